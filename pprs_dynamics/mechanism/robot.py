@@ -1,0 +1,191 @@
+"""What the robot is: geometry, masses and gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pprs_dynamics.errors import ModelError
+
+Array = NDArray[np.float64]
+
+DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
+ELBOWS = ('up', 'down')
+
+
+class ChainVector(NamedTuple):
+    """One vector per chain, by its components in the chain's own frame (e_i, n_i, k).
+
+    e_i points radially outwards from the base's centre, n_i along the revolute axis of C_i
+    (the slide's direction), k up; e_i x n_i = k. Each component is (N, 3), chains last.
+    """
+
+    e: Array
+    n: Array
+    k: Array
+
+
+def add(a: ChainVector, b: ChainVector) -> ChainVector:
+    """Return a + b."""
+    return ChainVector(a.e + b.e, a.n + b.n, a.k + b.k)
+
+
+def cross(a: ChainVector, b: ChainVector) -> ChainVector:
+    """Return a x b."""
+    return ChainVector(a.n * b.k - a.k * b.n, a.k * b.e - a.e * b.k, a.e * b.n - a.n * b.e)
+
+
+class ChainFrames:
+    """The three chain frames (e_i, n_i, k), and the way between them and `base`.
+
+    Parameters
+    ----------
+    angles : sequence of 3 floats
+        Chain angles delta_i [rad].
+    """
+
+    def __init__(self, angles: tuple[float, float, float]) -> None:
+        self.cos = np.cos(angles)
+        self.sin = np.sin(angles)
+
+    def components(self, vector: Array) -> ChainVector:
+        """Return the chain components of a vector given in `base`.
+
+        Parameters
+        ----------
+        vector : (N, 3) or (N, 3, 3) array
+            One vector for all chains, or one per chain (axis 1).
+        """
+        if vector.ndim == 2:
+            vector = vector[:, None, :]
+        x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+        e, n = x * self.cos + y * self.sin, y * self.cos - x * self.sin
+        return ChainVector(e, n, np.broadcast_to(z, e.shape))
+
+    def base(self, vector: ChainVector) -> Array:
+        """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
+        e, n, k = np.broadcast_arrays(*vector)
+        return np.stack((e * self.cos - n * self.sin, e * self.sin + n * self.cos, k), axis=-1)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Lengths and angles of the mechanism.
+
+    Parameters
+    ----------
+    base_radius, platform_radius, rod_length : float
+        R, r and l [m].
+    chain_angles, platform_angles : 3 floats
+        delta_i on the base and delta'_i on the platform [rad].
+    elbow : {'up', 'down'}
+        Branch of the inverse kinematics: 'up' has sin u_i > 0, the carriage below the platform.
+    """
+
+    base_radius: float
+    platform_radius: float
+    rod_length: float
+    chain_angles: tuple[float, float, float]
+    platform_angles: tuple[float, float, float]
+    elbow: str = 'up'
+    frames: ChainFrames = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ('base_radius', 'platform_radius', 'rod_length'):
+            _require(f'geometry.{name}', getattr(self, name), getattr(self, name) > 0,
+                     'be greater than 0 m')
+        for name in ('chain_angles', 'platform_angles'):
+            angles = np.asarray(getattr(self, name), dtype=float)
+            _require(f'geometry.{name}', getattr(self, name), angles.shape == (3,),
+                     'hold three angles [rad]')
+            distance = np.abs(np.exp(1j * angles) - np.exp(1j * np.roll(angles, 1)))
+            _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
+                     'hold three different directions')
+        _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
+        object.__setattr__(self, 'frames', ChainFrames(self.chain_angles))
+
+    @property
+    def elbow_sign(self) -> float:
+        """Sign of sin u_i."""
+        return 1.0 if self.elbow == 'up' else -1.0
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Masses and the inertia of the platform with its payload.
+
+    Parameters
+    ----------
+    platform, payload : float
+        M and m [kg].
+    slides, lifts, rods : 3 floats each
+        m_1..m_3, m_4..m_6 and m_b of each chain [kg].
+    centre : 3 floats
+        Centre of mass of platform and payload from o, in `platform` [m].
+    inertia : 6 floats
+        Elements xx, yy, zz, xy, xz, yz of the inertia tensor of both about that centre, in
+        `platform` [kg m^2]; products as tensor elements (-integral of x y dm), as in a URDF.
+    """
+
+    platform: float
+    payload: float
+    slides: tuple[float, float, float]
+    lifts: tuple[float, float, float]
+    rods: tuple[float, float, float]
+    centre: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]
+
+    def __post_init__(self) -> None:
+        for name, value in (('platform', self.platform), ('payload', self.payload)):
+            _require(f'masses.{name}', value, value >= 0, 'be at least 0 kg')
+        for name in ('slides', 'lifts', 'rods'):
+            value = getattr(self, name)
+            _require(f'masses.{name}', value, len(value) == 3 and min(value) >= 0,
+                     'hold three masses of at least 0 kg')
+        _require('masses.platform', self.platform, self.total > 0,
+                 'with masses.payload be greater than 0 kg')
+        # A body's tensor has principal moments that satisfy the triangle inequality; a point
+        # mass has none at all. Tolerance: a thin disc lies exactly on the border.
+        moments = np.linalg.eigvalsh(self.inertia_tensor)
+        slack = 1e-9 * max(float(moments[2]), 1e-300)
+        _require('masses.inertia', self.inertia, bool(moments[0] >= -slack),
+                 'be a positive semi-definite tensor')
+        triangle = bool(moments[0] + moments[1] >= moments[2] - slack)
+        _require('masses.inertia', self.inertia, triangle,
+                 'have principal moments of which each two sum to at least the third')
+
+    @property
+    def total(self) -> float:
+        """M + m [kg]."""
+        return self.platform + self.payload
+
+    @property
+    def inertia_tensor(self) -> Array:
+        """Inertia tensor about the centre of mass, in `platform`, (3, 3) [kg m^2]."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The rigid mechanism: all that the frictionless dynamics needs.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    masses : Masses
+    gravity : 3 floats
+        Gravity acceleration in `base` [m/s^2].
+    """
+
+    geometry: Geometry
+    masses: Masses
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+
+
+def _require(key: str, value: Any, condition: bool, rule: str) -> None:
+    if not condition:
+        raise ModelError(key, value, rule)

@@ -1,0 +1,1 @@
+"""The drive model: the sum over effects, its limits and its file."""

@@ -1,0 +1,144 @@
+"""Every key of a model file, declared once: type, size, unit, rule and description.
+
+The file loader, the nodes' parameter descriptors and the documentation read this table.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.mechanism.robot import ELBOWS
+
+EQUATIONS = ('corrected', 'printed')
+APPROACHES = ('whole_mechanism', 'independent_chains')
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a model file.
+
+    Parameters
+    ----------
+    name : str
+        Full dotted name.
+    description : str
+    unit : str
+        Empty for words and pure numbers.
+    size : int or None
+        Length of a list; None for a single value.
+    lower, upper : float
+        Bounds, both allowed.
+    positive : bool
+        True where 0 is not allowed either.
+    choices : tuple of str
+        Words that are allowed, for a key that holds one; () for numbers.
+    default : object
+        Value where a file is silent; None where the file must have it.
+    """
+
+    name: str
+    description: str
+    unit: str = ''
+    size: int | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    positive: bool = False
+    choices: tuple[str, ...] = ()
+    default: Any = None
+
+    @property
+    def rule(self) -> str:
+        """What a value must be, completing "it must ..."."""
+        if self.choices:
+            return f'be one of {", ".join(self.choices)} ({self.description})'
+        count = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
+        limits = []
+        if self.positive:
+            limits.append('greater than 0')
+        elif self.lower > -math.inf:
+            limits.append(f'at least {self.lower:g}')
+        if self.upper < math.inf:
+            limits.append(f'at most {self.upper:g}')
+        bounds = f', {" and ".join(limits)}' if limits else ''
+        unit = f' [{self.unit}]' if self.unit else ''
+        return f'{count}{bounds} ({self.description}{unit})'
+
+    def check(self, value: Any) -> Any:
+        """Return the value as a word, a float or a tuple of floats, or raise ModelError."""
+        if self.choices:
+            if not isinstance(value, str) or value not in self.choices:
+                raise ModelError(self.name, value, self.rule)
+            return value
+        if self.size is None:
+            return self._number(value, value)
+        if isinstance(value, (str, bytes)) or not hasattr(value, '__len__'):
+            raise ModelError(self.name, value, self.rule)
+        if len(value) != self.size:
+            raise ModelError(self.name, list(value), self.rule)
+        return tuple(self._number(element, list(value)) for element in value)
+
+    def _number(self, element: Any, value: Any) -> float:
+        good = (isinstance(element, (int, float)) and not isinstance(element, bool)
+                and math.isfinite(element) and self.lower <= element <= self.upper
+                and not (self.positive and element <= 0))
+        if not good:
+            raise ModelError(self.name, value, self.rule)
+        return float(element)
+
+
+def _friction(joint: str, where: str, symbol: str) -> tuple[Key, ...]:
+    return (
+        Key(f'friction.{joint}.viscous', f'c_{symbol}, viscous friction in {where}',
+            'N m s/rad', lower=0),
+        Key(f'friction.{joint}.coulomb', f'mu_{symbol}, Coulomb friction in {where}', lower=0),
+        Key(f'friction.{joint}.diameter', f'd_{symbol}, diameter in {where}', 'm', lower=0))
+
+
+KEYS: dict[str, Key] = {key.name: key for key in (
+    Key('equations', 'the paper\'s (7), (12), (13) corrected or to the letter',
+        choices=EQUATIONS),
+    Key('geometry.base_radius', 'R, radius of the base', 'm', positive=True),
+    Key('geometry.platform_radius', 'r, radius of the platform', 'm', positive=True),
+    Key('geometry.rod_length', 'l, length of the guiding rods', 'm', positive=True),
+    Key('geometry.chain_angles', 'delta_i, chains around the base', 'rad', size=3),
+    Key('geometry.platform_angles', 'delta\'_i, joints around the platform', 'rad', size=3),
+    Key('geometry.elbow', 'branch of the rods', choices=ELBOWS),
+    Key('masses.platform', 'M, mass of the platform', 'kg', lower=0),
+    Key('masses.payload', 'm, mass of the manipulated object', 'kg', lower=0),
+    Key('masses.slides', 'm_1..m_3, masses of the slides', 'kg', size=3, lower=0),
+    Key('masses.lifts', 'm_4..m_6, masses of the lifts', 'kg', size=3, lower=0),
+    Key('masses.rods', 'm_b, masses of the guiding rods', 'kg', size=3, lower=0),
+    Key('masses.centre', 'centre of mass of platform and payload, in platform', 'm', size=3),
+    Key('masses.inertia', 'xx yy zz xy xz yz about that centre, in platform', 'kg m^2', size=6),
+    Key('gravity', 'gravity in base', 'm/s^2', size=3),
+    Key('friction.approach', 'how passive friction reaches the drives', choices=APPROACHES),
+    Key('friction.reversal_velocity', 'width in which sgn turns over in drives', 'm/s',
+        positive=True),
+    Key('friction.reversal_rate', 'width in which sgn turns over in passive joints', 'rad/s',
+        positive=True),
+    Key('friction.drives.viscous', 'c_i, viscous friction of the drives', 'N s/m', size=6,
+        lower=0),
+    Key('friction.drives.coulomb', 'mu of the drives', size=6, lower=0),
+    *_friction('revolute', 'C_i', 'r'),
+    *_friction('spherical', 'A_i', 's'),
+    Key('limits.slide_stroke', 'lowest and highest position of the slides', 'm', size=2,
+        default=(-0.3, 0.3)),
+    Key('limits.lift_stroke', 'lowest and highest position of the lifts', 'm', size=2,
+        default=(-0.1, 0.8)),
+    Key('limits.effort', 'largest absolute force of each drive', 'N', size=6, positive=True,
+        default=(100.0,) * 6),
+    Key('limits.condition_number', 'largest condition number of the drive Jacobian', lower=1,
+        default=20.0),
+    Key('limits.rod_sine', 'smallest |sin u_i|', positive=True, upper=1, default=0.05),
+    Key('limits.rod_cosine', 'smallest |cos u_i| for independent_chains', positive=True, upper=1,
+        default=0.05),
+)}
+
+# Keys of ROS 2 itself and of single nodes, which may stand in the same file.
+NODE_KEYS = frozenset({
+    'max_age', 'file', 'source', 'rate', 'seed', 'duration', 'repeat', 'points',
+    'use_sim_time', 'start_type_description_service'})
+NODE_PREFIXES = ('qos_overrides.',)

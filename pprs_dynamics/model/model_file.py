@@ -1,0 +1,261 @@
+"""Model files: YAML that is also a ROS 2 parameter file -> DriveModel.
+
+The same `build_model` serves files and the nodes' parameters: both are flat keys and values.
+"""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pprs_dynamics.effects.active_friction import ActiveFriction
+from pprs_dynamics.effects.catalogue import CATALOGUE
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.effects.passive_friction import (
+    IndependentChainsFriction,
+    JointFriction,
+    PassiveFriction,
+    WholeMechanismFriction,
+)
+from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.mechanism.reversal import Reversal
+from pprs_dynamics.mechanism.robot import Geometry, Masses, Robot
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.keys import KEYS, NODE_KEYS, NODE_PREFIXES
+from pprs_dynamics.model.limits import Limits
+
+DEFAULT_MODEL = 'config/paper.yaml'
+
+
+def find_file(path: str | PathLike[str]) -> Path:
+    """Return the file itself, or the package's own of that name (e.g. config/paper.yaml).
+
+    Raises
+    ------
+    UnreadableFileError
+        Where there is neither.
+    """
+    given = Path(path)
+    if given.exists() or given.is_absolute():
+        return given
+    package = Path(__file__).resolve().parents[1]
+    # A source tree or an editable install; a `pip install --target`; a prefix or workspace,
+    # four folders above <prefix>/lib/pythonX.Y/site-packages/pprs_dynamics.
+    roots = [package.parent, package.parent / 'share/pprs_dynamics']
+    roots += [prefix / 'share/pprs_dynamics' for prefix in package.parents[2:5]]
+    roots.append(Path(sys.prefix) / 'share/pprs_dynamics')
+    for root in roots:
+        if (root / given).is_file():
+            return root / given
+    raise UnreadableFileError(path, 'no such file, nor one of that name in the package')
+
+
+def load_model(path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel:
+    """Read a model file; see `DriveModel.load`."""
+    file = find_file(path)
+    return build_model(read_parameters(file), source=str(file))
+
+
+def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
+    """Return the flat keys and values of a ROS 2 parameter file.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be read, is not YAML, or has no `ros__parameters`.
+    ModelError
+        For a list that mixes whole and decimal numbers, which ROS 2 refuses.
+    """
+    try:
+        content = yaml.load(Path(path).read_text(encoding='utf-8'), Loader=_StrictLoader)
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    except UnicodeDecodeError:
+        raise UnreadableFileError(path, 'not a text file in UTF-8') from None
+    except yaml.YAMLError as error:
+        raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
+    flat = dict(_flatten(_parameters_block(path, content)))
+    for key, value in flat.items():
+        if isinstance(value, list) and len({type(element) for element in value}) > 1:
+            raise ModelError(key, value, 'hold elements of one type, as ROS 2 demands '
+                             '(write 0.0, not 0, among decimal numbers)', str(path))
+    return flat
+
+
+def build_model(parameters: Mapping[str, Any], source: str = '') -> DriveModel:
+    """Build the model from flat keys and values, each checked.
+
+    Parameters
+    ----------
+    parameters : mapping
+        E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored.
+    source : str
+        Named in errors.
+
+    Raises
+    ------
+    ModelError
+        For a key that is unknown, missing, of the wrong type or impossible.
+    """
+    try:
+        return _build(parameters, source)
+    except ModelError as error:
+        if error.source:
+            raise
+        raise ModelError(error.key, error.value, error.rule, source) from None
+
+
+def default_parameters() -> dict[str, Any]:
+    """Return the flat keys and values of the paper's robot."""
+    return read_parameters(find_file(DEFAULT_MODEL))
+
+
+def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
+    values: dict[str, Any] = {}
+    _require_known(parameters)
+    for name, key in KEYS.items():
+        if name in parameters:
+            values[name] = key.check(parameters[name])
+        elif key.default is None:
+            raise ModelError(name, None, key.rule)
+        else:
+            values[name] = key.default
+    for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
+        if not values[stroke][0] < values[stroke][1]:
+            raise ModelError(stroke, values[stroke], 'be a lower and a higher position [m]')
+    _check_tolerances(parameters)
+
+    def group(prefix: str) -> dict[str, Any]:
+        return {name.removeprefix(prefix): value for name, value in values.items()
+                if name.startswith(prefix) and '.' not in name.removeprefix(prefix)}
+
+    robot = Robot(Geometry(**group('geometry.')), Masses(**group('masses.')), values['gravity'])
+    limits = Limits(**group('limits.'))
+    printed = values['equations'] == 'printed'
+    joints = (JointFriction(**group('friction.revolute.')),
+              JointFriction(**group('friction.spherical.')))
+    passive: PassiveFriction
+    if values['friction.approach'] == WholeMechanismFriction.approach:
+        passive = WholeMechanismFriction(*joints, printed)
+    else:
+        passive = IndependentChainsFriction(*joints, printed, limits.rod_cosine)
+    effects = (ActiveFriction(**group('friction.drives.')), passive, *_added_effects(parameters))
+    for name, value in parameters.items():
+        if name.startswith(('effects.', 'tolerances.', 'history.')):
+            values[name] = value
+    return DriveModel(
+        robot, effects, limits,
+        Reversal(values['friction.reversal_velocity'], values['friction.reversal_rate']),
+        values['equations'], values, source)
+
+
+def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
+    active = parameters.get('effects.active')
+    active = [] if active is None else active
+    if isinstance(active, str) or not all(isinstance(name, str) for name in active):
+        raise ModelError('effects.active', active, 'be a list of names of effects')
+    if len(set(active)) < len(active):
+        raise ModelError('effects.active', list(active), 'name each effect once')
+    for name in active:
+        if name not in CATALOGUE:
+            raise ModelError('effects.active', list(active), f'name known effects, not {name!r}'
+                             + _suggestion(name, CATALOGUE) + f': {", ".join(CATALOGUE)}')
+    blocks = _nested({key.removeprefix('effects.'): value for key, value in parameters.items()
+                      if key.startswith('effects.') and key != 'effects.active'})
+    for name, block in blocks.items():
+        if name not in CATALOGUE:
+            raise ModelError(f'effects.{name}', block, 'belong to a known effect'
+                             + _suggestion(name, CATALOGUE) + f': {", ".join(CATALOGUE)}')
+        # A block that is not active is checked all the same: it may be switched on any time.
+        effect = CATALOGUE[name].from_file(block)
+        if name in active:
+            yield effect
+    missing = [name for name in active if name not in blocks]
+    if missing:
+        raise ModelError(f'effects.{missing[0]}', None, 'be given: effects.active names it')
+
+
+def _check_tolerances(parameters: Mapping[str, Any]) -> None:
+    for name, value in parameters.items():
+        target = name.removeprefix('tolerances.')
+        if target == name:
+            continue
+        if target not in KEYS or KEYS[target].choices:
+            raise ModelError(name, value, 'name a number of the model'
+                             + _suggestion(target, KEYS))
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
+            raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
+
+
+def _require_known(parameters: Mapping[str, Any]) -> None:
+    for name, value in parameters.items():
+        known = (name in KEYS or name in NODE_KEYS
+                 or name.startswith((*NODE_PREFIXES, 'effects.', 'tolerances.', 'history.')))
+        if not known:
+            raise ModelError(name, value, 'not be there: no such key'
+                             + _suggestion(name, (*KEYS, *NODE_KEYS)))
+
+
+def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
+    if not isinstance(content, Mapping) or not content:
+        raise UnreadableFileError(path, 'not a model file: it must map /** to ros__parameters')
+    blocks: dict[str, Mapping[str, Any]] = {}
+    for node, block in content.items():
+        if not isinstance(block, Mapping) or not isinstance(block.get('ros__parameters'), Mapping):
+            raise UnreadableFileError(
+                path, f'not a model file: {node} must hold a mapping ros__parameters')
+        blocks[node] = block['ros__parameters']
+    if '/**' in blocks:
+        return blocks['/**']
+    if len(blocks) > 1:
+        raise UnreadableFileError(
+            path, f'parameters of {len(blocks)} nodes and none for all: put the model under /**')
+    return next(iter(blocks.values()))
+
+
+def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    for key, value in block.items():
+        if isinstance(value, Mapping):
+            yield from _flatten(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}', value
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for name, value in flat.items():
+        *folders, leaf = name.split('.')
+        branch = tree
+        for folder in folders:
+            branch = branch.setdefault(folder, {})
+        branch[leaf] = value
+    return tree
+
+
+def _suggestion(name: str, known: Any) -> str:
+    close = difflib.get_close_matches(name, list(known), 1)
+    return f' (did you mean {close[0]}?)' if close else ''
+
+
+def _one_line(error: Exception) -> str:
+    return ' '.join(str(error).split())
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """YAML that refuses the same key twice: the later one would win in silence."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            key = key_node.value
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'the key {key!r} stands twice', key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep=deep)

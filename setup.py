@@ -1,0 +1,44 @@
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+package_name = 'pprs_dynamics'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    description='Dynamics of the 3-PPRS parallel robot with friction in every joint',
+    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    license='Apache-2.0',
+    maintainer='The pprs_dynamics founders',
+    maintainer_email='pprs-dynamics@example.org',
+    packages=find_packages(include=[package_name, f'{package_name}.*']),
+    package_data={package_name: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+        (f'share/{package_name}/config', glob('config/*.yaml')),
+    ],
+    python_requires='>=3.11',
+    install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'PyYAML>=6'],
+    extras_require={
+        # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
+        'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
+                'ros-sensor-msgs==5.5.1', 'ros-trajectory-msgs==5.5.1'],
+        'report': ['rich>=13', 'matplotlib>=3.8'],
+        'test': ['pytest>=8', 'hypothesis>=6', 'mujoco>=3.2', 'pin>=3', 'ruff>=0.6', 'mypy>=1.11',
+                 'types-PyYAML', 'scipy-stubs', 'colcon-common-extensions', 'colcon-ros',
+                 # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.
+                 'setuptools<80'],
+    },
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'feedforward = pprs_dynamics.nodes.feedforward:main',
+            'play_trajectory = pprs_dynamics.nodes.play_trajectory:main',
+            'pprs = pprs_dynamics.commands.pprs:main',
+        ],
+    },
+)
