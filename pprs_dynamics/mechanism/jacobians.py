@@ -76,7 +76,7 @@ def compute_jacobians(
         wrench_rows(frames, axis, chains.arm),
         wrench_rows(frames, chains.rod_direction, chains.arm)), axis=1)        # Eq. (4)
     try:
-        B_inverse: Array = np.linalg.inv(B)
+        B_inverse = np.asarray(np.linalg.inv(B), dtype=np.float64)
     except np.linalg.LinAlgError:
         sample = int(np.argmax([np.linalg.matrix_rank(matrix) < 6 for matrix in B]))
         raise SingularityError(sample, 'det [B] is 0',
