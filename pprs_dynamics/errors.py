@@ -53,10 +53,12 @@ class MotionError(PprsError, ValueError):
         What was found, with the sample.
     rule : str
         What is required.
+    kind : {'shape', 'finite', 'unit_length', 'time'}
+        Which sort of rule was broken.
     """
 
-    def __init__(self, quantity: str, found: str, rule: str) -> None:
-        self.quantity, self.found, self.rule = quantity, found, rule
+    def __init__(self, quantity: str, found: str, rule: str, kind: str) -> None:
+        self.quantity, self.found, self.rule, self.kind = quantity, found, rule, kind
         super().__init__(f'{quantity}: {found}, but it must {rule}')
 
 

@@ -88,11 +88,15 @@ class CatalogueEffect(Effect):
 
     @classmethod
     @abstractmethod
-    def from_file(cls, values: Mapping[str, Any]) -> CatalogueEffect:
-        """Build the effect from its block in a model file, or raise ModelError."""
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> CatalogueEffect:
+        """Build the effect from its block in a model file, or raise ModelError.
+
+        With `complete` false, values may be missing and the result only says that those given
+        are right: a node gets an effect's parameters one by one before it becomes active.
+        """
 
     @classmethod
-    def _checked(cls, prefix: str, values: Any) -> dict[str, float]:
+    def _checked(cls, prefix: str, values: Any, complete: bool) -> dict[str, float]:
         if not isinstance(values, Mapping):
             raise ModelError(prefix, values, f'map {_names(cls.parameters)} to numbers')
         known = {parameter.name: parameter for parameter in cls.parameters}
@@ -103,6 +107,8 @@ class CatalogueEffect(Effect):
         checked = {}
         for name, parameter in known.items():
             if name not in values and parameter.default is None:
+                if not complete:
+                    continue
                 raise ModelError(f'{prefix}.{name}', None,
                                  f'be given ({parameter.description} [{parameter.unit}])')
             checked[name] = parameter.check(f'{prefix}.{name}', values.get(name, parameter.default))
@@ -145,7 +151,7 @@ class DriveEffect(CatalogueEffect):
         return force
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any]) -> DriveEffect:
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> DriveEffect:
         """Build the effect from `{drive: {parameter: value}}`."""
         prefix = f'effects.{cls.name}'
         if not isinstance(values, Mapping) or not values:
@@ -155,7 +161,7 @@ class DriveEffect(CatalogueEffect):
             if drive not in DRIVES:
                 raise ModelError(f'{prefix}.{drive}', values[drive],
                                  f'sit on one of the drives {", ".join(DRIVES)}')
-        return cls({drive: cls._checked(f'{prefix}.{drive}', block)
+        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
                     for drive, block in values.items()})
 
 

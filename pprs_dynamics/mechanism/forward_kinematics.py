@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.mechanism.inverse_kinematics import spherical_joint_arms
+from pprs_dynamics.mechanism.inverse_kinematics import (
+    solve_inverse_kinematics,
+    spherical_joint_arms,
+)
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import Array, Geometry
 
@@ -82,11 +85,11 @@ def solve_forward_kinematics(
     q = np.array(drive_positions, dtype=float, ndmin=2)
     if q.ndim != 2 or q.shape[1] != 6 or len(q) == 0:
         raise MotionError('drive positions', f'their shape is {np.shape(drive_positions)}',
-                          'be (N, 6) with N of at least 1')
+                          'be (N, 6) with N of at least 1', 'shape')
     if not np.all(np.isfinite(q)):
         raise MotionError('drive positions',
                           f'sample {int(np.argmax(~np.isfinite(q).all(axis=1)))} is not finite',
-                          'be finite')
+                          'be finite', 'finite')
     home = home_pose(geometry)
     start = home if seed is None else seed
     P = np.array(np.broadcast_to(start.position, (len(q), 3)))
@@ -181,8 +184,6 @@ def _elbow_agrees(geometry: Geometry, P: Array, rotation: Array, q: Array) -> np
 
 
 def _drive_positions(geometry: Geometry, pose: PlatformMotion) -> Array:
-    from pprs_dynamics.mechanism.inverse_kinematics import solve_inverse_kinematics
-
     return solve_inverse_kinematics(geometry, pose).position
 
 

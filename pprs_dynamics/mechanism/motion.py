@@ -80,6 +80,33 @@ class PlatformMotion:
             self.angular_velocity[index], self.linear_acceleration[index],
             self.angular_acceleration[index], None if self.time is None else self.time[index])
 
+    def with_time(self, time: ArrayLike) -> PlatformMotion:
+        """Return the same motion with other times [s]."""
+        return PlatformMotion(
+            self.position, self.orientation, self.linear_velocity, self.angular_velocity,
+            self.linear_acceleration, self.angular_acceleration, time)
+
+    def resampled(self, rate: float) -> PlatformMotion:
+        """Return the motion at a constant rate.
+
+        Where the samples already have that rate they stay as they are, twists included; else a
+        spline through the poses is evaluated, see `from_poses`.
+
+        Parameters
+        ----------
+        rate : float
+            [Hz].
+        """
+        if self.time is None:
+            raise MotionError('time', 'it is absent', 'be known to resample', 'time')
+        if len(self) > 1 and np.allclose(np.diff(self.time) * rate, 1.0, rtol=0, atol=1e-6):
+            return self
+        # The last pose belongs to the motion even where rounding puts it just past the grid.
+        count = int((self.time[-1] - self.time[0]) * rate + 1e-9) + 1
+        grid = self.time[0] + np.arange(count) / rate
+        return PlatformMotion.from_poses(
+            self.time, self.position, self.orientation, at=grid).with_time(grid)
+
     @property
     def rotation(self) -> Array:
         """Rotation matrices from `platform` to `base`, (N, 3, 3)."""
@@ -125,7 +152,8 @@ class PlatformMotion:
         position : (N, 3) array_like
         orientation : (N, 4) array_like
         at : (K,) array_like, optional
-            Times at which to evaluate [s]; the poses' own by default.
+            Times at which to evaluate [s], in any order; the poses' own by default. The result
+            carries times only without it.
 
         References
         ----------
@@ -139,13 +167,14 @@ class PlatformMotion:
         knots = _times(time, len(position))
         if len(knots) < 4:
             raise MotionError('poses', f'{len(knots)} were given',
-                              'be at least four for velocities and accelerations')
+                              'be at least four for velocities and accelerations', 'shape')
         moments = knots if at is None else np.asarray(at, dtype=float)
         path = make_interp_spline(knots, position, k=5 if len(knots) >= 6 else 3)
         turn = RotationSpline(knots, Rotation.from_quat(orientation))
         return cls(
             path(moments), turn(moments).as_quat(), path.derivative(1)(moments),
-            turn(moments, 1), path.derivative(2)(moments), turn(moments, 2), moments)
+            turn(moments, 1), path.derivative(2)(moments), turn(moments, 2),
+            knots if at is None else None)
 
 
 def _matrix(name: str, value: ArrayLike, width: int, samples: int | None = None) -> Array:
@@ -153,15 +182,17 @@ def _matrix(name: str, value: ArrayLike, width: int, samples: int | None = None)
         array = np.array(value, dtype=float, ndmin=2)
     except (TypeError, ValueError):
         raise MotionError(name, f'{str(value)[:60]!r} was given',
-                          f'be an (N, {width}) array of numbers') from None
+                          f'be an (N, {width}) array of numbers', 'shape') from None
     if array.ndim != 2 or array.shape[1] != width or len(array) == 0:
         raise MotionError(name, f'its shape is {np.shape(value)}',
-                          f'be (N, {width}) with N of at least 1')
+                          f'be (N, {width}) with N of at least 1', 'shape')
     if samples is not None and len(array) != samples:
-        raise MotionError(name, f'it has {len(array)} samples', f'have {samples}, as position')
+        raise MotionError(name, f'it has {len(array)} samples', f'have {samples}, as position',
+                          'shape')
     if not np.all(np.isfinite(array)):
         row = int(np.argmax(~np.isfinite(array).all(axis=1)))
-        raise MotionError(name, f'sample {row} is {array[row].tolist()}', 'be finite')
+        raise MotionError(name, f'sample {row} is {array[row].tolist()}', 'be finite',
+                          'finite')
     array.flags.writeable = False
     return array
 
@@ -174,7 +205,8 @@ def _normalised(quaternions: Array) -> Array:
     if np.any(off):
         row = int(np.argmax(off))
         raise MotionError('orientation', f'the quaternion of sample {row} has length '
-                          f'{length[row]:.6g}', f'be 1 within {UNIT_LENGTH_TOLERANCE:g}')
+                          f'{length[row]:.6g}', f'be 1 within {UNIT_LENGTH_TOLERANCE:g}',
+                          'unit_length')
     unit: Array = quaternions / length[:, None]
     unit.flags.writeable = False
     return unit
@@ -183,13 +215,14 @@ def _normalised(quaternions: Array) -> Array:
 def _times(time: ArrayLike, samples: int) -> Array:
     times = np.array(time, dtype=float, ndmin=1)
     if times.shape != (samples,):
-        raise MotionError('time', f'its shape is {np.shape(time)}', f'be ({samples},), as position')
+        raise MotionError('time', f'its shape is {np.shape(time)}', f'be ({samples},), as position',
+                          'shape')
     if not np.all(np.isfinite(times)):
         raise MotionError('time', f'sample {int(np.argmax(~np.isfinite(times)))} is not finite',
-                          'be finite')
+                          'be finite', 'finite')
     if np.any(np.diff(times) <= 0):
         row = int(np.argmax(np.diff(times) <= 0))
         raise MotionError('time', f'sample {row + 1} at {times[row + 1]:.9g} s follows '
-                          f'{times[row]:.9g} s', 'strictly increase')
+                          f'{times[row]:.9g} s', 'strictly increase', 'time')
     times.flags.writeable = False
     return times

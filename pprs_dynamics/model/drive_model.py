@@ -47,6 +47,11 @@ class ModelState:
     def __init__(self, memories: dict[str, Any]) -> None:
         self.memories = memories
 
+    @property
+    def has_memory(self) -> bool:
+        """Whether any effect keeps anything."""
+        return any(memory is not None for memory in self.memories.values())
+
     def copy(self) -> ModelState:
         """Return an independent copy, to look ahead without advancing this one."""
         return ModelState(copy.deepcopy(self.memories))
@@ -115,9 +120,11 @@ class DriveModel:
             For a pose nearer to a singularity than `limits.rod_sine` or
             `limits.condition_number` allow.
         """
-        return solve_mechanism(
-            self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
-            minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
+        # Absurd numbers overflow; what comes out is checked by whoever uses it.
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            return solve_mechanism(
+                self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
+                minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
 
     def drive_forces(
         self, motion: PlatformMotion, state: ModelState | None = None,
@@ -140,10 +147,11 @@ class DriveModel:
         mechanism = self.mechanism(motion)
         parts = {RIGID_BODY: mechanism.rigid_body.force}
         state = self.initial_state() if state is None else state
-        for effect in self.effects:
-            if not effect.is_measurement:
-                parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-        total: Array = np.sum(list(parts.values()), axis=0)                    # Eq. (14)
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            for effect in self.effects:
+                if not effect.is_measurement:
+                    parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
+            total: Array = np.sum(list(parts.values()), axis=0)                # Eq. (14)
         return DriveForces(total, parts, mechanism)
 
     def condition_number(self, motion: PlatformMotion) -> Array:

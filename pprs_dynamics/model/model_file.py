@@ -172,8 +172,8 @@ def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
         if name not in CATALOGUE:
             raise ModelError(f'effects.{name}', block, 'belong to a known effect'
                              + _suggestion(name, CATALOGUE) + f': {", ".join(CATALOGUE)}')
-        # A block that is not active is checked all the same: it may be switched on any time.
-        effect = CATALOGUE[name].from_file(block)
+        # A block that is not active is checked all the same, but may still be incomplete.
+        effect = CATALOGUE[name].from_file(block, complete=name in active)
         if name in active:
             yield effect
     missing = [name for name in active if name not in blocks]

@@ -1,0 +1,118 @@
+"""Paths of the platform: the paper's helical translation, and a smooth random excitation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.robot import Array
+
+
+@dataclass(frozen=True)
+class HelicalPath:
+    """The paper's helical translation: one turn of radius R, rising by `rise`, in 3 pi / 2 s.
+
+    Parameters
+    ----------
+    radius : float
+        Of the helix [m]; the paper takes the base radius R.
+    height : float
+        Z where it starts [m].
+    rise : float
+        Gain of height per turn [m].
+    """
+
+    radius: float = 0.15
+    height: float = 0.5
+    rise: float = 0.1
+
+    duration = 3 * np.pi / 2
+
+    def motion(self, time: ArrayLike) -> PlatformMotion:
+        """Return the motion at times [s] within 0..duration, clipped to its ends outside."""
+        times = np.atleast_1d(np.asarray(time, dtype=float))
+        angle, rate, gain = _helix_angle(np.clip(times, 0.0, self.duration))
+        c, s, pitch = np.cos(angle), np.sin(angle), self.rise / (2 * np.pi)
+        R, zero = self.radius, np.zeros((len(times), 3))
+        position = np.stack((R * c, R * s, self.height + pitch * angle), axis=1)
+        velocity = np.stack((-R * s * rate, R * c * rate, pitch * rate), axis=1)
+        acceleration = np.stack((
+            -R * (s * gain + c * rate * rate), R * (c * gain - s * rate * rate), pitch * gain),
+            axis=1)
+        upright = np.tile((0.0, 0.0, 0.0, 1.0), (len(times), 1))
+        return PlatformMotion(position, upright, velocity, zero, acceleration, zero, times)
+
+
+def _helix_angle(t: Array) -> tuple[Array, Array, Array]:
+    """Return lambda(t) of the paper with its first and second derivative."""
+    half, whole = np.pi / 2, np.pi
+    phases = [t < half, t < whole]
+    angle = np.select(
+        phases, [2 / np.pi * t ** 2, 2 * (t - half) + half],
+        -2 * (t - whole) ** 2 / np.pi + 2 * (t - whole) + 3 * half)
+    rate = np.select(phases, [4 / np.pi * t, np.full_like(t, 2.0)], 2 - 4 / np.pi * (t - whole))
+    gain = np.select(phases, [np.full_like(t, 4 / np.pi), np.zeros_like(t)], -4 / np.pi)
+    return angle, rate, gain
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A random Fourier series in all six degrees of freedom, from rest to rest.
+
+    Parameters
+    ----------
+    duration : float
+        Of the whole motion [s].
+    seed : int
+        Of the random coefficients.
+    amplitude : float
+        Largest excursion from the centre along every axis [m].
+    tilt : float
+        Largest component of the rotation vector [rad].
+    highest_frequency : float
+        Of the series [Hz].
+    centre : 3 floats
+        Position around which the platform moves [m].
+    """
+
+    duration: float = 20.0
+    seed: int = 0
+    amplitude: float = 0.06
+    tilt: float = 0.15
+    highest_frequency: float = 0.6
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.5)
+
+    def motion(self, time: ArrayLike) -> PlatformMotion:
+        """Return the motion at times [s] within 0..duration, clipped to its ends outside."""
+        from scipy.spatial.transform import Rotation
+
+        times = np.atleast_1d(np.asarray(time, dtype=float))
+        # Twenty knots per period of the highest harmonic: the spline's error is then far below
+        # a micrometre, and position, velocity and acceleration belong to one curve exactly.
+        knots = np.linspace(0.0, self.duration,
+                            max(60, int(20 * self.duration * self.highest_frequency)))
+        coordinates = self._coordinates(knots)
+        orientation = Rotation.from_rotvec(coordinates[:, 3:]).as_quat()
+        inside = np.clip(times, 0.0, self.duration)
+        motion = PlatformMotion.from_poses(
+            knots, coordinates[:, :3] + self.centre, orientation, at=inside)
+        return motion.with_time(times)
+
+    def _coordinates(self, t: Array) -> Array:
+        rng = np.random.default_rng(self.seed)
+        count = max(1, int(self.highest_frequency * self.duration))
+        harmonics = np.arange(1, count + 1) / self.duration
+        phase = rng.uniform(0, 2 * np.pi, (6, count))
+        weight = rng.normal(size=(6, count))
+        series = np.einsum('jk,jkn->jn', weight,
+                           np.sin(2 * np.pi * harmonics[:, None] * t + phase[..., None])).T
+        ramp = np.clip(np.minimum(t, self.duration - t) / (0.1 * self.duration), 0.0, 1.0)
+        # A septic blend has no velocity, acceleration or jerk at its ends.
+        blend = ramp ** 4 * (35 - 84 * ramp + 70 * ramp ** 2 - 20 * ramp ** 3)
+        shaped = series * blend[:, None]
+        reach = np.array([self.amplitude] * 3 + [self.tilt] * 3)
+        scaled: Array = shaped * (reach / np.abs(shaped).max(axis=0))
+        return scaled

@@ -1,0 +1,128 @@
+"""Node `feedforward`: platform pose trajectories in, six drive forces out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.nodes import conversions
+from pprs_dynamics.nodes.conversions import TrajectoryRequest
+from pprs_dynamics.nodes.parameters import current_values, declare_model, model_from
+from pprs_dynamics.nodes.rejection import CODES, Rejection
+from pprs_dynamics.nodes.status import StatusReporter
+
+
+class FeedforwardNode(Node):
+    """Answers every valid trajectory with friction-compensated drive forces.
+
+    A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
+    reason stands in `~/status` and in the log.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('feedforward', allow_undeclared_parameters=True, **options)
+        self.declare_parameter('max_age', 0.0, ParameterDescriptor(
+            description='oldest header stamp that is accepted [s]; 0: any', dynamic_typing=True))
+        taken_from_paper = declare_model(self)
+        self._apply(self._validated())
+        if 0 < len(taken_from_paper) < 20:
+            self.get_logger().info(f'not given, taken from the paper: {taken_from_paper}')
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(lambda _: self._apply(self._validated()))
+
+        self._counters = {'received': 0, 'accepted': 0, **dict.fromkeys(CODES, 0)}
+        self._status = StatusReporter(self, {}, self._counters)
+        self._commands = self.create_publisher(Float64MultiArray, '~/commands', 10)
+        self._joint_command = self.create_publisher(JointState, '~/joint_command', 10)
+        self._joint_trajectory = self.create_publisher(JointTrajectory, '~/joint_trajectory', 10)
+        self.create_subscription(
+            MultiDOFJointTrajectory, '~/trajectory', self._on_trajectory, 10)
+        self.get_logger().info(
+            f'equations {self._model.equations}, effects '
+            f'{", ".join(effect.name for effect in self._model.effects)}; ready')
+
+    def _on_trajectory(self, message: MultiDOFJointTrajectory) -> None:
+        self._counters['received'] += 1
+        try:
+            request = conversions.read_trajectory(
+                message, self.get_clock().now().nanoseconds, self._max_age)
+            forces = self._answer(request)
+        except PprsError as error:
+            self._reject(Rejection.of(error))
+            return
+        self._counters['accepted'] += 1
+        self._publish(request, forces)
+        self._status.report('OK', 'OK', 'commands follow the trajectory')
+
+    def _answer(self, request: TrajectoryRequest) -> DriveForces:
+        model, state = self._model, self._state
+        forces = model.drive_forces(request.motion, state.copy())
+        mechanism = forces.mechanism
+        for name, quantity in (('force', forces.total), ('drive velocity', mechanism.velocity),
+                               ('drive acceleration', mechanism.acceleration)):
+            if not np.all(np.isfinite(quantity)):
+                raise Rejection('OUTPUT', f'the model gave a {name} that is not finite')
+        model.limits.check_strokes(mechanism.position)
+        model.limits.check_efforts(forces.total)
+        # Memory advances with what is executed, the first point, and only once it is accepted.
+        if state.has_memory:
+            model.drive_forces(request.motion[:1], state)
+        return forces
+
+    def _publish(self, request: TrajectoryRequest, forces: DriveForces) -> None:
+        self._commands.publish(conversions.commands(forces))
+        if self._joint_command.get_subscription_count():
+            self._joint_command.publish(conversions.joint_command(request, forces))
+        if self._joint_trajectory.get_subscription_count():
+            self._joint_trajectory.publish(conversions.joint_trajectory(request, forces))
+        for name, publisher in self._parts.items():
+            if publisher.get_subscription_count():
+                publisher.publish(conversions.effort_part(request, forces.parts[name]))
+
+    def _reject(self, rejection: Rejection) -> None:
+        self._counters[rejection.code] += 1
+        self._status.report('ERROR', rejection.code, rejection.text)
+        self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
+
+    def _validated(self, changes: tuple[Parameter, ...] = ()) -> tuple[DriveModel, float]:
+        values = current_values(self)
+        values.update({change.name: change.value for change in changes
+                       if change.name == 'max_age'})
+        max_age = values.pop('max_age')
+        if isinstance(max_age, bool) or not isinstance(max_age, (int, float)) or not max_age >= 0:
+            raise ModelError('max_age', max_age, 'be a number of at least 0 [s]')
+        return model_from(values, [c for c in changes if c.name != 'max_age']), float(max_age)
+
+    def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        try:
+            self._validated(tuple(changes))
+        except PprsError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, validated: tuple[DriveModel, float]) -> None:
+        self._model, self._max_age = validated
+        self._state = self._model.initial_state()
+        names = ['rigid_body', *(e.name for e in self._model.effects if not e.is_measurement)]
+        known: dict[str, Any] = getattr(self, '_parts', {})
+        for name in known.keys() - set(names):
+            self.destroy_publisher(known[name])
+        self._parts = {
+            name: known.get(name) or self.create_publisher(JointState, f'~/effort/{name}', 10)
+            for name in names}
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until it is told to stop."""
+    from pprs_dynamics.nodes.run import run_node
+
+    return run_node(FeedforwardNode, args)
