@@ -36,8 +36,8 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'feedforward = pprs_dynamics.nodes.feedforward:main',
-            'play_trajectory = pprs_dynamics.nodes.play_trajectory:main',
+            'feedforward = pprs_dynamics.nodes.executables:feedforward',
+            'play_trajectory = pprs_dynamics.nodes.executables:play_trajectory',
             'pprs = pprs_dynamics.commands.pprs:main',
         ],
     },

@@ -119,10 +119,3 @@ class FeedforwardNode(Node):
         self._parts = {
             name: known.get(name) or self.create_publisher(JointState, f'~/effort/{name}', 10)
             for name in names}
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until it is told to stop."""
-    from pprs_dynamics.nodes.run import run_node
-
-    return run_node(FeedforwardNode, args)

@@ -91,10 +91,3 @@ def _require_possible(values: dict[str, Any]) -> None:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until the path is played or it is told to stop."""
-    from pprs_dynamics.nodes.run import run_node
-
-    return run_node(PlayTrajectoryNode, args)

@@ -1,0 +1,48 @@
+# Two commands do everything on a fresh machine: make demo, make test.
+# The environment lives in .venv; `make clean` removes it and all that was built.
+
+VENV := .venv
+BIN := $(VENV)/bin
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
+	&& echo $$p && break; done)
+
+.PHONY: help demo test reproduce lint clean
+
+help:
+	@echo 'make demo       install into $(VENV), run the nodes, show forces and a picture'
+	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
+	@echo 'make reproduce  the figures and claims of the paper, into output/'
+	@echo 'make clean      remove $(VENV) and everything that was built'
+
+demo: $(VENV)/.demo
+	$(BIN)/python demo/feedforward_demo.py output
+
+test: $(VENV)/.test lint
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+reproduce: $(VENV)/.demo
+	$(BIN)/pprs reproduce --output output
+
+# What the demonstration needs; the tests add to it.
+$(VENV)/.demo: setup.py | $(VENV)/bin/python
+	@echo 'Installing the package with ROS 2 wheels (about a minute) ...'
+	$(BIN)/pip install --quiet --upgrade pip
+	$(BIN)/pip install --quiet --editable '.[ros,report]'
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.demo
+	@echo 'Installing physics engines, linters and colcon for the tests ...'
+	$(BIN)/pip install --quiet --editable '.[ros,report,test]'
+	@touch $@
+
+$(VENV)/bin/python:
+	@test -n '$(PYTHON)' || { echo 'pprs_dynamics needs Python 3.11, 3.12 or 3.13: none was found on PATH (or set PYTHON=...)' >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo 'python -m venv failed; on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
+
+clean:
+	rm -rf $(VENV) output build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,134 @@
+"""The main job, shown: two nodes over DDS, the paper's path in, six drive forces out.
+
+`feedforward` and `play_trajectory` run as processes of their own; this script only listens.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+from ros_processes import executable, node_process, reserve_domain
+
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.report.figures import draw_forces
+
+PARTS = ('rigid_body', 'active_friction', 'passive_friction')
+RATE = 200.0
+MESSAGES = 943  # 3 pi / 2 seconds of path
+PATIENCE = 30.0  # [s] for discovery and the path together
+ROWS = 16
+
+
+def main() -> int:
+    """Run the demonstration and return its exit status."""
+    output = Path(sys.argv[1] if len(sys.argv) > 1 else 'output')
+    output.mkdir(parents=True, exist_ok=True)
+    console = Console()
+    if not console.is_terminal and 'COLUMNS' not in os.environ:
+        console = Console(width=100)
+    domain, holder = reserve_domain()
+    with holder, tempfile.TemporaryDirectory() as folder:
+        log = Path(folder)
+        console.print('Starting [b]feedforward[/] and [b]play_trajectory[/] as two processes; '
+                      f'the paper\'s helical path at {RATE:g} Hz goes in ...')
+        with node_process([executable('feedforward')], domain, log / 'feedforward.log'):
+            time_s, total, parts = _listen(domain, log, console)
+        if len(time_s) < MESSAGES:
+            console.print(f'[red]only {len(time_s)} of {MESSAGES} messages were answered[/]')
+            for file in sorted(log.iterdir()):
+                console.print(f'{file.name}:\n{file.read_text()}')
+            return 1
+    console.print(_table(time_s, total, parts))
+    console.print(f'{len(time_s)} messages in, {len(total)} commands out, all finite: '
+                  f'{bool(np.isfinite(total).all())}')
+    picture = draw_forces(output / 'drive_forces.png', time_s, total, parts,
+                          'Drive forces on the paper\'s helical path, as published by feedforward')
+    curves = output / 'drive_forces.csv'
+    np.savetxt(curves, np.column_stack((time_s, total)), delimiter=',', fmt='%.9g', comments='',
+               header=','.join(('time', *(f'{drive}/effort' for drive in DRIVES))))
+    console.print(f'Picture: [b]{picture}[/]   curves: [b]{curves}[/]')
+    return 0
+
+
+def _listen(
+    domain: int, log: Path, console: Console,
+) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Play the path and return what came out: times, forces and their parts."""
+    os.environ.update(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+    from sensor_msgs.msg import JointState
+
+    rclpy.init()
+    node = rclpy.create_node('demo')
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    received: dict[str, dict[int, list[float]]] = {name: {} for name in ('total', *PARTS)}
+
+    def keep(name: str, message: JointState) -> None:
+        stamp = message.header.stamp
+        received[name][stamp.sec * 10 ** 9 + stamp.nanosec] = list(message.effort)
+
+    topics = {'total': '/feedforward/joint_command',
+              **{part: f'/feedforward/effort/{part}' for part in PARTS}}
+    subscriptions = [node.create_subscription(
+        JointState, topic, lambda message, name=name: keep(name, message), 100)
+        for name, topic in topics.items()]
+    deadline = time.monotonic() + PATIENCE
+    while (any(node.count_publishers(topic) == 0 for topic in topics.values())
+           and time.monotonic() < deadline):
+        executor.spin_once(timeout_sec=0.05)
+    command = [executable('play_trajectory'), '--ros-args', '-p', f'rate:={RATE}']
+    with (node_process(command, domain, log / 'play_trajectory.log'),
+          Progress(console=console, transient=True) as progress):
+        task = progress.add_task('commands received', total=MESSAGES)
+        while (min(len(kept) for kept in received.values()) < MESSAGES
+               and time.monotonic() < deadline):
+            executor.spin_once(timeout_sec=0.05)
+            progress.update(task, completed=len(received['total']))
+    subscriptions.clear()
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown()
+    stamps = sorted(set.intersection(*(set(kept) for kept in received.values())))
+    # The path starts with the first message; stamps are the moments of publication.
+    time_s = (np.array(stamps, dtype=float) - stamps[0]) / 1e9 if stamps else np.empty(0)
+    arrays = {name: np.array([kept[stamp] for stamp in stamps]).reshape(-1, 6)
+              for name, kept in received.items()}
+    return time_s, arrays.pop('total'), arrays
+
+
+def _table(time_s: np.ndarray, total: np.ndarray, parts: dict[str, np.ndarray]) -> Table:
+    friction = parts['active_friction'] + parts['passive_friction']
+    table = Table(title='Drive forces [N], and how much of each is friction')
+    table.add_column('time [s]', justify='right')
+    for drive in DRIVES:
+        table.add_column(drive, justify='right')
+    for row in np.linspace(0, len(time_s) - 1, ROWS).astype(int):
+        table.add_row(f'{time_s[row]:.2f}', *(
+            f'{force:6.2f} [dim]{share:4.0%}[/]' for force, share in zip(
+                total[row], _share(friction[row], total[row]), strict=True)))
+    table.add_section()
+    rms = np.sqrt(np.mean(total ** 2, axis=0))
+    share = np.sqrt(np.mean(friction ** 2, axis=0)) / rms
+    table.add_row('rms', *(f'[b]{force:6.2f} {part:4.0%}[/]'
+                           for force, part in zip(rms, share, strict=True)))
+    return table
+
+
+def _share(friction: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """Return how much of the two parts' sizes is friction, 0 to 1, also where they cancel."""
+    sizes = np.abs(friction) + np.abs(total - friction)
+    return np.abs(friction) / np.maximum(sizes, 1e-12)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

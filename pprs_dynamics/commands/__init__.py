@@ -1,0 +1,1 @@
+"""The command-line tool `pprs`: arguments -> one call -> report. One file per subcommand."""

@@ -1,0 +1,59 @@
+"""`pprs`: reads the arguments, calls the subcommand, and turns errors into one line.
+
+Exit status: 0 done; 1 refused or a check failed; 2 bad usage or unreadable input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from pprs_dynamics import __version__
+from pprs_dynamics.commands import reproduce
+from pprs_dynamics.errors import PprsError
+
+COMMANDS: dict[str, ModuleType] = {'reproduce': reproduce}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `pprs` and return its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        status: int = COMMANDS[options.command].run(options)
+        sys.stdout.flush()
+    except PprsError as error:
+        print(f'pprs {options.command}: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f'pprs {options.command}: interrupted', file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output, e.g. `head`, went away: nothing is left to say to it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        # A full disk, a folder without permission: the name and the system's own reason.
+        print(f'pprs {options.command}: {error.filename or "output"}: {error.strerror}',
+              file=sys.stderr)
+        return 2
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='pprs', description='Dynamics of the 3-PPRS parallel robot: what the model says, '
+        'what was measured, and which physical effect is missing.')
+    parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
+    for name, module in COMMANDS.items():
+        summary = (module.__doc__ or '').splitlines()[0]
+        summary = summary.split(': ', 1)[1]
+        command = commands.add_parser(name, help=summary, description=summary)
+        command.add_argument('--model', metavar='FILE', default='config/paper.yaml',
+                             help='model file (default: the paper\'s robot, config/paper.yaml)')
+        command.add_argument('--json', metavar='FILE', help='write the result as JSON too')
+        module.add_arguments(command)
+    return parser

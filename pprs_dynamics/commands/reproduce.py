@@ -1,0 +1,53 @@
+"""pprs reproduce: the paper's simulation, figures 8 and 9, and its claims against what comes out.
+
+Writes figure_8.png, figure_9.png, forces.csv and claims.json into the output folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from pprs_dynamics.commands.output import make_folder, write_json
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.reproduction import Reproduction, reproduce
+from pprs_dynamics.report.figures import draw_figure_8, draw_figure_9
+from pprs_dynamics.report.tables import claims_table, console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('--output', metavar='DIR', required=True,
+                        help='folder for figures, curves and claims')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    model = DriveModel.load(options.model)
+    folder = make_folder(options.output)
+    with screen.status('running the paper\'s simulation'):
+        result = reproduce(model)
+        written = [draw_figure_8(folder / 'figure_8.png', result),
+                   draw_figure_9(folder / 'figure_9.png', result),
+                   _write_curves(folder / 'forces.csv', result)]
+    content = {'equations': model.equations, 'claims': [asdict(claim) for claim in result.claims]}
+    for file in filter(None, (folder / 'claims.json', options.json)):
+        write_json(file, content)
+    screen.print(claims_table(result.claims))
+    screen.print(f'written: {", ".join(str(file) for file in written)}, {folder / "claims.json"}')
+    return 0
+
+
+def _write_curves(path: Path, result: Reproduction) -> Path:
+    columns = {'time': result.time[:, None], 'Q': result.rigid_body, 'active': result.active,
+               **result.passive}
+    header = ['time'] + [f'{drive}/{name}' for name in columns if name != 'time'
+                         for drive in DRIVES]
+    np.savetxt(path, np.column_stack(list(columns.values())), fmt='%.9g', delimiter=',',
+               header=','.join(header), comments='')
+    return path

@@ -1,0 +1,28 @@
+"""Entry points of the nodes; they tell in one sentence where ROS 2 itself is missing."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+
+def feedforward() -> int:
+    """Run `ros2 run pprs_dynamics feedforward`."""
+    return _run('feedforward', 'FeedforwardNode')
+
+
+def play_trajectory() -> int:
+    """Run `ros2 run pprs_dynamics play_trajectory`."""
+    return _run('play_trajectory', 'PlayTrajectoryNode')
+
+
+def _run(module: str, node: str) -> int:
+    try:
+        import rclpy  # noqa: F401
+    except ImportError:
+        print(f'{module} needs ROS 2: source an installation (Jazzy or Kilted), or '
+              "pip install 'pprs_dynamics[ros]'", file=sys.stderr)
+        return 2
+    from pprs_dynamics.nodes.run import run_node
+
+    return run_node(getattr(importlib.import_module(f'pprs_dynamics.nodes.{module}'), node))
