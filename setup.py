@@ -1,5 +1,4 @@
 from glob import glob
-from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -9,8 +8,6 @@ setup(
     name=package_name,
     version='0.1.0',
     description='Dynamics of the 3-PPRS parallel robot with friction in every joint',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
-    long_description_content_type='text/markdown',
     license='Apache-2.0',
     maintainer='The pprs_dynamics founders',
     maintainer_email='pprs-dynamics@example.org',

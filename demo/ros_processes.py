@@ -53,12 +53,12 @@ def executable(name: str) -> str:
 
 @contextmanager
 def node_process(
-    command: list[str], domain: int, log: Path,
+    command: list[str], domain: int, log: Path, env: dict[str, str] | None = None,
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Run a node while the block lasts; end it with SIGINT, as Ctrl-C would."""
     with log.open('wb') as output:
         process = subprocess.Popen(
-            command, env=environment(domain), stdout=output, stderr=subprocess.STDOUT)
+            command, env=env or environment(domain), stdout=output, stderr=subprocess.STDOUT)
         try:
             yield process
         finally:

@@ -111,5 +111,5 @@ class MissingLibraryError(PprsError, ImportError):
 
 
 def _shorten(value: Any) -> str:
-    text = repr(value)
+    text = repr(list(value) if isinstance(value, tuple) else value)
     return text if len(text) <= 120 else text[:117] + '...'

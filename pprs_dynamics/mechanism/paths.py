@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import Array
 
+KNOTS_PER_PERIOD = 400
+
 
 @dataclass(frozen=True)
 class HelicalPath:
@@ -90,10 +92,12 @@ class Excitation:
         from scipy.spatial.transform import Rotation
 
         times = np.atleast_1d(np.asarray(time, dtype=float))
-        # Twenty knots per period of the highest harmonic: the spline's error is then far below
-        # a micrometre, and position, velocity and acceleration belong to one curve exactly.
+        # The curve is a spline by definition, so that pose, twist and acceleration belong to one
+        # motion exactly. Cubic on SO(3), its angular acceleration has kinks at the knots: this
+        # many per period of the highest harmonic leave them below 1e-4 of its size.
         knots = np.linspace(0.0, self.duration,
-                            max(60, int(20 * self.duration * self.highest_frequency)))
+                            max(500, int(KNOTS_PER_PERIOD * self.duration
+                                         * self.highest_frequency)))
         coordinates = self._coordinates(knots)
         orientation = Rotation.from_rotvec(coordinates[:, 3:]).as_quat()
         inside = np.clip(times, 0.0, self.duration)

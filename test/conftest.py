@@ -1,0 +1,20 @@
+"""One ROS domain per test session, so that runs side by side do not hear each other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+from ros_processes import environment, reserve_domain
+
+_DOMAIN, _HOLDER = reserve_domain()
+os.environ.update({name: value for name, value in environment(_DOMAIN).items()
+                   if name.startswith('ROS_')})
+
+
+@pytest.fixture(scope='session')
+def ros_domain() -> Iterator[int]:
+    """Domain id of this session."""
+    yield _DOMAIN
+    _HOLDER.close()

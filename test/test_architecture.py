@@ -1,0 +1,103 @@
+"""The house rules: who may import whom, and every equation of the paper in one place."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pprs_dynamics.effects.catalogue import CATALOGUE
+from pprs_dynamics.effects.effect import CatalogueEffect
+
+PACKAGE = Path(__file__).parents[1] / 'pprs_dynamics'
+ROS = {'rclpy', 'std_msgs', 'sensor_msgs', 'trajectory_msgs', 'geometry_msgs', 'rcl_interfaces',
+       'builtin_interfaces', 'diagnostic_msgs'}
+PLOTTING = {'matplotlib', 'plotly', 'rich'}
+# Each folder uses itself and those named; arrows point from what stands on to what it stands on.
+MAY_USE = {
+    'mechanism': set(),
+    'effects': {'mechanism'},
+    'model': {'mechanism', 'effects'},
+    'measurement': {'mechanism', 'effects', 'model'},
+    'simulation': {'mechanism', 'model', 'measurement'},
+    'report': {'mechanism', 'effects', 'model', 'measurement'},
+    'nodes': {'mechanism', 'effects', 'model', 'measurement', 'simulation'},
+    'commands': {'mechanism', 'effects', 'model', 'measurement', 'simulation', 'report'},
+}
+# Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
+EQUATIONS = set(range(1, 17))
+
+
+def imports(file: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return names
+
+
+def files() -> list[Path]:
+    return sorted(file for file in PACKAGE.rglob('*.py') if file.parent != PACKAGE)
+
+
+@pytest.mark.parametrize('file', files(), ids=lambda file: str(file.relative_to(PACKAGE)))
+def test_arrows_point_one_way(file: Path) -> None:
+    folder = file.relative_to(PACKAGE).parts[0]
+    used = imports(file)
+    own = {name.split('.')[1] for name in used if name.startswith('pprs_dynamics.')}
+    assert own - {'errors', folder} <= MAY_USE[folder]
+    libraries = {name.split('.')[0] for name in used}
+    if folder != 'nodes':
+        assert not libraries & ROS
+    if folder not in ('report', 'commands'):
+        assert not libraries & PLOTTING
+
+
+@pytest.mark.parametrize('file', sorted((PACKAGE / 'nodes').glob('*.py')), ids=lambda f: f.name)
+def test_nodes_hold_no_mathematics(file: Path) -> None:
+    text = file.read_text()
+    assert 'Eq. (' not in text
+    for function in ('np.linalg', 'np.cross', 'np.sin', 'np.cos', 'np.tanh', 'np.sqrt', ' @ '):
+        assert function not in text
+
+
+def test_importing_the_package_imports_neither_ros_nor_plotting() -> None:
+    code = ('import sys, pprs_dynamics; pprs_dynamics.DriveModel.load(); '
+            'print(" ".join({name.split(".")[0] for name in sys.modules}))')
+    loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                            check=True).stdout.split()
+    assert not set(loaded) & (ROS | PLOTTING)
+
+
+def test_every_equation_of_the_paper_is_cited_and_no_other() -> None:
+    cited: set[int] = set()
+    for file in files():
+        for line in file.read_text().splitlines():
+            _, found, comment = line.partition('# Eq. ')
+            if found:
+                cited |= {int(number) for number in re.findall(r'\((\d+)\)', comment)}
+    assert cited == EQUATIONS
+
+
+def test_each_catalogue_effect_has_a_file_of_its_name_and_the_list_is_sorted() -> None:
+    assert list(CATALOGUE) == sorted(CATALOGUE)
+    for name, effect in CATALOGUE.items():
+        assert Path(sys.modules[effect.__module__].__file__ or '').stem == name
+        assert effect.__doc__
+        assert issubclass(effect, CatalogueEffect)
+        for parameter in effect.parameters:
+            assert parameter.unit
+            assert parameter.description
+            assert parameter.lower < parameter.upper
+
+
+def test_modules_are_short() -> None:
+    lengths = {str(file.relative_to(PACKAGE)): len(file.read_text().splitlines())
+               for file in files()}
+    assert {name: length for name, length in lengths.items() if length > 350} == {}
