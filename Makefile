@@ -16,7 +16,7 @@ help:
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
 demo: $(VENV)/.demo
-	$(BIN)/python demo/feedforward_demo.py output
+	@$(BIN)/python demo/feedforward_demo.py output
 
 test: $(VENV)/.test lint
 	$(BIN)/python -m pytest
@@ -31,18 +31,18 @@ reproduce: $(VENV)/.demo
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python
 	@echo 'Installing the package with ROS 2 wheels (about a minute) ...'
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[ros,report]'
+	@$(BIN)/pip install -qq --upgrade pip
+	@$(BIN)/pip install -qq --editable '.[ros,report]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
-	$(BIN)/pip install --quiet --editable '.[ros,report,test]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,test]'
 	@touch $@
 
 $(VENV)/bin/python:
 	@test -n '$(PYTHON)' || { echo 'pprs_dynamics needs Python 3.11, 3.12 or 3.13: none was found on PATH (or set PYTHON=...)' >&2; exit 1; }
-	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo 'python -m venv failed; on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo 'python -m venv failed; on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 
 clean:
 	rm -rf $(VENV) output build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
