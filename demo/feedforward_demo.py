@@ -24,6 +24,7 @@ PARTS = ('rigid_body', 'active_friction', 'passive_friction')
 RATE = 200.0
 MESSAGES = 943  # 3 pi / 2 seconds of path
 PATIENCE = 30.0  # [s] for discovery and the path together
+SETTLE = 1.0  # [s]
 ROWS = 16
 
 
@@ -80,12 +81,14 @@ def _listen(
     topics = {'total': '/feedforward/joint_command',
               **{part: f'/feedforward/effort/{part}' for part in PARTS}}
     subscriptions = [node.create_subscription(
-        JointState, topic, lambda message, name=name: keep(name, message), 100)
+        JointState, topic, lambda message, name=name: keep(name, message), 1000)
         for name, topic in topics.items()]
     deadline = time.monotonic() + PATIENCE
-    while (any(node.count_publishers(topic) == 0 for topic in topics.values())
+    while (not all(subscription.get_publisher_count() for subscription in subscriptions)
            and time.monotonic() < deadline):
         executor.spin_once(timeout_sec=0.05)
+    # Discovery is one-sided: the node may see us a moment after we see it.
+    time.sleep(SETTLE)
     command = [executable('play_trajectory'), '--ros-args', '-p', f'rate:={RATE}']
     with (node_process(command, domain, log / 'play_trajectory.log'),
           Progress(console=console, transient=True) as progress):

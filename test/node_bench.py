@@ -26,6 +26,7 @@ class Bench:
         self.executor = SingleThreadedExecutor(context=context)
         self.probe = Node('probe', context=context)
         self.executor.add_node(self.probe)
+        self.subscriptions: list[Any] = []
         self.status: list[dict[str, Any]] = []
 
     def add(self, factory: Callable[..., Node], **options: Any) -> Node:
@@ -37,8 +38,17 @@ class Bench:
     def listen(self, message_type: type, topic: str, qos: Any = 100) -> list[Any]:
         """Return a list that fills with what arrives on a topic."""
         received: list[Any] = []
-        self.probe.create_subscription(message_type, topic, received.append, qos)
+        self.subscriptions.append(
+            self.probe.create_subscription(message_type, topic, received.append, qos))
         return received
+
+    def connected(self) -> bool:
+        """Spin until every topic listened to has its publisher, on both sides."""
+        found = self.spin_until(
+            lambda: all(each.get_publisher_count() for each in self.subscriptions), 20)
+        # Discovery is one-sided: a publisher may see us a moment after we see it.
+        self.spin_for(0.5)
+        return found
 
     def follow_status(self, topic: str) -> None:
         """Keep every status of a node, decoded, in `status`."""

@@ -17,6 +17,7 @@ from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.conversions import TrajectoryRequest
 from pprs_dynamics.nodes.parameters import current_values, declare_model, model_from
+from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
 
@@ -41,11 +42,13 @@ class FeedforwardNode(Node):
 
         self._counters = {'received': 0, 'accepted': 0, **dict.fromkeys(CODES, 0)}
         self._status = StatusReporter(self, {}, self._counters)
-        self._commands = self.create_publisher(Float64MultiArray, '~/commands', 10)
-        self._joint_command = self.create_publisher(JointState, '~/joint_command', 10)
-        self._joint_trajectory = self.create_publisher(JointTrajectory, '~/joint_trajectory', 10)
+        self._commands = self.create_publisher(Float64MultiArray, '~/commands', EVERY_MESSAGE)
+        self._joint_command = self.create_publisher(
+            JointState, '~/joint_command', EVERY_MESSAGE)
+        self._joint_trajectory = self.create_publisher(
+            JointTrajectory, '~/joint_trajectory', EVERY_MESSAGE)
         self.create_subscription(
-            MultiDOFJointTrajectory, '~/trajectory', self._on_trajectory, 10)
+            MultiDOFJointTrajectory, '~/trajectory', self._on_trajectory, EVERY_MESSAGE)
         self.get_logger().info(
             f'equations {self._model.equations}, effects '
             f'{", ".join(effect.name for effect in self._model.effects)}; ready')
@@ -117,5 +120,6 @@ class FeedforwardNode(Node):
         for name in known.keys() - set(names):
             self.destroy_publisher(known[name])
         self._parts = {
-            name: known.get(name) or self.create_publisher(JointState, f'~/effort/{name}', 10)
+            name: known.get(name) or self.create_publisher(
+                JointState, f'~/effort/{name}', EVERY_MESSAGE)
             for name in names}

@@ -14,6 +14,7 @@ from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.nodes import conversions
+from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.run import Finished
 
 SOURCES = ('helix', 'excitation', 'csv')
@@ -44,7 +45,7 @@ class PlayTrajectoryNode(Node):
         self._motion = _path(values)
         self._next, self._round = 0, 1
         self._publisher = self.create_publisher(
-            MultiDOFJointTrajectory, 'feedforward/trajectory', 10)
+            MultiDOFJointTrajectory, 'feedforward/trajectory', EVERY_MESSAGE)
         self.get_logger().info(
             f'{values["source"]}, {len(self._motion)} messages at {self._rate:g} Hz; waiting for '
             f'a listener on {self._publisher.topic_name}')

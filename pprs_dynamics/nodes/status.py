@@ -6,8 +6,9 @@ import json
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
+
+from pprs_dynamics.nodes.qos import LATCHED
 
 try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -31,8 +32,7 @@ class StatusReporter:
 
     def __init__(self, node: Node, facts: dict[str, Any], counters: dict[str, int]) -> None:
         self._node, self.facts, self._counters = node, facts, counters
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._publisher = node.create_publisher(String, '~/status', latched)
+        self._publisher = node.create_publisher(String, '~/status', LATCHED)
         self._diagnostics = None
         if DiagnosticArray is not None:
             self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
