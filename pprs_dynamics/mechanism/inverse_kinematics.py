@@ -69,6 +69,28 @@ def spherical_joint_arms(geometry: Geometry, rotation: Array) -> Array:
     return arm
 
 
+@dataclass(frozen=True)
+class JointPositions:
+    """Where the joints are, in `base`; each (N, 3, 3): samples, chains, components [m].
+
+    `foot` is the slide on its guide at height 0, `elbow` C_i on the lift, `tip` A_i.
+    """
+
+    foot: Array
+    elbow: Array
+    tip: Array
+
+
+def joint_positions(geometry: Geometry, motion: PlatformMotion) -> JointPositions:
+    """Return the joints' positions at the poses of a motion, to draw the mechanism."""
+    chains = solve_inverse_kinematics(geometry, motion)
+    slide, lift = chains.position[:, :3], chains.position[:, 3:]
+    R, zero = np.full_like(slide, geometry.base_radius), np.zeros_like(slide)
+    base = geometry.frames.base
+    tip = motion.position[:, None, :] + base(chains.arm)
+    return JointPositions(base(ChainVector(R, slide, zero)), base(ChainVector(R, slide, lift)), tip)
+
+
 def solve_inverse_kinematics(
     geometry: Geometry, motion: PlatformMotion, minimum_sine: float = 1e-6,
 ) -> ChainKinematics:
