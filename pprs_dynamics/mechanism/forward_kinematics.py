@@ -2,8 +2,9 @@
 
 Six drive positions belong to several poses. The solver therefore follows the branch: it moves
 from a known pose to the wanted drive positions in steps, and accepts only poses whose det [B]
-has the sign that it has at the home pose (the assembly mode), and whose rods lean the way that
-the elbow says.
+has the sign that it has at the home pose, and whose rods lean the way that the elbow says. These
+two conditions alone do not single out one pose: others that meet them are turned by more than
+150 degrees against it, and are found only from a seed that lies there.
 """
 
 from __future__ import annotations
@@ -13,18 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError
 from pprs_dynamics.mechanism.inverse_kinematics import (
     solve_inverse_kinematics,
     spherical_joint_arms,
 )
-from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.motion import PlatformMotion, checked_matrix
 from pprs_dynamics.mechanism.robot import Array, Geometry
 
-RESIDUAL_TOLERANCE = 1e-13  # of the rod length; a few rounding errors of the closure
+RESIDUAL_TOLERANCE = 1e-13  # of the lengths involved; a few rounding errors of the closure
 MAXIMUM_STEPS = 30
 # Where det [B] has fallen to this share of its value at home, two solutions are about to meet.
 NEAR_BRANCH = 0.1
+SINGULAR_HOME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -81,23 +83,25 @@ def solve_forward_kinematics(
         For a wrong shape or a non-finite number.
     ConvergenceError
         Where no pose of the home pose's assembly mode is found.
+    SingularityError
+        Where the geometry's home pose is itself singular, so that it tells no mode.
     """
-    q = np.array(drive_positions, dtype=float, ndmin=2)
-    if q.ndim != 2 or q.shape[1] != 6 or len(q) == 0:
-        raise MotionError('drive positions', f'their shape is {np.shape(drive_positions)}',
-                          'be (N, 6) with N of at least 1', 'shape')
-    if not np.all(np.isfinite(q)):
-        raise MotionError('drive positions',
-                          f'sample {int(np.argmax(~np.isfinite(q).all(axis=1)))} is not finite',
-                          'be finite', 'finite')
+    q = checked_matrix('drive positions', drive_positions, 6)
     home = home_pose(geometry)
     start = home if seed is None else seed
+    if len(start) not in (1, len(q)):
+        raise MotionError('seed', f'it has {len(start)} poses',
+                          f'have 1 or {len(q)}, as the drive positions', 'shape')
     P = np.array(np.broadcast_to(start.position, (len(q), 3)))
     rotation = np.array(np.broadcast_to(start.rotation, (len(q), 3, 3)))
     if seed is None:
         P[:, 2] += q[:, 3:].mean(axis=1) - _drive_positions(geometry, home)[0, 3:].mean()
     home_B = _closure(geometry, home.position, home.rotation, _drive_positions(geometry, home))[1]
     home_determinant = float(np.linalg.det(home_B)[0])
+    # In units of the platform's radius det [B] is a pure number, 0.6 for the paper's robot.
+    if abs(home_determinant) < SINGULAR_HOME * geometry.platform_radius ** 3:
+        raise SingularityError(0, 'det [B] is 0 at the home pose of this geometry',
+                               'home must tell which assembly mode is meant')
 
     q_start = _drive_positions(geometry, PlatformMotion(
         P, _quaternions(rotation), *(np.zeros((len(q), 3)),) * 4))
@@ -113,7 +117,8 @@ def solve_forward_kinematics(
             target = q_start[pending] + (q[pending] - q_start[pending]) * (move / moves)
             good &= _newton(geometry, target, P_new, rotation_new, count)
         B = _closure(geometry, P_new, rotation_new, q[pending])[1]
-        found = np.linalg.det(B) / home_determinant
+        with np.errstate(all='ignore'):
+            found = np.linalg.det(B) / home_determinant
         good &= (found > 0) & _elbow_agrees(geometry, P_new, rotation_new, q[pending])
         done = pending[good]
         P[done], rotation[done] = P_new[good], rotation_new[good]
@@ -138,13 +143,20 @@ def _newton(
     for _ in range(MAXIMUM_STEPS):
         residual, B = _closure(geometry, P[active], rotation[active], q[active])
         size = np.abs(residual).max(axis=1)
-        arrived = size <= RESIDUAL_TOLERANCE * geometry.rod_length
+        # Heights far from 0 carry their own rounding.
+        arrived = size <= RESIDUAL_TOLERANCE * (
+            geometry.rod_length + np.abs(q[active]).max(axis=1))
         converged[active[arrived]] = True
         active, residual, B = active[~arrived], residual[~arrived], B[~arrived]
         if not len(active):
             break
         with np.errstate(all='ignore'):
-            step = np.linalg.solve(B + 1e-300, -residual[..., None])[..., 0]
+            regular = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
+            regular[regular] &= np.linalg.det(B[regular]) != 0.0
+            active, residual, B = active[regular], residual[regular], B[regular]
+            if not len(active):
+                break
+            step = np.linalg.solve(B, -residual[..., None])[..., 0]
             # A Newton step longer than the mechanism leaves the branch: shorten it.
             length = np.maximum(np.linalg.norm(step[:, :3], axis=1) / geometry.rod_length,
                                 np.linalg.norm(step[:, 3:], axis=1))

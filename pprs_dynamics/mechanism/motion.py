@@ -62,7 +62,7 @@ class PlatformMotion:
             'angular_acceleration': (angular_acceleration, 3)}
         samples: int | None = None
         for name, (value, width) in columns.items():
-            array = _matrix(name, value, width, samples)
+            array = checked_matrix(name, value, width, samples)
             samples = len(array)
             object.__setattr__(self, name, array)
         object.__setattr__(self, 'orientation', _normalised(self.orientation))
@@ -162,8 +162,8 @@ class PlatformMotion:
         from scipy.interpolate import make_interp_spline
         from scipy.spatial.transform import Rotation, RotationSpline
 
-        position = _matrix('position', position, 3)
-        orientation = _normalised(_matrix('orientation', orientation, 4, len(position)))
+        position = checked_matrix('position', position, 3)
+        orientation = _normalised(checked_matrix('orientation', orientation, 4, len(position)))
         knots = _times(time, len(position))
         if len(knots) < 4:
             raise MotionError('poses', f'{len(knots)} were given',
@@ -177,7 +177,10 @@ class PlatformMotion:
             knots if at is None else None)
 
 
-def _matrix(name: str, value: ArrayLike, width: int, samples: int | None = None) -> Array:
+def checked_matrix(
+    name: str, value: ArrayLike, width: int, samples: int | None = None,
+) -> Array:
+    """Return a finite (N, width) array of floats, or raise MotionError naming the quantity."""
     try:
         array = np.array(value, dtype=float, ndmin=2)
     except (TypeError, ValueError):
@@ -193,7 +196,6 @@ def _matrix(name: str, value: ArrayLike, width: int, samples: int | None = None)
         row = int(np.argmax(~np.isfinite(array).all(axis=1)))
         raise MotionError(name, f'sample {row} is {array[row].tolist()}', 'be finite',
                           'finite')
-    array.flags.writeable = False
     return array
 
 
@@ -208,7 +210,6 @@ def _normalised(quaternions: Array) -> Array:
                           f'{length[row]:.6g}', f'be 1 within {UNIT_LENGTH_TOLERANCE:g}',
                           'unit_length')
     unit: Array = quaternions / length[:, None]
-    unit.flags.writeable = False
     return unit
 
 
@@ -224,5 +225,4 @@ def _times(time: ArrayLike, samples: int) -> Array:
         row = int(np.argmax(np.diff(times) <= 0))
         raise MotionError('time', f'sample {row + 1} at {times[row + 1]:.9g} s follows '
                           f'{times[row]:.9g} s', 'strictly increase', 'time')
-    times.flags.writeable = False
     return times

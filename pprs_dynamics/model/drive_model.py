@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.effects.effect import Effect
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal
@@ -147,6 +148,10 @@ class DriveModel:
         mechanism = self.mechanism(motion)
         parts = {RIGID_BODY: mechanism.rigid_body.force}
         state = self.initial_state() if state is None else state
+        for effect in self.effects:
+            if effect.name not in state.memories:
+                raise ModelError('state', sorted(state.memories),
+                                 f'come from this model, which has {effect.name}')
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             for effect in self.effects:
                 if not effect.is_measurement:
@@ -155,5 +160,9 @@ class DriveModel:
         return DriveForces(total, parts, mechanism)
 
     def condition_number(self, motion: PlatformMotion) -> Array:
-        """Return the condition number of the drive Jacobian, rotations times r, (N,)."""
-        return condition_number(self.robot.geometry, self.mechanism(motion).jacobians.J)
+        """Return the condition number of the drive Jacobian, rotations times r, (N,).
+
+        Unlike `drive_forces` it answers beyond `limits.condition_number` too.
+        """
+        mechanism = solve_mechanism(self.robot, motion, minimum_sine=self.limits.rod_sine)
+        return condition_number(self.robot.geometry, mechanism.jacobians.J)
