@@ -32,12 +32,12 @@ reproduce: $(VENV)/.demo
 $(VENV)/.demo: setup.py | $(VENV)/bin/python
 	@echo 'Installing the package with ROS 2 wheels (about a minute) ...'
 	@$(BIN)/pip install -qq --upgrade pip
-	@$(BIN)/pip install -qq --editable '.[ros,report]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,test]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,test]'
 	@touch $@
 
 $(VENV)/bin/python:

@@ -24,8 +24,10 @@ setup(
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
                 'ros-sensor-msgs==5.5.1', 'ros-trajectory-msgs==5.5.1'],
-        'report': ['rich>=13', 'matplotlib>=3.8'],
-        'test': ['pytest>=8', 'hypothesis>=6', 'mujoco>=3.2', 'pin>=3', 'ruff>=0.6', 'mypy>=1.11',
+        'report': ['rich>=13', 'matplotlib>=3.8', 'plotly>=5.20'],
+        'sim': ['mujoco>=4.0'],
+        'bags': ['rosbags>=0.10'],
+        'test': ['pytest>=8', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3', 'ruff>=0.6', 'mypy>=1.11',
                  'types-PyYAML', 'scipy-stubs', 'colcon-common-extensions', 'colcon-ros',
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.
                  'setuptools<80'],
@@ -35,6 +37,7 @@ setup(
         'console_scripts': [
             'feedforward = pprs_dynamics.nodes.executables:feedforward',
             'play_trajectory = pprs_dynamics.nodes.executables:play_trajectory',
+            'simulated_robot = pprs_dynamics.nodes.executables:simulated_robot',
             'pprs = pprs_dynamics.commands.pprs:main',
         ],
     },

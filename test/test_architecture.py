@@ -23,10 +23,12 @@ MAY_USE = {
     'effects': {'mechanism'},
     'model': {'mechanism', 'effects'},
     'measurement': {'mechanism', 'effects', 'model'},
+    'diagnosis': {'mechanism', 'effects', 'model', 'measurement'},
     'simulation': {'mechanism', 'model', 'measurement'},
-    'report': {'mechanism', 'effects', 'model', 'measurement'},
-    'nodes': {'mechanism', 'effects', 'model', 'measurement', 'simulation'},
-    'commands': {'mechanism', 'effects', 'model', 'measurement', 'simulation', 'report'},
+    'report': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis'},
+    'nodes': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis', 'simulation'},
+    'commands': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis', 'simulation',
+                 'report'},
 }
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))

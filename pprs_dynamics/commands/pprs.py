@@ -9,20 +9,20 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from types import ModuleType
+from importlib import import_module
 
 from pprs_dynamics import __version__
-from pprs_dynamics.commands import reproduce
 from pprs_dynamics.errors import PprsError
 
-COMMANDS: dict[str, ModuleType] = {'reproduce': reproduce}
+# Each a module of this folder with a docstring, add_arguments and run.
+COMMANDS = ('info', 'reproduce', 'simulate')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
     options = _parser().parse_args(arguments)
     try:
-        status: int = COMMANDS[options.command].run(options)
+        status: int = import_module(f'{__package__}.{options.command}').run(options)
         sys.stdout.flush()
     except PprsError as error:
         print(f'pprs {options.command}: {error}', file=sys.stderr)
@@ -48,7 +48,8 @@ def _parser() -> argparse.ArgumentParser:
         'what was measured, and which physical effect is missing.')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
-    for name, module in COMMANDS.items():
+    for name in COMMANDS:
+        module = import_module(f'{__package__}.{name}')
         summary = (module.__doc__ or '').splitlines()[0]
         summary = summary.split(': ', 1)[1]
         command = commands.add_parser(name, help=summary, description=summary)

@@ -171,10 +171,12 @@ class PlatformMotion:
         moments = knots if at is None else np.asarray(at, dtype=float)
         path = make_interp_spline(knots, position, k=5 if len(knots) >= 6 else 3)
         turn = RotationSpline(knots, Rotation.from_quat(orientation))
+        rotation = turn(moments)
+        # The spline's rates are in the turning frame; omega and its derivative turn alike.
         return cls(
-            path(moments), turn(moments).as_quat(), path.derivative(1)(moments),
-            turn(moments, 1), path.derivative(2)(moments), turn(moments, 2),
-            knots if at is None else None)
+            path(moments), rotation.as_quat(), path.derivative(1)(moments),
+            rotation.apply(turn(moments, 1)), path.derivative(2)(moments),
+            rotation.apply(turn(moments, 2)), knots if at is None else None)
 
 
 def checked_matrix(

@@ -11,6 +11,7 @@ from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import Array
 
 KNOTS_PER_PERIOD = 400
+HOME = (0.0, 0.0, 0.5)  # [m]; the unturned platform in the middle of its workspace
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,41 @@ def _helix_angle(t: Array) -> tuple[Array, Array, Array]:
     rate = np.select(phases, [4 / np.pi * t, np.full_like(t, 2.0)], 2 - 4 / np.pi * (t - whole))
     gain = np.select(phases, [np.full_like(t, 4 / np.pi), np.zeros_like(t)], -4 / np.pi)
     return angle, rate, gain
+
+
+def with_lead_in(motion: PlatformMotion, duration: float, rate: float) -> PlatformMotion:
+    """Return a motion that goes from the home pose to where another starts, and then plays it.
+
+    Parameters
+    ----------
+    motion : PlatformMotion
+    duration : float
+        Of the way there, from rest to rest along a quintic blend [s]; 0: none.
+    rate : float
+        Samples per second [Hz], those of `motion`.
+    """
+    from scipy.spatial.transform import Rotation
+
+    count = int(duration * rate)
+    if count < 1:
+        return motion
+    t = np.arange(count) / (count / duration)
+    s = t / duration
+    blend = s ** 3 * (10 - 15 * s + 6 * s ** 2)
+    rate_of = 30 * s ** 2 * (1 - s) ** 2 / duration
+    gain = 60 * s * (1 - s) * (1 - 2 * s) / duration ** 2
+    move = motion.position[0] - np.asarray(HOME)
+    # A turn about a fixed axis: its rate and gain are those of the angle.
+    turn = Rotation.from_quat(motion.orientation[0]).as_rotvec()
+    orientation = Rotation.from_rotvec(blend[:, None] * turn).as_quat()
+    way = (HOME + blend[:, None] * move, orientation, rate_of[:, None] * move,
+           rate_of[:, None] * turn, gain[:, None] * move, gain[:, None] * turn)
+    path = (motion.position, motion.orientation, motion.linear_velocity, motion.angular_velocity,
+            motion.linear_acceleration, motion.angular_acceleration)
+    position, orientation, v, omega, a, epsilon = (
+        np.concatenate(pair) for pair in zip(way, path, strict=True))
+    return PlatformMotion(position, orientation, v, omega, a, epsilon,
+                          np.arange(len(position)) / rate)
 
 
 @dataclass(frozen=True)

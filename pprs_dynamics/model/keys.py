@@ -139,6 +139,8 @@ KEYS: dict[str, Key] = {key.name: key for key in (
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.
 NODE_KEYS = frozenset({
-    'max_age', 'file', 'source', 'rate', 'seed', 'duration', 'repeat', 'points',
+    'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in',
+    'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
+    'encoder_resolution', 'effort_noise', 'hidden_effects', 'hidden_scale',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)

@@ -154,6 +154,38 @@ def joint_trajectory(request: TrajectoryRequest, forces: DriveForces) -> JointTr
     return message
 
 
+def joint_state(
+    stamp: int, position: Array, velocity: Array, effort: Array,
+) -> JointState:
+    """Return what the drives did at a time [ns]."""
+    message = JointState(name=list(DRIVES), position=position.tolist(),
+                         velocity=velocity.tolist(), effort=effort.tolist())
+    message.header.stamp, message.header.frame_id = time(stamp), BASE_FRAMES[1]
+    return message
+
+
+def read_drives(message: JointState, field: str) -> Array:
+    """Return one field of a JointState in drive order, matched by name, (6,).
+
+    Raises
+    ------
+    Rejection
+        Where a drive is missing, the field's length is not that of `name`, or a value is not
+        finite.
+    """
+    names, values = list(message.name), getattr(message, field)
+    missing = [drive for drive in DRIVES if drive not in names]
+    if missing:
+        raise Rejection('NAMES', f'name is {names!r:.100}, but it must hold {missing[0]}')
+    if len(values) != len(names):
+        raise Rejection('SIZE', f'{field} has {len(values)} values, but it must have '
+                        f'{len(names)}, as name')
+    array = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
+    if not np.all(np.isfinite(array)):
+        raise Rejection('NON_FINITE', f'{field} is {array.tolist()}, but it must be finite')
+    return array
+
+
 def nanoseconds(moment: Time | Duration) -> int:
     """Return a stamp or a duration in nanoseconds."""
     return int(moment.sec) * NANOSECONDS + int(moment.nanosec)

@@ -16,6 +16,11 @@ def play_trajectory() -> int:
     return _run('play_trajectory', 'PlayTrajectoryNode')
 
 
+def simulated_robot() -> int:
+    """Run `ros2 run pprs_dynamics simulated_robot`."""
+    return _run('simulated_robot', 'SimulatedRobotNode')
+
+
 def _run(module: str, node: str) -> int:
     try:
         import rclpy  # noqa: F401

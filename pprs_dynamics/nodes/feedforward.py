@@ -5,21 +5,31 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
-from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.conversions import TrajectoryRequest
-from pprs_dynamics.nodes.parameters import current_values, declare_model, model_from
+from pprs_dynamics.nodes.parameters import (
+    NodeParameter,
+    current_values,
+    declare_model,
+    declare_own,
+    model_from,
+)
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
+
+PARAMETERS = (
+    NodeParameter('max_age', 0.0, 'oldest header stamp that is accepted [s]; 0: any', lower=0),
+)
 
 
 class FeedforwardNode(Node):
@@ -31,8 +41,7 @@ class FeedforwardNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('feedforward', allow_undeclared_parameters=True, **options)
-        self.declare_parameter('max_age', 0.0, ParameterDescriptor(
-            description='oldest header stamp that is accepted [s]; 0: any', dynamic_typing=True))
+        declare_own(self, PARAMETERS)
         taken_from_paper = declare_model(self)
         self._apply(self._validated())
         if 0 < len(taken_from_paper) < 20:
@@ -97,13 +106,9 @@ class FeedforwardNode(Node):
         self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
 
     def _validated(self, changes: tuple[Parameter, ...] = ()) -> tuple[DriveModel, float]:
-        values = current_values(self)
-        values.update({change.name: change.value for change in changes
-                       if change.name == 'max_age'})
-        max_age = values.pop('max_age')
-        if isinstance(max_age, bool) or not isinstance(max_age, (int, float)) or not max_age >= 0:
-            raise ModelError('max_age', max_age, 'be a number of at least 0 [s]')
-        return model_from(values, [c for c in changes if c.name != 'max_age']), float(max_age)
+        values = current_values(self, changes)
+        own = {each.name: each.check(values.pop(each.name)) for each in PARAMETERS}
+        return model_from(values), own['max_age']
 
     def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         try:

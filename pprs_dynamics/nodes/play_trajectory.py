@@ -5,29 +5,34 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.nodes import conversions
+from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.run import Finished
 
 SOURCES = ('helix', 'excitation', 'csv')
 
-PARAMETERS: dict[str, tuple[Any, str]] = {
-    'source': ('helix', f'what to play: {", ".join(SOURCES)}'),
-    'file': ('', 'CSV of poses, for source csv'),
-    'rate': (100.0, 'messages per second, greater than 0 [Hz]'),
-    'points': (1, 'points per message, at least 1: the present one and those that follow'),
-    'repeat': (1, 'how often to play; 0: until stopped'),
-    'duration': (20.0, 'length of an excitation, greater than 0 [s]'),
-    'seed': (0, 'of an excitation, at least 0'),
-}
+PARAMETERS = (
+    NodeParameter('source', 'helix', 'what to play', choices=SOURCES),
+    NodeParameter('file', '', 'CSV of poses, for source csv'),
+    NodeParameter('rate', 100.0, 'messages per second [Hz]', lower=0.1, upper=10_000),
+    NodeParameter('points', 1, 'points per message: the present one and those that follow',
+                  lower=1),
+    NodeParameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
+    NodeParameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
+    NodeParameter('seed', 0, 'of an excitation', lower=0),
+    NodeParameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
+                  '0: start there', lower=0),
+    NodeParameter('ahead', 0.0, 'how far ahead of its moment each message is stamped [s]',
+                  lower=0),
+)
 
 
 class PlayTrajectoryNode(Node):
@@ -35,13 +40,9 @@ class PlayTrajectoryNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('play_trajectory', **options)
-        values = {}
-        for name, (default, description) in PARAMETERS.items():
-            self.declare_parameter(name, default, ParameterDescriptor(
-                description=description, dynamic_typing=True, read_only=True))
-            values[name] = self.get_parameter(name).value
-        _require_possible(values)
+        values = declare_own(self, PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
+        self._ahead = values['ahead']
         self._motion = _path(values)
         self._next, self._round = 0, 1
         self._publisher = self.create_publisher(
@@ -64,31 +65,25 @@ class PlayTrajectoryNode(Node):
         part = self._motion[self._next:self._next + self._points]
         offsets = [round(k * conversions.NANOSECONDS / self._rate) for k in range(len(part))]
         self._publisher.publish(conversions.write_trajectory(
-            part, self.get_clock().now().to_msg(), offsets))
+            part, conversions.time(self._stamp()), offsets))
         self._next += 1
+
+    def _stamp(self) -> int:
+        """Return the moment that the next pose belongs to [ns], evenly spaced."""
+        if self._next == 0:
+            self._start = self.get_clock().now().nanoseconds + round(
+                self._ahead * conversions.NANOSECONDS)
+        return self._start + round(self._next * conversions.NANOSECONDS / self._rate)
 
 
 def _path(values: dict[str, Any]) -> PlatformMotion:
     if values['source'] == 'csv':
-        return read_poses(values['file']).resampled(values['rate'])
-    path: HelicalPath | Excitation = HelicalPath()
-    if values['source'] == 'excitation':
-        path = Excitation(duration=values['duration'], seed=values['seed'])
-    return path.motion(np.arange(0.0, path.duration, 1.0 / values['rate']))
-
-
-def _require_possible(values: dict[str, Any]) -> None:
-    rules = {
-        'source': values['source'] in SOURCES,
-        'file': values['source'] != 'csv' or bool(values['file']),
-        **{name: _is_number(values[name]) and values[name] > 0 for name in ('rate', 'duration')},
-        'points': type(values['points']) is int and values['points'] >= 1,
-        'repeat': type(values['repeat']) is int and values['repeat'] >= 0,
-        'seed': type(values['seed']) is int and values['seed'] >= 0}
-    for name, good in rules.items():
-        if not good:
-            raise ModelError(name, values[name], f'be {PARAMETERS[name][1]}')
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+        if not values['file']:
+            raise ModelError('file', '', 'be a CSV of poses where source is csv')
+        motion = read_poses(values['file']).resampled(values['rate'])
+    else:
+        path: HelicalPath | Excitation = HelicalPath()
+        if values['source'] == 'excitation':
+            path = Excitation(duration=values['duration'], seed=values['seed'])
+        motion = path.motion(np.arange(0.0, path.duration, 1.0 / values['rate']))
+    return with_lead_in(motion, values['lead_in'], values['rate'])

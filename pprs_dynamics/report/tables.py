@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.measurement.recording import Summary
 from pprs_dynamics.model.reproduction import Claim
 
 
@@ -30,3 +31,24 @@ def claims_table(claims: Iterable[Claim]) -> Any:
         table.add_row(claim.claim, claim.paper, claim.found,
                       '[green]yes[/]' if claim.reproduced else '[red]no[/]')
     return table
+
+
+def recording_table(summary: Summary) -> Any:
+    """Return what is in a recording, drive by drive."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(
+        f'{summary.name}: {summary.used} of {summary.samples} samples in {len(summary.segments)} '
+        f'segment{"s" * (len(summary.segments) != 1)}, {summary.duration:.2f} s at '
+        f'{summary.rate:.6g} Hz'), caption=escape(summary.source))
+    for heading in ('drive', 'position [m]', 'velocity [m/s]', 'effort [N]', 'measured'):
+        table.add_column(heading, justify='left' if heading == 'drive' else 'right')
+    for drive, found in summary.drives.items():
+        table.add_row(drive, _span(found.position), _span(found.velocity), _span(found.effort),
+                      f'{found.measured:.1%}')
+    return table
+
+
+def _span(bounds: tuple[float, float] | None) -> str:
+    return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'

@@ -1,0 +1,223 @@
+"""The robot in closed loop over topics: three processes, and what its platform makes of the path.
+
+`play_trajectory` -> `feedforward` -> `simulated_robot`, as processes over DDS. This one listens to
+the commands and to joint_states, and says how far the platform was from where it should have been.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from ros_processes import environment, executable, node_process
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.model_file import find_file
+
+LEAD_IN = 2.0  # [s] from the home pose to the path's start, not counted
+AHEAD = 0.05  # [s] that each pose is sent before its moment, as a trajectory controller is fed
+RATE = 200.0  # [Hz]
+SETTLE = 1.0  # [s] for discovery, which is one-sided
+PATIENCE = 30.0  # [s] beyond the path's own time
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the robot is driven with.
+
+    Parameters
+    ----------
+    name : str
+    feedforward : {'none', 'rigid_body', 'friction'}
+        'none' is the gravity-compensated PD loop alone.
+    hidden : tuple of str
+        Effects in the robot that the model does not know of.
+    """
+
+    name: str
+    feedforward: str
+    hidden: tuple[str, ...] = ()
+
+
+CASES = (
+    Case('PD alone', 'none'),
+    Case('rigid-body feedforward', 'rigid_body'),
+    Case('friction-compensated feedforward', 'friction'),
+)
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How the platform followed.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Since the path's start [s].
+    position_error : (N, 3) array
+        [m]
+    angle_error : (N,) array
+        [rad]
+    late_share : float
+        Share of the robot's cycles that were late.
+    """
+
+    time: np.ndarray
+    position_error: np.ndarray
+    angle_error: np.ndarray
+    late_share: float
+
+    @property
+    def position_rms(self) -> float:
+        """Root of the mean squared distance [m]."""
+        return float(np.sqrt(np.mean(np.sum(self.position_error ** 2, axis=1))))
+
+    @property
+    def angle_rms(self) -> float:
+        """Root of the mean squared angle [rad]."""
+        return float(np.sqrt(np.mean(self.angle_error ** 2)))
+
+
+def run_case(
+    case: Case, path: Sequence[str], duration: float, domain: int, folder: Path,
+) -> Tracking:
+    """Run one case and return how the platform followed.
+
+    Parameters
+    ----------
+    case : Case
+    path : sequence of str
+        Parameters of play_trajectory, e.g. ['source:=helix'].
+    duration : float
+        Of the path [s].
+    domain : int
+        ROS domain, which must be this process's too.
+    folder : path
+        For the nodes' logs.
+    """
+    os.environ.update({name: value for name, value in environment(domain).items()
+                       if name.startswith('ROS_')})
+    player = [f'rate:={RATE}', f'lead_in:={LEAD_IN}', f'ahead:={AHEAD}', *path]
+    with _Listener() as listener, ExitStack() as nodes:
+        for name, command in (('robot', _robot(case)), ('feedforward', _feedforward(case))):
+            nodes.enter_context(node_process(command, domain, folder / f'{name}.log'))
+        listener.wait_for_nodes()
+        nodes.enter_context(node_process(
+            _command('play_trajectory', player), domain, folder / 'player.log'))
+        listener.spin_until(LEAD_IN + duration, PATIENCE)
+    return listener.tracking()
+
+
+def _robot(case: Case) -> list[str]:
+    parameters = [f'use_effort:={"false" if case.feedforward == "none" else "true"}',
+                  'command_timeout:=0.2']
+    if case.hidden:
+        parameters.append(f'hidden_effects:=[{",".join(case.hidden)}]')
+    return _command('simulated_robot', parameters)
+
+
+def _feedforward(case: Case) -> list[str]:
+    files = ['--params-file', str(find_file('config/paper.yaml'))]
+    if case.feedforward == 'rigid_body':
+        files += ['--params-file', str(find_file('config/without_friction.yaml'))]
+    remapped = ['-r', '~/joint_command:=/simulated_robot/joint_command']
+    return [executable('feedforward'), '--ros-args', *files, *remapped]
+
+
+def _command(name: str, parameters: Sequence[str]) -> list[str]:
+    return [executable(name), '--ros-args',
+            *(word for parameter in parameters for word in ('-p', parameter))]
+
+
+class _Listener:
+    """Keeps commands and joint states while the block lasts."""
+
+    def __enter__(self) -> _Listener:
+        import rclpy
+        from rclpy.context import Context
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+        from sensor_msgs.msg import JointState
+        from std_msgs.msg import String
+
+        from pprs_dynamics.nodes.qos import LATCHED
+
+        self.context = Context()
+        rclpy.init(context=self.context)
+        self.node = Node('listener', context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.commands: list[list[float]] = []
+        self.states: list[list[float]] = []
+        self.status = '{}'
+        self.subscriptions = [
+            self.node.create_subscription(
+                JointState, '/simulated_robot/joint_command',
+                lambda message: self.commands.append(
+                    [_seconds(message), *message.position, *message.velocity]), 1000),
+            self.node.create_subscription(
+                JointState, '/joint_states',
+                lambda message: self.states.append([_seconds(message), *message.position]), 1000),
+            self.node.create_subscription(String, '/simulated_robot/status', self._keep, LATCHED)]
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def _keep(self, message: object) -> None:
+        self.status = message.data  # type: ignore[attr-defined]
+
+    def wait_for_nodes(self) -> None:
+        """Spin until both nodes are seen."""
+        deadline = time.monotonic() + PATIENCE
+        while not all(each.get_publisher_count() for each in self.subscriptions):
+            if time.monotonic() > deadline:
+                raise TimeoutError('the nodes did not appear')
+            self.executor.spin_once(timeout_sec=0.05)
+        end = time.monotonic() + SETTLE
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def spin_until(self, path_time: float, patience: float) -> None:
+        """Spin until the states reach the path's end."""
+        deadline = time.monotonic() + path_time + patience
+        while time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.05)
+            if self.commands and self.states and (
+                    self.states[-1][0] > self.commands[0][0] + path_time):
+                return
+        raise TimeoutError(f'{len(self.commands)} commands and {len(self.states)} states came')
+
+    def tracking(self) -> Tracking:
+        """Return the platform's errors over the path, the lead-in left out."""
+        import json
+
+        commands, states = np.array(self.commands), np.array(self.states)
+        inside = (states[:, 0] > commands[0, 0] + LEAD_IN) & (states[:, 0] < commands[-1, 0])
+        times, count = states[inside, 0], len(DRIVES)
+        wanted = CubicHermiteSpline(
+            commands[:, 0], commands[:, 1:1 + count], commands[:, 1 + count:])(times)
+        geometry = DriveModel.load().robot.geometry
+        goal = solve_forward_kinematics(geometry, wanted)
+        found = solve_forward_kinematics(geometry, states[inside, 1:])
+        turn = (Rotation.from_quat(goal.orientation).inv()
+                * Rotation.from_quat(found.orientation)).magnitude()
+        counters = json.loads(self.status)['counters']
+        return Tracking(times - commands[0, 0] - LEAD_IN, found.position - goal.position, turn,
+                        counters['late'] / max(counters['cycles'], 1))
+
+
+def _seconds(message: object) -> float:
+    stamp = message.header.stamp  # type: ignore[attr-defined]
+    return float(stamp.sec % 1_000_000 + stamp.nanosec * 1e-9)

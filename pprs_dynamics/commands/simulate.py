@@ -1,0 +1,103 @@
+"""pprs simulate: a recording of the simulated robot, with hidden effects if wanted.
+
+Runs the physics-engine robot without ROS, faster than real time, and writes what its sensors say.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from pprs_dynamics.commands.arguments import at_least, positive, whole
+from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.measurement.pose_files import read_poses
+from pprs_dynamics.measurement.recording import Recording, write_recording
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.report.progress import progress_bar
+from pprs_dynamics.report.robot_view import write_robot_page
+from pprs_dynamics.report.tables import console
+from pprs_dynamics.simulation.drive_control import ControlSettings
+from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
+from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
+from pprs_dynamics.simulation.sensors import SensorSettings
+
+RATE = 500.0
+FEEDFORWARDS = ('friction', 'rigid_body', 'none')
+WHITE_SHARE = 0.64
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('--output', metavar='RECORDING', required=True,
+                        help='.mcap, .csv, or the name of a rosbag2 folder to make')
+    parser.add_argument('--effect', metavar='NAME', action='append', default=[],
+                        choices=(*HIDDEN_EFFECTS, 'random'),
+                        help='physics that the model does not know of, drawn from the seed; may '
+                        f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}')
+    parser.add_argument('--scale', type=at_least(0.0), default=1.0,
+                        help='multiplies the strength of the effects (default 1)')
+    parser.add_argument('--seed', type=whole, default=0, help='of noise and effects (default 0)')
+    parser.add_argument('--path', default='excitation',
+                        help='helix, excitation, or a CSV of poses (default excitation)')
+    parser.add_argument('--duration', type=positive, default=40.0,
+                        help='of an excitation [s] (default 40)')
+    parser.add_argument('--path-seed', type=whole, default=0, help='of an excitation (default 0)')
+    parser.add_argument('--noise', type=at_least(0.0), default=0.08,
+                        help='of the efforts, standard deviation [N] (default 0.08)')
+    parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
+                        help='what the robot is driven with (default friction)')
+    parser.add_argument('--report', metavar='FILE.html', help='the robot moving, as a page')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    model = DriveModel.load(options.model)
+    motion = _motion(options)
+    forces = model.drive_forces(motion)
+    model.limits.check_strokes(forces.mechanism.position)
+    rng = np.random.default_rng(options.seed)
+    names = [str(rng.choice(sorted(HIDDEN_EFFECTS))) if name == 'random' else name
+             for name in options.effect]
+    effects = [draw_effect(name, rng, options.scale) for name in names]
+    effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
+    with progress_bar(screen, 'simulating') as progress:
+        result = simulate(
+            model, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
+                                  effort[options.feedforward]),
+            effects, seed=options.seed, rate=RATE, truth=False,
+            control=ControlSettings(gravity_compensation=options.feedforward == 'none'),
+            sensors=SensorSettings(white_noise=options.noise * WHITE_SHARE ** 0.5,
+                                   coloured_noise=options.noise * (1 - WHITE_SHARE) ** 0.5),
+            progress=lambda share: progress(share, 1.0))
+    write_recording(options.output, Recording.from_arrays(
+        Path(options.output).name, result.time, result.position, result.velocity, result.effort))
+    for note in result.notes:
+        screen.print(f'[yellow]{note.time:.2f} s {note.code}[/]: {note.message}')
+    if options.report:
+        write_robot_page(options.report, model, motion, 'The simulated motion')
+    if options.json:
+        write_json(options.json, _content(options, result))
+    hidden = f'{len(effects)} hidden effect{"s" * (len(effects) != 1)}'
+    screen.print(f'{len(result.time)} samples at {RATE:g} Hz, {hidden}: {options.output}')
+    return 0
+
+
+def _motion(options: argparse.Namespace) -> PlatformMotion:
+    if options.path not in ('helix', 'excitation'):
+        return read_poses(options.path).resampled(RATE)
+    path: HelicalPath | Excitation = HelicalPath()
+    if options.path == 'excitation':
+        path = Excitation(duration=options.duration, seed=options.path_seed)
+    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
+
+
+def _content(options: argparse.Namespace, result: SimulatedRun) -> dict[str, object]:
+    return {'recording': options.output, 'samples': len(result.time), 'rate': RATE,
+            'seed': options.seed, 'effects': result.effects,
+            'notes': [{'time': note.time, 'code': note.code, 'message': note.message}
+                      for note in result.notes]}

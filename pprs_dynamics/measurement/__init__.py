@@ -1,0 +1,1 @@
+"""Measurements: files of recordings and poses, and the motion behind them."""

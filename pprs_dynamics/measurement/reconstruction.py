@@ -1,0 +1,232 @@
+"""From six measured drive positions to the platform's motion, at every sample of a recording.
+
+Per segment: equal steps, smoothed position, velocity and acceleration of the drives, forward
+kinematics that follows the branch, and the platform's twist and acceleration through the
+Jacobian. Effort is only cut to the same samples. `Reconstruction.treat` is for both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.measurement.differentiation import Smoothing
+from pprs_dynamics.measurement.drive_motion import DriveMotion, Measured, smooth_drives
+from pprs_dynamics.measurement.samples import Progress
+from pprs_dynamics.measurement.treatment import Treatment
+from pprs_dynamics.mechanism.forward_motion import find_jumps, solve_forward_motion
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.robot import DRIVES, Array, Geometry
+from pprs_dynamics.model.drive_model import DriveModel
+
+CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
+
+@dataclass(frozen=True)
+class Chunk:
+    """Consecutive whole blocks of one segment.
+
+    Parameters
+    ----------
+    motion : PlatformMotion
+        With times.
+    samples, blocks : slice
+        Its place in the reconstruction, before and after treatment.
+    is_start : bool
+        True where a segment starts: effects with memory start afresh.
+    treat : Treatment
+        For these samples alone.
+    """
+
+    motion: PlatformMotion
+    samples: slice
+    blocks: slice
+    is_start: bool
+    treat: Treatment
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """N samples of motion and effort in one or more segments, and M blocks of them.
+
+    Parameters
+    ----------
+    time : (N,) array
+        [s].
+    position, velocity, acceleration : (N, 6) arrays
+        Of the drives, smoothed [m, m/s, m/s^2].
+    motion : PlatformMotion
+        Without times, which need not increase from segment to segment; `chunks` has them.
+    effort : (N, 6) array
+        As measured [N]; NaN where it was not.
+    index : (N,) int array
+        The samples' places in the recording.
+    segments : tuple of slice
+        Of the N samples.
+    treat : Treatment
+        What effort and model both get: values (N, k) -> (M, k).
+    smoothing : Smoothing
+    block : int
+        Samples per block, in the longest segment.
+    from_recorded : (2, 6) bool array
+        Drives whose velocity, and those whose acceleration, come from recorded velocities.
+    near_branch : (N,) bool array
+        See `ForwardKinematics`.
+    jumps : (J,) int array
+        Samples before which the pose jumps.
+    dropped : int
+        Samples of the recording's segments that are not here: edges and short segments.
+    notes : tuple of str
+        What was done and found, in words.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    motion: PlatformMotion
+    effort: Array
+    index: np.ndarray
+    segments: tuple[slice, ...]
+    treat: Treatment
+    smoothing: Smoothing
+    block: int
+    from_recorded: np.ndarray
+    near_branch: np.ndarray
+    jumps: np.ndarray
+    dropped: int
+    notes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def chunks(self, samples: int = CHUNK) -> Iterator[Chunk]:
+        """Yield whole blocks of at most about `samples` samples, segment by segment."""
+        starts = self.treat.starts
+        for segment in self.segments:
+            first = int(np.searchsorted(starts, segment.start))
+            end = int(np.searchsorted(starts, segment.stop))
+            while first < end:
+                last = int(np.searchsorted(starts, starts[first] + samples, side='right')) - 1
+                last = min(max(last, first + 1), end)
+                stop = int(starts[last]) if last < len(starts) else len(self)
+                rows = slice(int(starts[first]), stop)
+                yield Chunk(self.motion[rows].with_time(self.time[rows]), rows,
+                            slice(first, last), rows.start == segment.start,
+                            self.treat.blocks(first, last))
+                first = last
+
+
+def reconstruct(
+    robot: DriveModel | Geometry, recording: Measured, progress: Progress | None = None,
+    window: float | None = None,
+) -> Reconstruction:
+    """Return the motion and effort behind a recording.
+
+    Parameters
+    ----------
+    robot : DriveModel or Geometry
+        Whose kinematics to use.
+    recording : Recording
+        Or anything with its arrays and segments.
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+    window : float, optional
+        Duration of the smoothing window [s], instead of the choice from the data.
+
+    Raises
+    ------
+    MotionError
+        Where no segment is long enough, or the drives are not the robot's six.
+    ConvergenceError
+        Where drive positions do not close the mechanism.
+    """
+    geometry = robot.robot.geometry if isinstance(robot, DriveModel) else robot
+    if tuple(recording.drives) != DRIVES:
+        raise MotionError('drives', f'they are {", ".join(recording.drives)}',
+                          f'be {", ".join(DRIVES)}, in this order', 'shape')
+    drives = smooth_drives(recording, window)
+    time, total = recording.time[drives.index], len(drives.index)
+    motion, near, jumps = _platform_motion(geometry, time, drives, progress)
+    dropped = sum(part.stop - part.start for part in recording.segments) - total
+    notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
+             f'{len(drives.segments)} segments, what fills no block, and segments too short']
+    if np.any(near):
+        notes.append(f'{int(near.sum())} samples lie near another solution of the forward '
+                     'kinematics, where small errors of positions matter most')
+    if len(jumps):
+        notes.append(f'the pose jumps at {len(jumps)} places, first at {time[jumps[0]]:.6g} s: '
+                     'forward kinematics may have left its branch')
+    return Reconstruction(
+        time, drives.position, drives.velocity, drives.acceleration, motion,
+        recording.effort[drives.index], drives.index, drives.segments,
+        Treatment(drives.block_starts, total), drives.smoothing, drives.block,
+        drives.from_recorded, near, jumps, dropped, tuple(notes))
+
+
+def treated_forces(
+    model: DriveModel, reconstruction: Reconstruction, progress: Progress | None = None,
+) -> dict[str, Array]:
+    """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, 6) [N].
+
+    Effects with memory run through each segment and start afresh in the next.
+
+    Raises
+    ------
+    WorkspaceError, SingularityError
+        See `DriveModel.drive_forces`.
+    """
+    treated: dict[str, Array] = {}
+    state = model.initial_state()
+    for chunk in reconstruction.chunks():
+        if chunk.is_start:
+            state = model.initial_state()
+        forces = model.drive_forces(chunk.motion, state)
+        for name, values in {**forces.parts, 'total': forces.total}.items():
+            if name not in treated:
+                treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
+            treated[name][chunk.blocks] = chunk.treat(values)
+        if progress is not None:
+            progress(chunk.samples.stop, len(reconstruction))
+    return treated
+
+
+def _platform_motion(
+    geometry: Geometry, time: Array, drives: DriveMotion, progress: Progress | None,
+) -> tuple[PlatformMotion, np.ndarray, np.ndarray]:
+    """Return motion, nearness to another branch, and jumps, chunk by chunk."""
+    count = len(time)
+    arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
+    near = np.zeros(count, dtype=bool)
+    for segment in drives.segments:
+        seed = None
+        for start in range(segment.start, segment.stop, CHUNK):
+            rows = slice(start, min(start + CHUNK, segment.stop))
+            try:
+                found = solve_forward_motion(
+                    geometry, drives.position[rows], drives.velocity[rows],
+                    drives.acceleration[rows], seed)
+            except ConvergenceError as error:
+                sample = start + error.sample
+                raise ConvergenceError(
+                    int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
+                    error.rule) from None
+            part = found.motion
+            for array, values in zip(arrays, (
+                    part.position, part.orientation, part.linear_velocity, part.angular_velocity,
+                    part.linear_acceleration, part.angular_acceleration), strict=True):
+                array[rows] = values
+            near[rows] = found.near_branch
+            seed = part[-1:]
+            if progress is not None:
+                progress(rows.stop, count)
+    motion = PlatformMotion(*arrays)
+    jumps = []
+    for segment in drives.segments:
+        for start in range(segment.start, segment.stop, CHUNK):
+            first = max(start - 1, segment.start)  # the step from the last chunk counts too
+            rows = slice(first, min(start + CHUNK, segment.stop))
+            jumps.append(first + np.flatnonzero(find_jumps(motion[rows].with_time(time[rows]))))
+    return motion, near, np.concatenate(jumps)

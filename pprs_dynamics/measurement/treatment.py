@@ -1,0 +1,84 @@
+"""The one operation that measured effort and modelled forces both get: means of blocks.
+
+Samples of effort are noisy and correlated; means of 0.01 s keep all that moves below some 20 Hz
+and a fifth of the samples. The mean is linear and the same for both sides of a comparison. Were
+only one of them filtered, each reversal of a drive would leave a difference that looks like
+friction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.mechanism.robot import Array
+
+BLOCK_DURATION = 0.01  # [s]
+
+
+def block_length(step: float) -> int:
+    """Return how many samples, `step` apart [s], make a block."""
+    return max(1, round(BLOCK_DURATION / step))
+
+
+class Treatment:
+    """Means over blocks of consecutive samples.
+
+    Parameters
+    ----------
+    starts : (M,) int array
+        First sample of every block; a block ends where the next begins.
+    samples : int
+        N, all of which lie in blocks.
+    """
+
+    def __init__(self, starts: np.ndarray, samples: int) -> None:
+        self.starts, self.samples = starts, samples
+        self._counts = np.diff(np.append(starts, samples))
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def __call__(self, values: Array) -> Array:
+        """Return the block means of values (N, ...), (M, ...).
+
+        A block with a NaN has none: a measurement that is missing is not made up.
+        """
+        values = np.asarray(values, dtype=float)
+        if len(values) != self.samples:
+            raise ValueError(f'{len(values)} samples for a treatment of {self.samples}')
+        sums = np.add.reduceat(values, self.starts, axis=0)
+        means: Array = sums / self._counts.reshape((-1,) + (1,) * (values.ndim - 1))
+        return means
+
+    def blocks(self, first: int, last: int) -> Treatment:
+        """Return the treatment of blocks first..last-1 alone, for their samples alone."""
+        end = self.starts[last] if last < len(self) else self.samples
+        start = self.starts[first]
+        return Treatment(self.starts[first:last] - start, int(end - start))
+
+
+class LiveTreatment:
+    """The same means, sample by sample.
+
+    Parameters
+    ----------
+    block : int
+        Samples per block.
+    """
+
+    def __init__(self, block: int) -> None:
+        self.block = block
+        self._values: list[Array] = []
+
+    def push(self, values: Array) -> Array | None:
+        """Take the values of one sample, and return their mean where a block ends."""
+        self._values.append(np.array(values, dtype=float))
+        if len(self._values) < self.block:
+            return None
+        mean: Array = np.sum(self._values, axis=0) / self.block
+        self._values.clear()
+        return mean
+
+    def reset(self) -> None:
+        """Forget an unfinished block: a stretch has ended."""
+        self._values.clear()

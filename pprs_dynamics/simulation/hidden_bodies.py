@@ -1,0 +1,161 @@
+"""Hidden bodies: masses, inertias and gravity that are not what the model says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.simulation.closed_chains import DRIVE_DOFS, ClosedChains
+from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.simulation.hidden_effect import BodyChange, DriveBound, Range
+
+PICK_UP_TIME = 0.2  # [s], in which the weight of a payload goes over to the platform
+
+
+Body = tuple[float, Array, Array]
+"""Mass [kg], centre of mass from o [m] and inertia tensor about it [kg m^2], in `platform`."""
+
+
+def join(one: Body, other: Body) -> Body:
+    """Return two bodies fixed to each other, as one."""
+    total = one[0] + other[0]
+    centre: Array = (one[0] * one[1] + other[0] * other[1]) / total
+    tensor: Array = (one[2] + _steiner(one[0], one[1] - centre)
+                     + other[2] + _steiner(other[0], other[1] - centre))
+    return total, centre, tensor
+
+
+def ball(mass: float, place: Array, radius: float) -> Body:
+    """Return a uniform ball."""
+    return mass, place, 0.4 * mass * radius ** 2 * np.eye(3)
+
+
+def _platform(chains: ClosedChains) -> Body:
+    return chains.platform_mass, chains.platform_centre, chains.platform_inertia
+
+
+def _steiner(mass: float, arm: Array) -> Array:
+    tensor: Array = mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return tensor
+
+
+class PayloadMass(BodyChange):
+    """A payload heavier or lighter than the model's, in the same place."""
+
+    name: ClassVar[str] = 'payload_mass'
+    form: ClassVar[str] = 'a ball of mass m and radius 2 cm at the centre of mass'
+    ranges: ClassVar[dict[str, Range]] = {'mass': Range('kg', 0.1, 0.4, 'signed', scales=True)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Add the mass."""
+        more = ball(self.parameters['mass'], chains.platform_centre, 0.02)
+        chains.set_platform(*join(_platform(chains), more))
+
+
+class PayloadOffset(BodyChange):
+    """The centre of mass of platform and payload lies elsewhere."""
+
+    name: ClassVar[str] = 'payload_offset'
+    form: ClassVar[str] = 'the centre of mass moved by (x, y, z), the tensor about it as it was'
+    ranges: ClassVar[dict[str, Range]] = {
+        'x': Range('m', 0.003, 0.01, 'signed', scales=True),
+        'y': Range('m', 0.003, 0.01, 'signed', scales=True),
+        'z': Range('m', 0.003, 0.02, 'signed', scales=True)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Move the centre."""
+        p = self.parameters
+        mass, centre, inertia = _platform(chains)
+        chains.set_platform(mass, centre + np.array([p['x'], p['y'], p['z']]), inertia)
+
+
+class PlatformInertia(BodyChange):
+    """A beam across the platform: more inertia, of which one axis in the plane feels nothing."""
+
+    name: ClassVar[str] = 'platform_inertia'
+    form: ClassVar[str] = 'I (E - a a^T), a = (cos beta, sin beta, 0)'
+    ranges: ClassVar[dict[str, Range]] = {
+        'inertia': Range('kg m^2', 0.01, 0.04, 'log', scales=True),
+        'angle': Range('rad', 0.0, np.pi)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Add the beam's inertia."""
+        p = self.parameters
+        along = np.array([np.cos(p['angle']), np.sin(p['angle']), 0.0])
+        mass, centre, inertia = _platform(chains)
+        beam = p['inertia'] * (np.eye(3) - np.outer(along, along))
+        chains.set_platform(mass, centre, inertia + beam)
+
+
+class RodMass(BodyChange):
+    """Guiding rods heavier than the model's: a collar in the middle of each."""
+
+    name: ClassVar[str] = 'rod_mass'
+    form: ClassVar[str] = 'a uniform collar of mass m over the middle 60 % of every rod'
+    ranges: ClassVar[dict[str, Range]] = {'mass': Range('kg', 0.05, 0.2, 'log', scales=True)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Add the collars."""
+        l, extra = values['geometry.rod_length'], self.parameters['mass']
+        for i, mass in enumerate(values['masses.rods']):
+            across = mass * l ** 2 / 12 + extra * (0.6 * l) ** 2 / 12
+            chains.set_mass(f'rod_{i + 1}', mass + extra, np.array([-l / 2, 0.0, 0.0]),
+                            np.diag([0.0, across, across]))
+
+
+class BaseTilt(BodyChange):
+    """The base does not stand level: gravity leans in it."""
+
+    name: ClassVar[str] = 'base_tilt'
+    form: ClassVar[str] = 'gravity turned by x about x, then by y about y'
+    ranges: ClassVar[dict[str, Range]] = {
+        'x': Range('rad', 0.01, 0.05, 'signed', scales=True),
+        'y': Range('rad', 0.01, 0.05, 'signed', scales=True)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Turn gravity."""
+        (c_x, s_x), (c_y, s_y) = ((np.cos(self.parameters[axis]), np.sin(self.parameters[axis]))
+                                  for axis in 'xy')
+        about_x = np.array([[1, 0, 0], [0, c_x, -s_x], [0, s_x, c_x]])
+        about_y = np.array([[c_y, 0, s_y], [0, 1, 0], [-s_y, 0, c_y]])
+        chains.model.opt.gravity[:] = about_y @ about_x @ np.array(values['gravity'])
+
+
+class DriveInertia(DriveBound, BodyChange):
+    """Rotor and screw, reflected: inertia along the drive, without weight."""
+
+    name: ClassVar[str] = 'drive_inertia'
+    form: ClassVar[str] = 'm dv/dt, as the armature of the engine\'s joint'
+    ranges: ClassVar[dict[str, Range]] = {'mass': Range('kg', 0.2, 1.0, 'log', scales=True)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Add the armature."""
+        chains.model.dof_armature[DRIVE_DOFS] += self.values['mass']
+
+
+class PayloadPickUp(BodyChange):
+    """A payload taken up while the robot moves. Not in the catalogue."""
+
+    name: ClassVar[str] = 'payload_pick_up'
+    form: ClassVar[str] = 'a ball of mass m, radius 3 cm, at (x, y, z) from the given time on'
+    ranges: ClassVar[dict[str, Range]] = {
+        'mass': Range('kg', 0.15, 0.5, 'log', scales=True), 'time': Range('s', 4.0, 15.0),
+        'x': Range('m', -0.02, 0.02), 'y': Range('m', -0.02, 0.02), 'z': Range('m', 0.02, 0.06)}
+
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Wait."""
+        self._share = 0.0
+        self._empty: Body | None = None
+
+    def advance(self, chains: ClosedChains, time: float) -> None:
+        """Take it up within `PICK_UP_TIME`."""
+        p = self.parameters
+        share = float(np.clip((time - p['time']) / PICK_UP_TIME, 0.0, 1.0))
+        if share != self._share:
+            self._share = share
+            if self._empty is None:
+                self._empty = _platform(chains)
+            more = ball(share * p['mass'], np.array([p['x'], p['y'], p['z']]), 0.03)
+            chains.set_platform(*join(self._empty, more))

@@ -1,0 +1,259 @@
+"""What a hidden effect is: physics in the simulated robot of which the model knows nothing.
+
+Each is known by its name in the interface where the catalogue has one, but has a form of its
+own, so that a diagnosis is not tested against itself. Signs are the interface's: positive is
+what the drives must apply more.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.simulation.engine_model import Array
+
+if TYPE_CHECKING:
+    from pprs_dynamics.simulation.closed_chains import ClosedChains
+    from pprs_dynamics.simulation.joint_friction import JointFriction
+
+DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
+"""Names of the drives, in the interface's order."""
+
+
+class HiddenEffectError(PprsError, ValueError):
+    """A hidden effect that does not exist, or parameters that it has not got."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a parameter is drawn from.
+
+    Parameters
+    ----------
+    unit : str
+    low, high : float
+    law : {'uniform', 'log', 'signed', 'sign', 'whole'}
+        'signed' draws the size logarithmically and the sign at random; 'sign' is 1 or -1;
+        'whole' draws whole numbers, both ends included.
+    lifts : (low, high), optional
+        Other limits on lifts, for what goes by positions.
+    scales : bool
+        True where a wanted strength multiplies it.
+    neutral : float
+        Value on drives that do not have the effect.
+    """
+
+    unit: str
+    low: float
+    high: float
+    law: str = 'uniform'
+    lifts: tuple[float, float] | None = None
+    scales: bool = False
+    neutral: float = 0.0
+
+    def draw(self, rng: np.random.Generator, scale: float, drive: str = '') -> float:
+        """Return a random value, for a drive where it sits on one."""
+        low, high = self.low, self.high
+        if self.lifts is not None and drive.startswith('lift'):
+            low, high = self.lifts
+        if self.law == 'sign':
+            value = float(rng.choice((-1.0, 1.0)))
+        elif self.law == 'whole':
+            value = float(rng.integers(int(low), int(high) + 1))
+        elif self.law == 'uniform':
+            value = rng.uniform(low, high)
+        else:
+            value = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+            if self.law == 'signed' and rng.random() < 0.5:
+                value = -value
+        return float(value * scale if self.scales else value)
+
+
+@dataclass(slots=True)
+class DriveMoment:
+    """What the drives do at one moment; arrays (6,), in SI units."""
+
+    time: float
+    position: Array
+    velocity: Array
+    guide_load: Array
+
+    def at(self, velocity: Array) -> DriveMoment:
+        """Return the same moment at other velocities."""
+        return DriveMoment(self.time, self.position, velocity, self.guide_load)
+
+
+@dataclass(frozen=True)
+class PlatformMoment:
+    """What platform and rods do at one moment, in `base`.
+
+    Parameters
+    ----------
+    time : float
+    position, velocity, angular_velocity : (3,) arrays
+        Of the platform.
+    rotation : (3, 3) array
+    rod_angle, rod_rate : (3,) arrays
+        u_i and its rate.
+    """
+
+    time: float
+    position: Array
+    rotation: Array
+    velocity: Array
+    angular_velocity: Array
+    rod_angle: Array
+    rod_rate: Array
+
+
+class HiddenEffect(ABC):
+    """Physics that is in the robot and not in its model.
+
+    Class attributes
+    ----------------
+    name : str
+    form : str
+        Its equation, for reports.
+    ranges : dict of Range
+        Its parameters.
+
+    Parameters
+    ----------
+    **parameters : float
+        All of `ranges`.
+    """
+
+    name: ClassVar[str]
+    form: ClassVar[str]
+    ranges: ClassVar[Mapping[str, Range]]
+
+    def __init__(self, **parameters: float) -> None:
+        require_parameters(type(self), parameters)
+        self.parameters: dict[str, Any] = dict(parameters)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, scale: float = 1.0) -> Self:
+        """Return the effect with random parameters; `scale` multiplies its strength."""
+        return cls(**{name: r.draw(rng, scale) for name, r in cls.ranges.items()})
+
+    @property
+    def drives(self) -> tuple[str, ...] | None:
+        """Drives on which it sits; None for passive joints, platform and structure."""
+        return None
+
+    def truth(self) -> dict[str, Any]:
+        """Return name, drives, parameters and form, as data for JSON."""
+        return {'name': self.name, 'drives': None if self.drives is None else list(self.drives),
+                'parameters': self.parameters, 'form': self.form}
+
+
+class DriveBound(HiddenEffect):
+    """An effect that sits on one drive, some or all.
+
+    Parameters
+    ----------
+    drives : mapping
+        Parameters of every drive that has it, e.g. {'lift_1': {'force': 1.0}}.
+    """
+
+    def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
+        for drive, parameters in drives.items():
+            if drive not in DRIVES:
+                raise HiddenEffectError(f'{self.name} sits on a drive, not on {drive!r}')
+            require_parameters(type(self), parameters)
+        self.parameters = {drive: dict(parameters) for drive, parameters in drives.items()}
+        # One array per parameter, neutral where a drive has not got the effect.
+        self.values = {
+            name: np.array([self.parameters[drive][name] if drive in drives else r.neutral
+                            for drive in DRIVES])
+            for name, r in self.ranges.items()}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, scale: float = 1.0) -> Self:
+        """Return the effect on one drive (half of the time), on two or three, or on all."""
+        count = int(rng.choice([1, 2, 3, 6], p=[0.5, 0.125, 0.125, 0.25]))
+        chosen = sorted(rng.choice(6, count, replace=False))
+        return cls({drive: {name: r.draw(rng, scale, drive) for name, r in cls.ranges.items()}
+                    for drive in (DRIVES[i] for i in chosen)})
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Drives on which it sits."""
+        return tuple(drive for drive in DRIVES if drive in self.parameters)
+
+
+class DriveForce(DriveBound):
+    """A force in the drives.
+
+    Class attributes
+    ----------------
+    steep : bool
+        True where it changes fast with the drive's own velocity: then the time step treats it
+        implicitly.
+    """
+
+    steep: ClassVar[bool] = False
+
+    def prepare(self, friction: JointFriction) -> None:
+        """Take note of the robot's own friction before it starts; by default not."""
+        return
+
+    @abstractmethod
+    def force(self, moment: DriveMoment) -> Array:
+        """Return what the drives must apply more [N], (6,)."""
+
+    def advance(self, moment: DriveMoment, duration: float) -> None:
+        """Advance memory by a time step; nothing to do without one."""
+        return
+
+
+class PassiveFriction(HiddenEffect):
+    """Friction in the passive joints; `joint` is 'revolute' or 'spherical'."""
+
+    joint: ClassVar[str]
+
+    @abstractmethod
+    def resistance(self, speed: Array, load: Array) -> Array:
+        """Return moment per speed [N m s/rad], (3,), at speeds and loads (3,)."""
+
+
+class StructureForce(HiddenEffect):
+    """Forces on rods and platform."""
+
+    @abstractmethod
+    def apply(self, moment: PlatformMoment) -> tuple[Array, Array, Array]:
+        """Return torques on the hinges of C_i, force at o and torque on the platform, in `base`.
+
+        These act on the mechanism: the drives must overcome them.
+        """
+
+
+class BodyChange(HiddenEffect):
+    """Bodies or gravity that are not what the model says."""
+
+    @abstractmethod
+    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
+        """Change the mechanism before it starts."""
+
+    def advance(self, chains: ClosedChains, time: float) -> None:
+        """Change it while it runs; by default not."""
+        return
+
+
+class SensorEffect(DriveBound):
+    """What a sensor says, beside the truth; see `sensors.Sensors`."""
+
+
+def require_parameters(effect: type[HiddenEffect], given: Mapping[str, float]) -> None:
+    """Raise HiddenEffectError unless the effect's parameters are given, all finite."""
+    if set(given) != set(effect.ranges):
+        raise HiddenEffectError(f'{effect.name} has the parameters {", ".join(effect.ranges)}, '
+                                f'not {", ".join(given) or "none"}')
+    for name, value in given.items():
+        if not np.isfinite(value):
+            raise HiddenEffectError(f'{effect.name}: {name} is {value}, but it must be finite')

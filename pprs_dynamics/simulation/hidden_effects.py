@@ -1,0 +1,60 @@
+"""All hidden effects by name."""
+
+from __future__ import annotations
+
+import difflib
+
+import numpy as np
+
+from pprs_dynamics.simulation import (
+    hidden_bodies,
+    hidden_forces,
+    hidden_friction,
+    hidden_sensors,
+)
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect, HiddenEffectError
+
+IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
+    hidden_friction.ViscousFriction, hidden_friction.CoulombFriction,
+    hidden_friction.AsymmetricFriction, hidden_friction.StribeckFriction,
+    hidden_friction.QuadraticFriction, hidden_friction.LoadFriction,
+    hidden_friction.Hysteresis, hidden_friction.FrictionDrift,
+    hidden_forces.EffortOffset, hidden_sensors.EffortGain, hidden_sensors.HomingError,
+    hidden_forces.DriveSpring, hidden_forces.ForceRipple, hidden_bodies.DriveInertia,
+    hidden_sensors.TimeDelay, hidden_friction.RevoluteFriction,
+    hidden_friction.SphericalFriction, hidden_forces.RevoluteStiffness,
+    hidden_bodies.PayloadMass, hidden_bodies.PayloadOffset, hidden_bodies.PlatformInertia,
+    hidden_forces.ExternalWrench, hidden_bodies.BaseTilt, hidden_forces.PlatformDrag,
+    hidden_bodies.RodMass)}
+"""Effects that the catalogue has under the same name, in the interface's order."""
+
+NOT_IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
+    hidden_forces.LocalBump, hidden_forces.Vibration, hidden_forces.DriveCoupling,
+    hidden_bodies.PayloadPickUp)}
+"""Effects that no catalogue effect explains."""
+
+HIDDEN_EFFECTS = {**IN_CATALOGUE, **NOT_IN_CATALOGUE}
+
+
+def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> HiddenEffect:
+    """Return a hidden effect with random parameters.
+
+    Parameters
+    ----------
+    name : str
+        One of `HIDDEN_EFFECTS`.
+    rng : numpy.random.Generator
+    scale : float
+        Multiplies its strength.
+
+    Raises
+    ------
+    HiddenEffectError
+        For another name.
+    """
+    if name not in HIDDEN_EFFECTS:
+        close = difflib.get_close_matches(name, HIDDEN_EFFECTS, 1)
+        hint = f' (did you mean {close[0]}?)' if close else ''
+        raise HiddenEffectError(f'no hidden effect is called {name!r}{hint}; there are '
+                                f'{", ".join(HIDDEN_EFFECTS)}')
+    return HIDDEN_EFFECTS[name].draw(rng, scale)

@@ -1,0 +1,143 @@
+"""All that resists the drives by velocity, and the acceleration that it leaves them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg.lapack import dposv
+
+from pprs_dynamics.simulation.closed_chains import Equations
+from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.simulation.hidden_effect import (
+    DriveForce,
+    DriveMoment,
+    HiddenEffect,
+    PassiveFriction,
+)
+from pprs_dynamics.simulation.joint_friction import JointFriction
+
+FORCE_TOLERANCE = 1e-8  # [N]
+# A Newton step shorter than this share of the width in which friction turns over leaves an
+# error below 0.4 times its square, times the dry friction: a few millinewtons for some steps at
+# a reversal, which leaves the error of the time step as it is.
+RESOLVED_SHARE = 0.1
+ITERATIONS = 40
+SMALLEST_SHARE = 1 / 64  # of a Newton step that would not lower the error
+VELOCITY_NUDGE = 1e-7  # [m/s], for slopes of hidden forces; below every width of turning over
+
+# Joint (of 12) to which each relative velocity (of 18) belongs.
+JOINT_OF_RATE = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 10, 10, 10, 11, 11, 11])
+SUM_PER_JOINT = np.equal.outer(np.arange(12), JOINT_OF_RATE).astype(float)
+
+
+class Resistance:
+    """The joints' friction and the hidden forces in drives and passive joints.
+
+    Parameters
+    ----------
+    friction : JointFriction
+        By the model file.
+    effects : sequence of HiddenEffect
+        Those of other kinds are left to others.
+    """
+
+    def __init__(self, friction: JointFriction, effects: Sequence[HiddenEffect]) -> None:
+        self.friction = friction
+        self._drive_forces = [e for e in effects if isinstance(e, DriveForce)]
+        self._passive_friction = [e for e in effects if isinstance(e, PassiveFriction)]
+        for force in self._drive_forces:
+            force.prepare(friction)
+        self._resolved = RESOLVED_SHARE * float(friction.width[:6].min())
+
+    def in_drives(self, equations: Equations, moment: DriveMoment, loads: Array) -> Array:
+        """Return what the drives must apply more [N], (6,), at loads (12,) [N]."""
+        relative = equations.rates.dot(moment.velocity)
+        resistances, _ = self._of_joints(relative, loads)
+        force: Array = (resistances.take(JOINT_OF_RATE) * relative).dot(equations.rates)
+        for effect in self._drive_forces:
+            force += effect.force(moment)
+        return force
+
+    def of_passive_joints(self, equations: Equations, velocity: Array, loads: Array) -> Array:
+        """Return what friction takes from hinges and platform [N m], (9,)."""
+        relative = equations.rates.dot(velocity)
+        resistances, _ = self._of_joints(relative, loads)
+        moments = resistances.take(JOINT_OF_RATE) * relative
+        passive: Array = moments[9:].dot(equations.axes)
+        passive[:3] += moments[6:9]
+        return passive
+
+    def solve(self, equations: Equations, drive: Array, moment: DriveMoment, loads: Array,
+              guess: Array, ahead: float) -> Array:
+        """Return the drive acceleration with friction at velocity + ahead * acceleration.
+
+        Newton's method, shortened where friction turns over within the step and the full step
+        would not lower the error.
+
+        Parameters
+        ----------
+        equations : Equations
+        drive : (6,) array
+            All forces on the drives that velocities do not change within the step [N].
+        moment : DriveMoment
+            With the velocity to start from.
+        loads : (12,) array
+        guess : (6,) array
+        ahead : float
+            [s]
+        """
+        y = moment.velocity
+        y_dot, step = guess, np.zeros(6)
+        best, share = np.inf, 1.0
+        for _ in range(ITERATIONS):
+            force, slopes = self._with_slopes(equations, moment.at(y + ahead * y_dot), loads)
+            error = drive - force - equations.mass.dot(y_dot)
+            size = np.abs(error).max()
+            if size < FORCE_TOLERANCE:
+                break
+            if size >= best and share > SMALLEST_SHARE:
+                share /= 2
+                y_dot = y_dot - share * step
+                continue
+            best, share = size, 1.0
+            _, step, _ = dposv(equations.mass + ahead * slopes, error)
+            y_dot = y_dot + step
+            if ahead * np.abs(step).max() < self._resolved:
+                break
+        return y_dot
+
+    def advance(self, moment: DriveMoment, duration: float) -> None:
+        """Advance the memory of hidden effects by a time step."""
+        for effect in self._drive_forces:
+            effect.advance(moment, duration)
+
+    def _of_joints(self, relative: Array, loads: Array) -> tuple[Array, Array]:
+        """Return forces per speed in the joints, (12,), and slopes of the drives, (6,)."""
+        squares = SUM_PER_JOINT.dot(relative * relative)
+        resistances, slopes = self.friction.resist(squares, loads)
+        for effect in self._passive_friction:
+            part = slice(6, 9) if effect.joint == 'revolute' else slice(9, 12)
+            resistances[part] += effect.resistance(np.sqrt(squares[part]), loads[part])
+        return resistances, slopes
+
+    def _with_slopes(
+        self, equations: Equations, moment: DriveMoment, loads: Array,
+    ) -> tuple[Array, Array]:
+        """Return `in_drives`, and its slopes over the drive velocities, (6, 6)."""
+        rates = equations.rates
+        relative = rates.dot(moment.velocity)
+        resistances, slopes = self._of_joints(relative, loads)
+        weights = resistances.take(JOINT_OF_RATE)
+        force = (weights * relative).dot(rates)
+        # Of the passive joints the secant is taken: not smaller than the slope, so that the
+        # matrix stays positive, and their share is small.
+        weights[:6] = slopes
+        for effect in self._drive_forces:
+            hidden = effect.force(moment)
+            force += hidden
+            if effect.steep:
+                nudged = effect.force(moment.at(moment.velocity + VELOCITY_NUDGE))
+                # Friction that falls with the speed is taken explicitly.
+                weights[:6] += np.maximum((nudged - hidden) / VELOCITY_NUDGE, 0.0)
+        return force, (rates.T * weights).dot(rates)

@@ -1,0 +1,127 @@
+"""The simulated robot: mechanism, drives' control and sensors, advanced tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.errors import SingularityError
+from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
+from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth
+from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
+
+
+class SimulatedRobot:
+    """A 3-PPRS to run against; it starts at home, the platform unturned at 0.5 m, and holds.
+
+    Call `command` whenever a command arrives, and `tick` at the rate at which it publishes.
+
+    Parameters
+    ----------
+    values : mapping
+        Flat keys and values of a model file, e.g. `DriveModel.values`.
+    effects : sequence of HiddenEffect
+        Physics that the model knows nothing of. They carry memory: every robot needs its own.
+    seed : int
+        Of the noise.
+    rate : float
+        Ticks per second [Hz].
+    plant, control, sensors : settings, optional
+
+    Raises
+    ------
+    MissingLibraryError
+        Where mujoco is not installed.
+    """
+
+    def __init__(
+        self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (), *, seed: int = 0,
+        rate: float = 500.0, plant: PlantSettings | None = None,
+        control: ControlSettings | None = None, sensors: SensorSettings | None = None,
+    ) -> None:
+        self.plant = Plant(values, effects, plant)
+        step = self.plant.settings.step
+        self.steps_per_tick = max(1, round(1 / (rate * step)))
+        if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
+            raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
+        self.effects = tuple(effects)
+        self.sensors = Sensors(sensors or SensorSettings(), step, np.random.default_rng(seed),
+                               effects)
+        self.control = DriveControl(values, control or ControlSettings(), step,
+                                    self.sensors.smoothing)
+        self._ticks = 0
+        self._stopped = False
+        self.place(self.plant.position)
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._ticks * self.steps_per_tick * self.plant.settings.step
+
+    @property
+    def notes(self) -> list[Note]:
+        """What the robot has had to say."""
+        return self.control.notes
+
+    @property
+    def stopped(self) -> bool:
+        """True after the mechanism came to a singular pose: it moves no more."""
+        return self._stopped
+
+    def place(self, position: Array, velocity: Array | None = None) -> None:
+        """Put the drives at encoder positions (6,) [m], at rest or with velocities [m/s].
+
+        Raises
+        ------
+        SingularityError
+            Where the mechanism cannot go there.
+        """
+        true = np.asarray(position, dtype=float) - self.sensors.zero
+        self.plant.place(true, velocity)
+        self.sensors.start(true, self.plant.velocity)
+        self.control.start(self.sensors.position)
+        self._effort: Array | None = None
+        self._stopped = False
+
+    def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
+        """Take a command for now, and the next tick's where it is known; False if refused."""
+        return self.control.command(
+            self.time, setpoint, following, self.steps_per_tick * self.plant.settings.step)
+
+    def tick(self) -> Measurement:
+        """Return what the sensors say now, and advance to the next tick."""
+        return self.tick_with_truth(want_truth=False)[0]
+
+    def tick_with_truth(self, want_truth: bool = True) -> tuple[Measurement, Truth | None]:
+        """As `tick`, and what really happens now."""
+        now, step, plant = self.time, self.plant.settings.step, self.plant
+        measurement, truth = None, None
+        for k in range(self.steps_per_tick):
+            effort = self._next_effort(now + k * step)
+            if measurement is None:
+                measurement = self.sensors.measure(now)
+                truth = plant.observe(effort) if want_truth else None
+            if not self._stopped:
+                try:
+                    plant.step(effort)
+                except SingularityError as error:
+                    self._stop(now + k * step, error)
+            self.sensors.read_encoders(plant.position, plant.velocity)
+        self._ticks += 1
+        assert measurement is not None
+        return measurement, truth
+
+    def _next_effort(self, now: float) -> Array:
+        effort = self.control.effort(now, self.sensors.position, self.sensors.velocity)
+        self.sensors.read_effort(effort if self._effort is None else self._effort, effort)
+        self._effort = effort
+        return effort
+
+    def _stop(self, now: float, error: SingularityError) -> None:
+        self._stopped = True
+        self.plant.velocity = np.zeros(6)
+        self.notes.append(Note(now, 'STOPPED', f'the robot stopped: {error.found}'))

@@ -1,0 +1,173 @@
+"""What the robot's sensors say: quantised positions, noisy efforts, faults.
+
+All randomness comes from one generator, so that a seed repeats a recording bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect, SensorEffect
+
+# Correlation times of the slow processes that add up to 1/f noise [samples], a factor 4 apart:
+# the sum follows 1/f within 10 % from 1/200 of the sampling rate down to 1/400 000 of it.
+PINK_TIMES = 2.0 * 4.0 ** np.arange(9)
+
+
+@dataclass(frozen=True)
+class SensorSettings:
+    """Quality of the sensors.
+
+    Parameters
+    ----------
+    quantisation : float
+        Of the encoders [m]; 0 for none.
+    true_velocity : bool
+        True: tachometers. False: differentiated positions, smoothed.
+    velocity_bandwidth : float
+        Of that smoothing, a first-order low-pass [Hz].
+    white_noise, coloured_noise, pink_noise : float
+        Standard deviations of the noise of the efforts [N].
+    noise_correlation : float
+        Of the coloured noise, from sample to sample; AR(1).
+    pink_exponent : float
+        a of the pink noise's spectrum 1/f^a, 0 < a < 2.
+    """
+
+    quantisation: float = 1e-6
+    true_velocity: bool = False
+    velocity_bandwidth: float = 80.0
+    white_noise: float = 0.064
+    coloured_noise: float = 0.048
+    noise_correlation: float = 0.9
+    pink_noise: float = 0.0
+    pink_exponent: float = 1.0
+
+
+class EffortNoise:
+    """White, AR(1) and 1/f noise of six efforts, one sample at a time.
+
+    Parameters
+    ----------
+    settings : SensorSettings
+    rng : numpy.random.Generator
+
+    Notes
+    -----
+    1/f^a noise is a sum of AR(1) processes whose correlation times lie evenly on a logarithmic
+    scale and whose variances go with time^(a - 1).
+    """
+
+    def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
+        self._rng = rng
+        weights = PINK_TIMES ** (settings.pink_exponent - 1)
+        self._sizes = np.concatenate((
+            [settings.coloured_noise],
+            settings.pink_noise * np.sqrt(weights / weights.sum())))
+        self._keep = np.concatenate(([settings.noise_correlation], np.exp(-1 / PINK_TIMES)))
+        self._add = np.sqrt(1 - self._keep ** 2)
+        self._white = settings.white_noise
+        self._states = rng.standard_normal((len(self._keep), 6))
+
+    def sample(self) -> Array:
+        """Return the next sample [N], (6,)."""
+        news = self._rng.standard_normal((len(self._keep) + 1, 6))
+        self._states = self._keep[:, None] * self._states + self._add[:, None] * news[1:]
+        noise: Array = self._white * news[0] + self._sizes @ self._states
+        return noise
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What the sensors say at one moment: `time` [s] and (6,) arrays in drive order."""
+
+    time: float
+    position: Array
+    velocity: Array
+    effort: Array
+
+
+class Sensors:
+    """Encoders and effort sensors of the six drives.
+
+    Parameters
+    ----------
+    settings : SensorSettings
+    step : float
+        Time between readings of the encoders [s].
+    rng : numpy.random.Generator
+    effects : sequence of HiddenEffect
+        Of which the faults of sensors act here.
+
+    Attributes
+    ----------
+    smoothing : float
+        Share of a change that `velocity` shows after one reading; 1 with tachometers.
+    """
+
+    def __init__(self, settings: SensorSettings, step: float, rng: np.random.Generator,
+                 effects: Sequence[HiddenEffect] = ()) -> None:
+        self.settings, self._step = settings, step
+        self._noise = EffortNoise(settings, rng)
+        self.smoothing = 1.0 if settings.true_velocity else 1 - float(
+            np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
+        faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
+        self.zero, self._gain, delay = (
+            np.sum([effect.values[name] for effect in faults if name in effect.values]
+                   or [np.zeros(6)], axis=0) for name in ('zero', 'gain', 'delay'))
+        self._effort_delay, self._position_delay = np.maximum(delay, 0), np.maximum(-delay, 0)
+        length = int(np.ceil(np.abs(delay).max() / step)) + 2
+        self._past: deque[tuple[Array, Array, Array]] = deque(maxlen=length)
+        self.position, self.velocity = np.zeros(6), np.zeros(6)
+
+    def start(self, position: Array, velocity: Array) -> None:
+        """Forget the past: the robot is at (6,) [m] and moves with (6,) [m/s]."""
+        self._past.clear()
+        self.position, self.velocity = self._encoder(position), np.array(velocity)
+
+    def read_encoders(self, position: Array, velocity: Array) -> None:
+        """Take the true positions and velocities, (6,), as the drives' electronics see them."""
+        seen = self._encoder(position)
+        if self.settings.true_velocity:
+            self.velocity = np.array(velocity)
+        else:
+            change = (seen - self.position) / self._step
+            self.velocity = self.velocity + self.smoothing * (change - self.velocity)
+        self.position = seen
+
+    def read_effort(self, before: Array, after: Array) -> None:
+        """Take the efforts applied just before and after now, (6,) each, and remember them.
+
+        Efforts are constant over a time step: at its border their mean is what belongs to the
+        motion there. Either one alone would be half a step late or early.
+        """
+        self._past.appendleft((self.position, self.velocity, (before + after) / 2))
+
+    def measure(self, time: float) -> Measurement:
+        """Return what is published now, with faults and noise."""
+        position, velocity = (self._delayed(i, self._position_delay) for i in (0, 1))
+        effort = self._delayed(2, self._effort_delay)
+        return Measurement(time, position, velocity,
+                           (1 + self._gain) * effort + self._noise.sample())
+
+    def _encoder(self, position: Array) -> Array:
+        seen: Array = position + self.zero
+        grain = self.settings.quantisation
+        return np.round(seen / grain) * grain if grain > 0 else seen
+
+    def _delayed(self, quantity: int, delay: Array) -> Array:
+        if not delay.any():
+            return self._past[0][quantity].copy()
+        # Between readings by straight lines; before the first reading, the first.
+        steps = delay / self._step
+        whole = np.floor(steps).astype(int)
+        share, last, drives = steps - whole, len(self._past) - 1, range(6)
+        newer = np.array([self._past[min(whole[i], last)][quantity][i] for i in drives])
+        older = np.array([self._past[min(whole[i] + 1, last)][quantity][i] for i in drives])
+        delayed: Array = newer + share * (older - newer)
+        return delayed
