@@ -36,6 +36,7 @@ setup(
     entry_points={
         'console_scripts': [
             'feedforward = pprs_dynamics.nodes.executables:feedforward',
+            'monitor = pprs_dynamics.nodes.executables:monitor',
             'play_trajectory = pprs_dynamics.nodes.executables:play_trajectory',
             'simulated_robot = pprs_dynamics.nodes.executables:simulated_robot',
             'pprs = pprs_dynamics.commands.pprs:main',

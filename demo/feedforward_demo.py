@@ -22,7 +22,7 @@ from pprs_dynamics.report.figures import draw_forces
 
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')
 RATE = 200.0
-MESSAGES = 943  # 3 pi / 2 seconds of path
+MESSAGES = 944  # 3 pi / 2 seconds of path, both ends included
 PATIENCE = 30.0  # [s] for discovery and the path together
 SETTLE = 1.0  # [s]
 ROWS = 16

@@ -5,6 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 
+class Missing:
+    """Stands for a value that is not there, which is not the same as None."""
+
+    def __repr__(self) -> str:
+        return 'missing'
+
+
+MISSING = Missing()
+
+
 class PprsError(Exception):
     """Root of every error that a user's input can cause."""
 
@@ -17,7 +27,7 @@ class ModelError(PprsError, ValueError):
     key : str
         Full dotted name, e.g. ``geometry.rod_length``.
     value : object
-        What was found there; None where it is missing.
+        What was found there; MISSING where nothing was.
     rule : str
         What is required, completing "it must ...".
     source : str, optional
@@ -27,7 +37,7 @@ class ModelError(PprsError, ValueError):
     def __init__(self, key: str, value: Any, rule: str, source: str = '') -> None:
         self.key, self.value, self.rule, self.source = key, value, rule, source
         place = f'{source}: ' if source else ''
-        found = 'is missing' if value is None else f'is {_shorten(value)}'
+        found = 'is missing' if value is MISSING else f'is {_shorten(value)}'
         super().__init__(f'{place}{key} {found}, but it must {rule}')
 
 

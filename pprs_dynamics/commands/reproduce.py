@@ -6,12 +6,14 @@ Writes figure_8.png, figure_9.png, forces.csv and claims.json into the output fo
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from pprs_dynamics.commands.output import make_folder, write_json
+from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.reproduction import Reproduction, reproduce
@@ -29,9 +31,14 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = DriveModel.load(options.model)
-    folder = make_folder(options.output)
     with screen.status('running the paper\'s simulation'):
-        result = reproduce(model)
+        try:
+            result = reproduce(model)
+        except WorkspaceError as error:
+            print(f'pprs reproduce: this robot cannot follow the paper\'s path: {error}',
+                  file=sys.stderr)
+            return 1
+        folder = make_folder(options.output)
         written = [draw_figure_8(folder / 'figure_8.png', result),
                    draw_figure_9(folder / 'figure_9.png', result),
                    _write_curves(folder / 'forces.csv', result)]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.mechanism.robot import DRIVES, Array
 from pprs_dynamics.mechanism.state import MechanismState
 
@@ -31,16 +31,17 @@ class Parameter:
     symbol: str
     unit: str
     description: str
-    lower: float = -np.inf
-    upper: float = np.inf
+    lower: float
+    upper: float
     default: float | None = None
 
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ModelError(key, value, 'be a number')
-        if not self.lower <= value <= self.upper or not np.isfinite(value):
-            raise ModelError(key, value, f'be finite and lie in [{self.lower:g}, {self.upper:g}] '
+        # Bounds are finite, so that what lies within is, too.
+        if not self.lower <= value <= self.upper:
+            raise ModelError(key, value, f'lie in [{self.lower:g}, {self.upper:g}] '
                              f'{self.unit} ({self.description})')
         return float(value)
 
@@ -74,6 +75,14 @@ class Effect(ABC):
     def initial_memory(self) -> Any:
         """Return a fresh memory, or None for an effect without one."""
         return None
+
+    def check_memory(self, memories: Mapping[str, Any]) -> None:
+        """Raise ModelError where memories, by effect, were not made for this one."""
+        fresh = self.initial_memory()
+        memory = memories.get(self.name, MISSING)
+        if memory is MISSING or (isinstance(fresh, dict) and set(fresh) != set(memory or ())):
+            raise ModelError('state', sorted(memories),
+                             f'come from a model with this very {self.name}')
 
 
 class CatalogueEffect(Effect):
@@ -109,7 +118,7 @@ class CatalogueEffect(Effect):
             if name not in values and parameter.default is None:
                 if not complete:
                     continue
-                raise ModelError(f'{prefix}.{name}', None,
+                raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
             checked[name] = parameter.check(f'{prefix}.{name}', values.get(name, parameter.default))
         return checked
@@ -131,6 +140,12 @@ class DriveEffect(CatalogueEffect):
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self.drives)))
 
     @abstractmethod
     def columns(self, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

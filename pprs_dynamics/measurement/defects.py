@@ -111,14 +111,14 @@ class Judgement:
                    f'{counted(int(late.sum()), "stamp")} out of order', _places(late))
         if np.any(late):
             self.samples = self.samples.take(stamps.sorted_order(time, self._starts))
-        same = stamps.duplicates(self.samples.time, self._starts)
+        same = stamps.duplicates(self.samples.time)
         self._tell('duplicate_stamps', int(same.sum()),
                    f'{counted(int(same.sum()), "sample")} with the stamp of another',
                    _places(same))
         self._keep(~same)
 
     def _judge_positions(self) -> None:
-        found = signals.find_jumps(self.samples, self._starts)
+        found = signals.find_jumps(self.samples)
         for drive, name in enumerate(self.samples.drives):
             jumps = [(first, size) for first, k, size in found.jumps if k == drive]
             size = max((size for _, size in jumps), key=abs, default=0.0)

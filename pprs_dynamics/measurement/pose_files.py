@@ -19,8 +19,15 @@ POSE_COLUMNS = ('time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 TWIST_COLUMNS = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz', 'ax', 'ay', 'az', 'alx', 'aly', 'alz')
 
 
-def read_poses(path: str | PathLike[str]) -> PlatformMotion:
+def read_poses(path: str | PathLike[str], rate: float | None = None) -> PlatformMotion:
     """Read a CSV of poses, columns in any order.
+
+    Parameters
+    ----------
+    path : path
+    rate : float, optional
+        Resample to this rate [Hz]. A file with twists must have it already: its twists are
+        taken as they are, and nothing in between is invented.
 
     Raises
     ------
@@ -56,12 +63,19 @@ def read_poses(path: str | PathLike[str]) -> PlatformMotion:
     time, position, orientation = take('time')[:, 0], take('x', 'y', 'z'), take(*POSE_COLUMNS[4:])
     try:
         if columns == POSE_COLUMNS:
-            return PlatformMotion.from_poses(time, position, orientation)
+            motion = PlatformMotion.from_poses(time, position, orientation)
+            return motion if rate is None else motion.resampled(rate)
         v, omega, a, epsilon = (take(*TWIST_COLUMNS[k:k + 3]) for k in (0, 3, 6, 9))
-        return PlatformMotion(position, orientation, v, omega, a, epsilon, time)
+        motion = PlatformMotion(position, orientation, v, omega, a, epsilon, time)
     except MotionError as error:
         raise MotionError(f'{path}: {error.quantity}', error.found, error.rule,
                           error.kind) from None
+    if rate is not None and len(motion) > 1 and not np.allclose(
+            np.diff(time) * rate, 1.0, rtol=0, atol=1e-6):
+        raise UnreadableFileError(
+            path, f'its twists belong to {1 / np.median(np.diff(time)):.6g} Hz, evenly spaced, but '
+            f'{rate:g} Hz are wanted: choose that rate, or leave the twists out')
+    return motion
 
 
 def write_poses(path: str | PathLike[str], motion: PlatformMotion) -> None:
@@ -71,10 +85,13 @@ def write_poses(path: str | PathLike[str], motion: PlatformMotion) -> None:
     table = np.column_stack((
         motion.time, motion.position, motion.orientation, motion.linear_velocity,
         motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
-    with Path(path).open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow(POSE_COLUMNS + TWIST_COLUMNS)
-        writer.writerows(table.tolist())
+    try:
+        with Path(path).open('w', encoding='utf-8', newline='') as file:
+            writer = csv.writer(file)
+            writer.writerow(POSE_COLUMNS + TWIST_COLUMNS)
+            writer.writerows(table.tolist())
+    except OSError as error:
+        raise UnreadableFileError(path, f'cannot be written: {error.strerror}') from None
 
 
 def _columns(path: object, header: list[str]) -> tuple[str, ...]:

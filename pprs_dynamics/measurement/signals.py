@@ -45,15 +45,13 @@ class Jumps:
     spike_drives: set[int]
 
 
-def find_jumps(samples: Samples, starts: Indices) -> Jumps:
-    """Return spikes and jumps of all drives, looking within stretches of one clock."""
+def find_jumps(samples: Samples) -> Jumps:
+    """Return spikes and jumps of all drives; where the clock was set back there is none."""
     count = len(samples.time)
     found = Jumps(np.zeros(count, dtype=bool), [], set())
     steps = np.diff(samples.time)
-    inside = np.ones(max(count - 1, 0), dtype=bool)
-    inside[starts[1:] - 1] = False
     for drive in range(len(samples.drives)):
-        moved = np.where(inside, np.diff(samples.position[:, drive]), 0.0)
+        moved = np.diff(samples.position[:, drive])
         fast = _too_fast(moved, steps)
         at = 0
         while at < len(fast):
@@ -106,7 +104,7 @@ def _too_fast(moved: Array, steps: Array) -> Indices:
     nothing = np.array([], dtype=np.int64)
     if not len(moved):
         return nothing
-    # Steps over boundaries may run backwards in time; they moved 0 and divide by anything.
+    # Where the clock was set back nothing is known about the speed.
     with np.errstate(over='ignore'):
         speed = np.abs(moved) / np.where(steps > 0, steps, np.inf)
     moving = speed[speed > 0]

@@ -77,12 +77,12 @@ def sorted_order(time: Array, starts: Indices) -> Indices:
                            for part in stretches(starts, len(time))])
 
 
-def duplicates(time: Array, starts: Indices) -> Mask:
-    """Return which stamps equal the one before, within sorted stretches."""
-    same = np.zeros(len(time), dtype=bool)
-    same[1:] = np.diff(time) == 0
-    same[starts] = False
-    return same
+def duplicates(time: Array) -> Mask:
+    """Return which stamps equal the one before, within sorted stretches.
+
+    Where the clock was set back two stamps side by side differ by definition.
+    """
+    return np.concatenate(([False], np.diff(time) == 0))
 
 
 def rate_changes(time: Array, starts: Indices) -> list[tuple[int, float, float]]:

@@ -103,20 +103,22 @@ def solve_forward_kinematics(
         raise SingularityError(0, 'det [B] is 0 at the home pose of this geometry',
                                'home must tell which assembly mode is meant')
 
-    q_start = _drive_positions(geometry, PlatformMotion(
-        P, _quaternions(rotation), *(np.zeros((len(q), 3)),) * 4))
     steps = np.zeros(len(q), dtype=int)
     determinant = np.full(len(q), np.nan)
     pending = np.arange(len(q))
     # The straight way first; what fails follows the branch in ever smaller moves of the drives.
     for moves in (1, 4, 16, 64):
-        P_new, rotation_new = P[pending].copy(), rotation[pending].copy()
+        P_new, rotation_new, target = P[pending].copy(), rotation[pending].copy(), q[pending]
         good = np.ones(len(pending), dtype=bool)
         count = np.zeros(len(pending), dtype=int)
-        for move in range(1, moves + 1):
-            target = q_start[pending] + (q[pending] - q_start[pending]) * (move / moves)
-            good &= _newton(geometry, target, P_new, rotation_new, count)
-        B = _closure(geometry, P_new, rotation_new, q[pending])[1]
+        if moves > 1:
+            q_start = _drive_positions(
+                geometry, PlatformMotion.at_rest(P_new, _quaternions(rotation_new)))
+            for move in range(1, moves):
+                way = q_start + (target - q_start) * (move / moves)
+                good &= _newton(geometry, way, P_new, rotation_new, count)[0]
+        converged, B = _newton(geometry, target, P_new, rotation_new, count)
+        good &= converged
         with np.errstate(all='ignore'):
             found = np.linalg.det(B) / home_determinant
         good &= (found > 0) & _elbow_agrees(geometry, P_new, rotation_new, q[pending])
@@ -136,27 +138,29 @@ def solve_forward_kinematics(
 
 def _newton(
     geometry: Geometry, q: Array, P: Array, rotation: Array, steps: np.ndarray,
-) -> np.ndarray:
-    """Improve poses in place, count steps, and return where they converged."""
+) -> tuple[np.ndarray, Array]:
+    """Improve poses in place, count steps, and return where they converged, with [B] there."""
     active = np.arange(len(q))
     converged = np.zeros(len(q), dtype=bool)
+    found = np.full((len(q), 6, 6), np.nan)
     for _ in range(MAXIMUM_STEPS):
         residual, B = _closure(geometry, P[active], rotation[active], q[active])
         size = np.abs(residual).max(axis=1)
         # Heights far from 0 carry their own rounding.
         arrived = size <= RESIDUAL_TOLERANCE * (
             geometry.rod_length + np.abs(q[active]).max(axis=1))
-        converged[active[arrived]] = True
+        converged[active[arrived]], found[active[arrived]] = True, B[arrived]
         active, residual, B = active[~arrived], residual[~arrived], B[~arrived]
         if not len(active):
             break
         with np.errstate(all='ignore'):
-            regular = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
-            regular[regular] &= np.linalg.det(B[regular]) != 0.0
-            active, residual, B = active[regular], residual[regular], B[regular]
-            if not len(active):
-                break
-            step = np.linalg.solve(B, -residual[..., None])[..., 0]
+            try:
+                step = np.linalg.solve(B, -residual[..., None])[..., 0]
+            except np.linalg.LinAlgError:
+                # One exactly singular matrix stops all: go on with the others.
+                regular = np.isfinite(B).all(axis=(1, 2)) & (np.linalg.det(B) != 0.0)
+                active, residual, B = active[regular], residual[regular], B[regular]
+                step = np.linalg.solve(B, -residual[..., None])[..., 0]
             # A Newton step longer than the mechanism leaves the branch: shorten it.
             length = np.maximum(np.linalg.norm(step[:, :3], axis=1) / geometry.rod_length,
                                 np.linalg.norm(step[:, 3:], axis=1))
@@ -166,7 +170,7 @@ def _newton(
         active, step = active[usable], step[usable]
         P[active] += step[:, :3]
         rotation[active] = _turned(rotation[active], step[:, 3:])
-    return converged
+    return converged, found
 
 
 def _closure(geometry: Geometry, P: Array, rotation: Array, q: Array) -> tuple[Array, Array]:

@@ -158,4 +158,4 @@ def _require_upright_rods(sin_u: Array, minimum: float) -> None:
         sample, chain = (int(i) for i in np.argwhere(flat)[0])
         raise SingularityError(
             sample, f'|sin u| of chain {chain + 1} is {abs(sin_u[sample, chain]):.3g} '
-            '(its rod lies horizontally)', f'it must be at least {minimum:g}')
+            '(its rod lies horizontally)', f'it must be at least {minimum:g} (limits.rod_sine)')

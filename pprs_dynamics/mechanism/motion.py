@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # A quaternion printed with three decimals is still accepted; a Euler triple with a 0 is not.
 UNIT_LENGTH_TOLERANCE = 1e-3
+MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -74,11 +75,19 @@ class PlatformMotion:
     def __getitem__(self, index: Any) -> PlatformMotion:
         """Return the samples that `index` (slice, mask or indices) selects."""
         if isinstance(index, (int, np.integer)):
-            index = slice(index, index + 1 or None)
+            index = range(len(self))[index]  # raises IndexError, and ends a loop
+            index = slice(index, index + 1)
         return PlatformMotion(
             self.position[index], self.orientation[index], self.linear_velocity[index],
             self.angular_velocity[index], self.linear_acceleration[index],
             self.angular_acceleration[index], None if self.time is None else self.time[index])
+
+    def is_closed(self) -> bool:
+        """Return whether it ends within 1 mm and 1 mrad of where it starts."""
+        ends = self.orientation[[0, -1]]
+        moved = np.linalg.norm(self.position[-1] - self.position[0])
+        turned = 2 * np.arccos(min(abs(float(ends[0] @ ends[1])), 1.0))
+        return bool(moved < 1e-3 and turned < 1e-3)
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
         """Return the same motion with other times [s]."""
@@ -99,6 +108,9 @@ class PlatformMotion:
         """
         if self.time is None:
             raise MotionError('time', 'it is absent', 'be known to resample', 'time')
+        if not 0 < rate * (self.time[-1] - self.time[0]) < MOST_SAMPLES:
+            raise MotionError('rate', f'{rate:g} Hz over {self.time[-1] - self.time[0]:g} s',
+                              f'give between 1 and {MOST_SAMPLES:g} samples', 'shape')
         if len(self) > 1 and np.allclose(np.diff(self.time) * rate, 1.0, rtol=0, atol=1e-6):
             return self
         # The last pose belongs to the motion even where rounding puts it just past the grid.
@@ -128,7 +140,7 @@ class PlatformMotion:
         orientation : (N, 4) array_like, optional
             Unit quaternions x, y, z, w; unturned by default.
         """
-        position = np.atleast_2d(np.asarray(position, dtype=float))
+        position = checked_matrix('position', position, 3)
         zero = np.zeros_like(position)
         if orientation is None:
             orientation = np.broadcast_to((0.0, 0.0, 0.0, 1.0), (len(position), 4))
@@ -169,6 +181,8 @@ class PlatformMotion:
             raise MotionError('poses', f'{len(knots)} were given',
                               'be at least four for velocities and accelerations', 'shape')
         moments = knots if at is None else np.asarray(at, dtype=float)
+        if not np.all(np.isfinite(moments)):
+            raise MotionError('at', 'a time is not finite', 'be finite', 'finite')
         path = make_interp_spline(knots, position, k=5 if len(knots) >= 6 else 3)
         turn = RotationSpline(knots, Rotation.from_quat(orientation))
         rotation = turn(moments)
@@ -216,7 +230,11 @@ def _normalised(quaternions: Array) -> Array:
 
 
 def _times(time: ArrayLike, samples: int) -> Array:
-    times = np.array(time, dtype=float, ndmin=1)
+    try:
+        times = np.array(time, dtype=float, ndmin=1)
+    except (TypeError, ValueError):
+        raise MotionError('time', f'{str(time)[:60]!r} was given', f'be ({samples},) numbers',
+                          'shape') from None
     if times.shape != (samples,):
         raise MotionError('time', f'its shape is {np.shape(time)}', f'be ({samples},), as position',
                           'shape')

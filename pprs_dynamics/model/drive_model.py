@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.effects.effect import Effect
-from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal
@@ -110,6 +109,14 @@ class DriveModel:
         """Return a fresh state for effects with memory."""
         return ModelState({effect.name: effect.initial_memory() for effect in self.effects})
 
+    def continued_state(self, model: DriveModel, state: ModelState) -> ModelState:
+        """Return a state that goes on from another model's for the effects that both have."""
+        fresh = self.initial_state()
+        for effect in self.effects:
+            if effect in model.effects:
+                fresh.memories[effect.name] = copy.deepcopy(state.memories[effect.name])
+        return fresh
+
     def mechanism(self, motion: PlatformMotion) -> MechanismState:
         """Return drive motion, Jacobians and frictionless forces for a platform motion.
 
@@ -149,9 +156,7 @@ class DriveModel:
         parts = {RIGID_BODY: mechanism.rigid_body.force}
         state = self.initial_state() if state is None else state
         for effect in self.effects:
-            if effect.name not in state.memories:
-                raise ModelError('state', sorted(state.memories),
-                                 f'come from this model, which has {effect.name}')
+            effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             for effect in self.effects:
                 if not effect.is_measurement:

@@ -13,6 +13,7 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.robot import ELBOWS
 
 EQUATIONS = ('corrected', 'printed')
+LARGEST = 1e300  # beyond it is no physical quantity, and squares overflow
 APPROACHES = ('whole_mechanism', 'independent_chains')
 
 
@@ -81,8 +82,9 @@ class Key:
         return tuple(self._number(element, list(value)) for element in value)
 
     def _number(self, element: Any, value: Any) -> float:
+        # Compared before it is converted: a whole number of any length compares.
         good = (isinstance(element, (int, float)) and not isinstance(element, bool)
-                and math.isfinite(element) and self.lower <= element <= self.upper
+                and max(self.lower, -LARGEST) <= element <= min(self.upper, LARGEST)
                 and not (self.positive and element <= 0))
         if not good:
             raise ModelError(self.name, value, self.rule)
@@ -133,14 +135,15 @@ KEYS: dict[str, Key] = {key.name: key for key in (
     Key('limits.condition_number', 'largest condition number of the drive Jacobian', lower=1,
         default=20.0),
     Key('limits.rod_sine', 'smallest |sin u_i|', positive=True, upper=1, default=0.05),
-    Key('limits.rod_cosine', 'smallest |cos u_i| for independent_chains', positive=True, upper=1,
-        default=0.05),
+    Key('limits.rod_cosine', 'smallest |cos u_i| for independent_chains', positive=True,
+        upper=0.5, default=0.05),
 )}
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.
 NODE_KEYS = frozenset({
     'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in',
     'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
-    'encoder_resolution', 'effort_noise', 'hidden_effects', 'hidden_scale',
+    'window', 'error_span', 'update_rate', 'encoder_resolution', 'effort_noise',
+    'hidden_effects', 'hidden_scale',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)

@@ -6,6 +6,7 @@ The same `build_model` serves files and the nodes' parameters: both are flat key
 from __future__ import annotations
 
 import difflib
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from os import PathLike
@@ -23,7 +24,7 @@ from pprs_dynamics.effects.passive_friction import (
     PassiveFriction,
     WholeMechanismFriction,
 )
-from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.errors import MISSING, ModelError, UnreadableFileError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.robot import Geometry, Masses, Robot
 from pprs_dynamics.model.drive_model import DriveModel
@@ -31,6 +32,8 @@ from pprs_dynamics.model.keys import KEYS, NODE_KEYS, NODE_PREFIXES
 from pprs_dynamics.model.limits import Limits
 
 DEFAULT_MODEL = 'config/paper.yaml'
+# Blocks whose keys are not listed one by one.
+ADDED = ('effects.', 'tolerances.', 'history.')
 
 
 def find_file(path: str | PathLike[str]) -> Path:
@@ -78,10 +81,17 @@ def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     except UnicodeDecodeError:
         raise UnreadableFileError(path, 'not a text file in UTF-8') from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
-    flat = dict(_flatten(_parameters_block(path, content)))
-    for key, value in flat.items():
+    flat: dict[str, Any] = {}
+    try:
+        pairs = list(_flatten(_parameters_block(path, content)))
+    except RecursionError:
+        raise UnreadableFileError(path, 'not a model file: it contains itself') from None
+    for key, value in pairs:
+        if key in flat:
+            raise ModelError(key, value, 'stand once: it is given nested and with dots', str(path))
+        flat[key] = value
         if isinstance(value, list) and len({type(element) for element in value}) > 1:
             raise ModelError(key, value, 'hold elements of one type, as ROS 2 demands '
                              '(write 0.0, not 0, among decimal numbers)', str(path))
@@ -123,7 +133,7 @@ def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
         if name in parameters:
             values[name] = key.check(parameters[name])
         elif key.default is None:
-            raise ModelError(name, None, key.rule)
+            raise ModelError(name, MISSING, key.rule)
         else:
             values[name] = key.default
     for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
@@ -147,7 +157,7 @@ def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
         passive = IndependentChainsFriction(*joints, printed, limits.rod_cosine)
     effects = (ActiveFriction(**group('friction.drives.')), passive, *_added_effects(parameters))
     for name, value in parameters.items():
-        if name.startswith(('effects.', 'tolerances.', 'history.')):
+        if name.startswith(ADDED):
             values[name] = value
     return DriveModel(
         robot, effects, limits,
@@ -156,9 +166,8 @@ def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
 
 
 def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
-    active = parameters.get('effects.active')
-    active = [] if active is None else active
-    if isinstance(active, str) or not all(isinstance(name, str) for name in active):
+    active = parameters.get('effects.active', [])
+    if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
         raise ModelError('effects.active', active, 'be a list of names of effects')
     if len(set(active)) < len(active):
         raise ModelError('effects.active', list(active), 'name each effect once')
@@ -166,8 +175,8 @@ def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
         if name not in CATALOGUE:
             raise ModelError('effects.active', list(active), f'name known effects, not {name!r}'
                              + _suggestion(name, CATALOGUE) + f': {", ".join(CATALOGUE)}')
-    blocks = _nested({key.removeprefix('effects.'): value for key, value in parameters.items()
-                      if key.startswith('effects.') and key != 'effects.active'})
+    blocks = _nested('effects', {key: value for key, value in parameters.items()
+                                 if key.startswith('effects.') and key != 'effects.active'})
     for name, block in blocks.items():
         if name not in CATALOGUE:
             raise ModelError(f'effects.{name}', block, 'belong to a known effect'
@@ -178,7 +187,7 @@ def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
             yield effect
     missing = [name for name in active if name not in blocks]
     if missing:
-        raise ModelError(f'effects.{missing[0]}', None, 'be given: effects.active names it')
+        raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
 
 
 def _check_tolerances(parameters: Mapping[str, Any]) -> None:
@@ -195,11 +204,18 @@ def _check_tolerances(parameters: Mapping[str, Any]) -> None:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     for name, value in parameters.items():
-        known = (name in KEYS or name in NODE_KEYS
-                 or name.startswith((*NODE_PREFIXES, 'effects.', 'tolerances.', 'history.')))
-        if not known:
+        block = name.split('.')[0]
+        if name == block and value in (None, {}) and any(
+                key.startswith(f'{block}.') for key in (*KEYS, *ADDED)):
+            continue  # a block that somebody left empty says nothing
+        if not is_known(name):
             raise ModelError(name, value, 'not be there: no such key'
                              + _suggestion(name, (*KEYS, *NODE_KEYS)))
+
+
+def is_known(name: str) -> bool:
+    """Return whether a model file may hold a key of that name."""
+    return (name in KEYS or name in NODE_KEYS or name.startswith((*NODE_PREFIXES, *ADDED)))
 
 
 def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
@@ -212,6 +228,12 @@ def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
                 path, f'not a model file: {node} must hold a mapping ros__parameters')
         blocks[node] = block['ros__parameters']
     if '/**' in blocks:
+        for node, block in blocks.items():
+            for key, _ in _flatten(block) if node != '/**' else ():
+                if key in KEYS or key.startswith(ADDED):
+                    raise UnreadableFileError(
+                        path, f'{key} of the model stands under {node}: put it under /**, for '
+                        'every node and command alike')
         return blocks['/**']
     if len(blocks) > 1:
         raise UnreadableFileError(
@@ -221,19 +243,24 @@ def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
 
 def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
     for key, value in block.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value:
             yield from _flatten(value, f'{prefix}{key}.')
         else:
             yield f'{prefix}{key}', value
 
 
-def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+def _nested(root: str, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tree below `root`; a name cannot be a value and a block at once."""
     tree: dict[str, Any] = {}
     for name, value in flat.items():
-        *folders, leaf = name.split('.')
+        *folders, leaf = name.removeprefix(f'{root}.').split('.')
         branch = tree
         for folder in folders:
             branch = branch.setdefault(folder, {})
+            if not isinstance(branch, dict):
+                raise ModelError(name, value, f'not stand below {folder}, which has a value')
+        if isinstance(branch.get(leaf), dict):
+            raise ModelError(name, value, 'not be a value: keys stand below it')
         branch[leaf] = value
     return tree
 
@@ -253,9 +280,18 @@ class _StrictLoader(yaml.SafeLoader):
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         seen = set()
         for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(
+                    None, None, 'a key must be a word', key_node.start_mark)
             key = key_node.value
             if key in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f'the key {key!r} stands twice', key_node.start_mark)
             seen.add(key)
         return super().construct_mapping(node, deep=deep)
+
+
+# ROS 2 reads 1e-3 and 1.0e2 as numbers; YAML 1.1, which PyYAML follows, as words.
+_StrictLoader.add_implicit_resolver(
+    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$'),
+    list('-+0123456789.'))

@@ -111,7 +111,8 @@ def _claims(
     friction = active + first
     share = 100 * _rms(friction) / _rms(Q + friction)
     u = np.degrees(state.chains.rod_angle)
-    crossed = bool(np.any(u.min(axis=0) < 90) and np.any(u.max(axis=0) > 90))
+    # A rod that leans down has a negative angle; upright is 90 degrees either way.
+    crossed = bool(np.any(state.chains.cos_u.min(axis=0) * state.chains.cos_u.max(axis=0) < 0))
     near = _approach_at(approaches[1], state, 1e-3)
     a, p1, p2 = _rms(active), _rms(first), _rms(second)
     passive_share = float(np.max(p1 / _rms(Q + friction)))

@@ -47,6 +47,11 @@ class TrajectoryRequest:
     start: int
     offsets: tuple[int, ...]
 
+    @property
+    def first_stamp(self) -> int:
+        """When the first point is due [ns]."""
+        return self.start + self.offsets[0]
+
 
 def read_trajectory(
     message: MultiDOFJointTrajectory, now: int, max_age: float,
@@ -125,18 +130,14 @@ def commands(forces: DriveForces) -> Float64MultiArray:
 
 def joint_command(request: TrajectoryRequest, forces: DriveForces) -> JointState:
     """Return the first sample, stamped and named, with drive positions and velocities."""
-    message = _stamped(request)
-    message.position = forces.mechanism.position[0].tolist()
-    message.velocity = forces.mechanism.velocity[0].tolist()
-    message.effort = forces.total[0].tolist()
-    return message
+    mechanism = forces.mechanism
+    return joint_state(request.first_stamp, forces.total[0], mechanism.position[0],
+                       mechanism.velocity[0])
 
 
 def effort_part(request: TrajectoryRequest, part: Array) -> JointState:
     """Return one part of the forces of the first sample."""
-    message = _stamped(request)
-    message.effort = part[0].tolist()
-    return message
+    return joint_state(request.first_stamp, part[0])
 
 
 def joint_trajectory(request: TrajectoryRequest, forces: DriveForces) -> JointTrajectory:
@@ -155,16 +156,17 @@ def joint_trajectory(request: TrajectoryRequest, forces: DriveForces) -> JointTr
 
 
 def joint_state(
-    stamp: int, position: Array, velocity: Array, effort: Array,
+    stamp: int, effort: Array, position: Array | None = None, velocity: Array | None = None,
 ) -> JointState:
-    """Return what the drives did at a time [ns]."""
-    message = JointState(name=list(DRIVES), position=position.tolist(),
-                         velocity=velocity.tolist(), effort=effort.tolist())
+    """Return efforts, and what else is known, at a time [ns]."""
+    message = JointState(name=list(DRIVES), effort=effort.tolist())
+    if position is not None and velocity is not None:
+        message.position, message.velocity = position.tolist(), velocity.tolist()
     message.header.stamp, message.header.frame_id = time(stamp), BASE_FRAMES[1]
     return message
 
 
-def read_drives(message: JointState, field: str) -> Array:
+def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Array:
     """Return one field of a JointState in drive order, matched by name, (6,).
 
     Raises
@@ -181,6 +183,9 @@ def read_drives(message: JointState, field: str) -> Array:
         raise Rejection('SIZE', f'{field} has {len(values)} values, but it must have '
                         f'{len(names)}, as name')
     array = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
+    if may_be_nan:
+        # Not a number, and no measurement either.
+        return np.where(np.isfinite(array), array, np.nan)
     if not np.all(np.isfinite(array)):
         raise Rejection('NON_FINITE', f'{field} is {array.tolist()}, but it must be finite')
     return array
@@ -223,9 +228,3 @@ def _vector(values: Array) -> Vector3:
     x, y, z = values.tolist()
     return Vector3(x=x, y=y, z=z)
 
-
-def _stamped(request: TrajectoryRequest) -> JointState:
-    message = JointState(name=list(DRIVES))
-    message.header.stamp = time(request.start + request.offsets[0])
-    message.header.frame_id = BASE_FRAMES[1]
-    return message

@@ -11,6 +11,11 @@ def feedforward() -> int:
     return _run('feedforward', 'FeedforwardNode')
 
 
+def monitor() -> int:
+    """Run `ros2 run pprs_dynamics monitor`."""
+    return _run('monitor', 'MonitorNode')
+
+
 def play_trajectory() -> int:
     """Run `ros2 run pprs_dynamics play_trajectory`."""
     return _run('play_trajectory', 'PlayTrajectoryNode')

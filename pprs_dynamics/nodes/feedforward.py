@@ -5,24 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.model.drive_model import DriveForces
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.conversions import TrajectoryRequest
-from pprs_dynamics.nodes.parameters import (
-    NodeParameter,
-    current_values,
-    declare_model,
-    declare_own,
-    model_from,
-)
+from pprs_dynamics.nodes.model_parameters import ModelParameters
+from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
@@ -42,15 +35,14 @@ class FeedforwardNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('feedforward', allow_undeclared_parameters=True, **options)
         declare_own(self, PARAMETERS)
-        taken_from_paper = declare_model(self)
-        self._apply(self._validated())
-        if 0 < len(taken_from_paper) < 20:
-            self.get_logger().info(f'not given, taken from the paper: {taken_from_paper}')
-        self.add_on_set_parameters_callback(self._check_parameters)
-        self.add_post_set_parameters_callback(lambda _: self._apply(self._validated()))
-
+        self._parts: dict[str, Any] = {}
+        self._settings = ModelParameters(self, PARAMETERS, self._use_model)
+        self._model = self._settings.model
+        self._state = self._model.initial_state()
+        self._use_model()
         self._counters = {'received': 0, 'accepted': 0, **dict.fromkeys(CODES, 0)}
-        self._status = StatusReporter(self, {}, self._counters)
+        self._status = StatusReporter(
+            self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters)
         self._commands = self.create_publisher(Float64MultiArray, '~/commands', EVERY_MESSAGE)
         self._joint_command = self.create_publisher(
             JointState, '~/joint_command', EVERY_MESSAGE)
@@ -66,7 +58,7 @@ class FeedforwardNode(Node):
         self._counters['received'] += 1
         try:
             request = conversions.read_trajectory(
-                message, self.get_clock().now().nanoseconds, self._max_age)
+                message, self.get_clock().now().nanoseconds, self._settings.own['max_age'])
             forces = self._answer(request)
         except PprsError as error:
             self._reject(Rejection.of(error))
@@ -105,26 +97,14 @@ class FeedforwardNode(Node):
         self._status.report('ERROR', rejection.code, rejection.text)
         self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
 
-    def _validated(self, changes: tuple[Parameter, ...] = ()) -> tuple[DriveModel, float]:
-        values = current_values(self, changes)
-        own = {each.name: each.check(values.pop(each.name)) for each in PARAMETERS}
-        return model_from(values), own['max_age']
-
-    def _check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
-        try:
-            self._validated(tuple(changes))
-        except PprsError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _apply(self, validated: tuple[DriveModel, float]) -> None:
-        self._model, self._max_age = validated
-        self._state = self._model.initial_state()
+    def _use_model(self) -> None:
+        model = self._settings.model
+        self._state = model.continued_state(self._model, self._state)
+        self._model = model
         names = ['rigid_body', *(e.name for e in self._model.effects if not e.is_measurement)]
-        known: dict[str, Any] = getattr(self, '_parts', {})
-        for name in known.keys() - set(names):
-            self.destroy_publisher(known[name])
+        for name in self._parts.keys() - set(names):
+            self.destroy_publisher(self._parts[name])
         self._parts = {
-            name: known.get(name) or self.create_publisher(
+            name: self._parts.get(name) or self.create_publisher(
                 JointState, f'~/effort/{name}', EVERY_MESSAGE)
             for name in names}

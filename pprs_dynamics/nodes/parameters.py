@@ -11,10 +11,10 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.keys import KEYS
-from pprs_dynamics.model.model_file import build_model, default_parameters
+from pprs_dynamics.model.model_file import build_model, default_parameters, is_known
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,12 @@ def declare_model(node: Node) -> list[str]:
     """
     defaults = default_parameters()
     given = overrides(node)
+    if any(name.startswith('geometry.') for name in given):
+        # Somebody's own robot: what is missing must not become the paper's in silence.
+        defaults = {}
+        for name, key in KEYS.items():
+            if name not in given and key.default is None:
+                raise ModelError(name, MISSING, key.rule)
     for name, key in KEYS.items():
         descriptor = ParameterDescriptor(
             description=key.description, additional_constraints=f'must {key.rule}',
@@ -109,7 +115,14 @@ def declare_model(node: Node) -> list[str]:
     for name, value in given.items():
         if not node.has_parameter(name) and value is not None:
             node.declare_parameter(name, value, ParameterDescriptor(dynamic_typing=True))
-    return [name for name in KEYS if name not in given]
+    return [name for name, key in KEYS.items() if name not in given and name in defaults]
+
+
+def refuse_unknown(node: Node) -> None:
+    """Raise ModelError where a parameter was given that neither node nor model has."""
+    for name, value in overrides(node).items():
+        if not node.has_parameter(name) and not is_known(name):
+            raise ModelError(name, value, 'not be there: no such parameter')
 
 
 def overrides(node: Node) -> dict[str, Any]:

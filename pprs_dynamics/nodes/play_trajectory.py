@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from rclpy.duration import Duration
 from rclpy.node import Node
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -13,7 +14,7 @@ from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.nodes import conversions
-from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
+from pprs_dynamics.nodes.parameters import NodeParameter, declare_own, refuse_unknown
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.run import Finished
 
@@ -43,6 +44,7 @@ class PlayTrajectoryNode(Node):
         values = declare_own(self, PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
         self._ahead = values['ahead']
+        refuse_unknown(self)
         self._motion = _path(values)
         self._next, self._round = 0, 1
         self._publisher = self.create_publisher(
@@ -58,7 +60,9 @@ class PlayTrajectoryNode(Node):
         if self._next == len(self._motion):
             if self._round == self._repeat:
                 # Leave only when the last message has arrived.
-                self._publisher.wait_for_all_acked()
+                # A listener that is stuck must not keep this node from ending.
+                if not self._publisher.wait_for_all_acked(Duration(seconds=1.0)):
+                    self.get_logger().warning('a listener did not take the last messages')
                 self.get_logger().info(f'played {self._round * len(self._motion)} messages')
                 raise Finished
             self._next, self._round = 0, self._round + 1
@@ -80,10 +84,14 @@ def _path(values: dict[str, Any]) -> PlatformMotion:
     if values['source'] == 'csv':
         if not values['file']:
             raise ModelError('file', '', 'be a CSV of poses where source is csv')
-        motion = read_poses(values['file']).resampled(values['rate'])
+        motion = read_poses(values['file'], values['rate'])
     else:
         path: HelicalPath | Excitation = HelicalPath()
         if values['source'] == 'excitation':
             path = Excitation(duration=values['duration'], seed=values['seed'])
-        motion = path.motion(np.arange(0.0, path.duration, 1.0 / values['rate']))
+        # One step beyond the end, held there: the last message is the pose at rest.
+        motion = path.motion(np.arange(0.0, path.duration + 1 / values['rate'], 1 / values['rate']))
+    if values['repeat'] != 1 and not motion.is_closed():
+        raise ModelError('repeat', values['repeat'],
+                         'be 1 for a path that does not end where it starts')
     return with_lead_in(motion, values['lead_in'], values['rate'])

@@ -109,7 +109,7 @@ class SimulatedRobotNode(Node):
             self._queue.clear()
         measured = robot.tick()
         self._states.publish(conversions.joint_state(
-            stamp, measured.position, measured.velocity, measured.effort))
+            stamp, measured.effort, measured.position, measured.velocity))
         if held and not robot.control.holding:
             self._status.report('OK', 'OK', 'following commands')
         for note in robot.notes:

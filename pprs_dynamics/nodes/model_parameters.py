@@ -1,0 +1,79 @@
+"""A node's model, kept in step with its parameters: what is not valid is never in force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.keys import KEYS
+from pprs_dynamics.nodes.parameters import (
+    NodeParameter,
+    current_values,
+    declare_model,
+    model_from,
+)
+
+
+class ModelParameters:
+    """Declares a model's parameters on a node, and follows their changes.
+
+    Parameters
+    ----------
+    node : Node
+    own : sequence of NodeParameter
+        The node's own parameters, declared already.
+    changed : callable
+        Called after every change that was accepted.
+
+    Attributes
+    ----------
+    model : DriveModel
+        In force now.
+    own : dict
+        Values of the node's own parameters.
+    taken_from_paper : list of str
+        Keys without a value of their own; none where a whole model was given.
+
+    Raises
+    ------
+    ModelError
+        Where the parameters at start are no model.
+    """
+
+    def __init__(
+        self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
+    ) -> None:
+        self._node, self._declared, self._changed = node, tuple(own), changed
+        taken_from_paper = declare_model(node)
+        self.model, self.own = self._validated()
+        # A status entry, and a line in the log: another robot would get wrong forces.
+        self.taken_from_paper = taken_from_paper
+        if taken_from_paper:
+            node.get_logger().warning(
+                'no geometry is given: this is the paper\'s robot'
+                + (f', but for {len(KEYS) - len(taken_from_paper)} parameters'
+                   if len(taken_from_paper) < len(KEYS) else ''))
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[DriveModel, dict[str, Any]]:
+        values = current_values(self._node, changes)
+        own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
+        return model_from(values), own
+
+    def _check(self, changes: list[Parameter]) -> SetParametersResult:
+        try:
+            self._validated(changes)
+        except PprsError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, _: list[Parameter]) -> None:
+        self.model, self.own = self._validated()
+        self._changed()

@@ -1,0 +1,95 @@
+"""Node `monitor`: measured efforts against the model, live."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from pprs_dynamics.diagnosis.live import Compared, LiveComparison
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.nodes import conversions
+from pprs_dynamics.nodes.model_parameters import ModelParameters
+from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
+from pprs_dynamics.nodes.qos import EVERY_MESSAGE
+from pprs_dynamics.nodes.rejection import CODES, Rejection
+from pprs_dynamics.nodes.status import StatusReporter
+
+PARAMETERS = (
+    NodeParameter('window', 0.12, 'of the smoothing that gives velocity and acceleration; '
+                  'answers lag by half of it [s]', lower=0.01, upper=2.0),
+    NodeParameter('error_span', 2.0, 'over which ~/error is taken [s]', lower=0.05, upper=600.0),
+    NodeParameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
+                  lower=1.0, upper=1000.0),
+)
+
+
+class MonitorNode(Node):
+    """Publishes what the model says at every measured stamp, and how wrong it is."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('monitor', allow_undeclared_parameters=True, **options)
+        own = declare_own(self, PARAMETERS)
+        self._settings = ModelParameters(self, PARAMETERS, self._use)
+        self._comparison = LiveComparison(
+            self._settings.model, own['window'], own['error_span'])
+        self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}
+        self._origin: int | None = None
+        self._status = StatusReporter(self, {}, self._counters)
+        self._model_effort = self.create_publisher(JointState, '~/model_effort', EVERY_MESSAGE)
+        self._residual = self.create_publisher(JointState, '~/residual', EVERY_MESSAGE)
+        self._error = self.create_publisher(Float64MultiArray, '~/error', EVERY_MESSAGE)
+        self.create_subscription(JointState, 'joint_states', self._on_state, EVERY_MESSAGE)
+        self.create_timer(1.0 / own['update_rate'], self._judge)
+        self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
+
+    def _use(self) -> None:
+        self._comparison.use_model(self._settings.model)
+
+    def _on_state(self, message: JointState) -> None:
+        self._counters['received'] += 1
+        try:
+            position = conversions.read_drives(message, 'position')
+            effort = conversions.read_drives(message, 'effort', may_be_nan=True)
+        except Rejection as rejection:
+            self._reject(rejection)
+            return
+        stamp = conversions.nanoseconds(message.header.stamp)
+        if self._origin is None:
+            self._origin = stamp
+        # Counted from the first stamp: seconds since 1970 would cost digits.
+        self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position, effort)
+
+    def _judge(self) -> None:
+        try:
+            compared = self._comparison.evaluate()
+        except PprsError as error:
+            self._reject(Rejection.of(error))
+            return
+        self._counters['gaps'] = self._comparison.gaps
+        if compared is None:
+            return
+        self._counters['compared'] += len(compared.time)
+        self._publish(compared)
+        running = self._comparison.running_error()
+        self._error.publish(Float64MultiArray(data=running.tolist()))
+        worst = float(np.nanmax(running)) if np.isfinite(running).any() else float('nan')
+        self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
+                                       for value in running.tolist()]
+        self._status.report('OK', 'OK', f'largest running error {worst:.4g} N')
+
+    def _publish(self, compared: Compared) -> None:
+        for publisher, efforts in ((self._model_effort, compared.model),
+                                   (self._residual, compared.residual)):
+            if publisher.get_subscription_count():
+                for time, effort in zip(compared.time, efforts, strict=True):
+                    stamp = self._origin + round(time * conversions.NANOSECONDS)
+                    publisher.publish(conversions.joint_state(stamp, effort))
+
+    def _reject(self, rejection: Rejection) -> None:
+        self._counters[rejection.code] += 1
+        self._status.report('ERROR', rejection.code, rejection.text)
+        self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
