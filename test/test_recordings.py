@@ -488,6 +488,9 @@ def test_prefixes_of_other_tools_are_accepted_where_they_are_unambiguous(tmp_pat
     one = table(left, prefix='/joint_states/')
     one.to_csv(tmp_path / 'one.csv', index=False)
     assert_same(read_recording(tmp_path / 'one.csv'), left)
+    pd.concat([one, table(right).drop(columns='time')], axis=1).to_csv(
+        tmp_path / 'plain.csv', index=False)
+    assert_same(read_recording(tmp_path / 'plain.csv'), right)
     two = pd.concat([table(left, prefix='/left/joint_states/'),
                      table(right, prefix='/right/joint_states/').drop(columns='time')], axis=1)
     two.to_csv(tmp_path / 'two.csv', index=False)
@@ -693,6 +696,35 @@ def test_a_clock_that_is_set_back_splits(back: float) -> None:
     np.testing.assert_array_equal(recording.position, arrays['position'])
 
 
+def test_a_single_stamp_of_another_clock_is_not_sorted_in() -> None:
+    arrays = measured()
+    arrays['time'][500] -= 5
+    recording = judged(arrays)
+    assert kinds(recording) == {'clock_reset', 'gap', 'short_segment'}
+    assert recording.segments == (slice(0, 500), slice(501, 1000))
+
+
+def test_segments_stay_in_place_when_samples_before_them_are_dropped() -> None:
+    arrays = measured()
+    arrays['time'][600:] -= 1
+    arrays['time'][100] = arrays['time'][99]
+    recording = judged(arrays)
+    assert kinds(recording) == {'clock_reset', 'duplicate_stamps', 'lost_samples'}
+    assert recording.segments == (slice(0, 599), slice(599, 999))
+
+
+def test_stamps_from_before_the_clock_was_set_do_not_cost_digits(tmp_path: Path) -> None:
+    arrays = measured(600)
+    states = states_of(arrays, time=arrays['time'] + 1_700_000_000)
+    states[0] = message(0, DRIVES, *(arrays[name][0] for name in QUANTITIES))
+    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
+    assert recording.epoch == 1_700_000_000
+    assert recording.segments == (slice(1, 600),)
+    # The test itself made these stamps from floats of seconds since 1970, good to 0.24 us.
+    assert np.abs(np.diff(recording.time[1:]) - STEP).max() < 1e-6
+    assert kinds(recording) == {'gap', 'short_segment'}
+
+
 @pytest.mark.parametrize('suffix', SUFFIXES)
 def test_a_clock_that_is_set_back_survives_a_round_trip(suffix: str, tmp_path: Path) -> None:
     arrays = measured(900)
@@ -714,6 +746,17 @@ def test_of_equal_stamps_the_first_sample_is_kept() -> None:
     finding = the(recording, 'duplicate_stamps')
     assert finding.count == 3
     assert finding.spans == ((0.02, 0.02), (1.4, 1.4))
+
+
+def test_of_equal_stamps_in_shuffled_rows_the_first_of_the_file_is_kept() -> None:
+    arrays = measured()
+    order = np.random.default_rng(2).permutation(1000)
+    shuffled = {name: values[order] for name, values in arrays.items()}
+    shuffled['time'] = STEP * (order // 2)
+    recording = judged(shuffled)
+    place = np.argsort(order)
+    first = np.where(place[::2] < place[1::2], np.arange(0, 1000, 2), np.arange(1, 1000, 2))
+    np.testing.assert_array_equal(recording.effort, arrays['effort'][first])
 
 
 @pytest.mark.parametrize('length', [1, 2, 3])

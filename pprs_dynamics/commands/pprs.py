@@ -15,7 +15,7 @@ from pprs_dynamics import __version__
 from pprs_dynamics.errors import PprsError
 
 # Each a module of this folder with a docstring, add_arguments and run.
-COMMANDS = ('info', 'reproduce', 'simulate')
+COMMANDS = ('compare', 'info', 'reproduce', 'simulate')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

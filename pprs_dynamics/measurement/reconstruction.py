@@ -7,7 +7,7 @@ Jacobian. Effort is only cut to the same samples. `Reconstruction.treat` is for 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.mechanism.forward_motion import find_jumps, solve_forward_motion
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES, Array, Geometry
-from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
 
@@ -168,10 +168,20 @@ def reconstruct(
 
 def treated_forces(
     model: DriveModel, reconstruction: Reconstruction, progress: Progress | None = None,
+    more: Callable[[DriveForces], Mapping[str, Array]] = lambda forces: {},
 ) -> dict[str, Array]:
     """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, 6) [N].
 
     Effects with memory run through each segment and start afresh in the next.
+
+    Parameters
+    ----------
+    model : DriveModel
+    reconstruction : Reconstruction
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+    more : callable, optional
+        Gives further quantities of the same evaluation to be treated, (N, k) each, by name.
 
     Raises
     ------
@@ -184,7 +194,7 @@ def treated_forces(
         if chunk.is_start:
             state = model.initial_state()
         forces = model.drive_forces(chunk.motion, state)
-        for name, values in {**forces.parts, 'total': forces.total}.items():
+        for name, values in {**forces.parts, 'total': forces.total, **more(forces)}.items():
             if name not in treated:
                 treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
             treated[name][chunk.blocks] = chunk.treat(values)

@@ -117,6 +117,10 @@ def solve_forward_kinematics(
             for move in range(1, moves):
                 way = q_start + (target - q_start) * (move / moves)
                 good &= _newton(geometry, way, P_new, rotation_new, count)[0]
+                if not good.any():
+                    break
+        if not good.any():
+            continue
         converged, B = _newton(geometry, target, P_new, rotation_new, count)
         good &= converged
         with np.errstate(all='ignore'):

@@ -129,6 +129,20 @@ class PlatformMotion:
             2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
         ), axis=-1).reshape(-1, 3, 3)
 
+    @property
+    def tilt(self) -> Array:
+        """Angle between the platform's normal and the vertical [rad], (N,)."""
+        x, y, z, w = self.orientation.T
+        tilt: Array = 2 * np.arctan2(np.hypot(x, y), np.hypot(z, w))
+        return tilt
+
+    @property
+    def turn(self) -> Array:
+        """Rotation about the vertical that remains without the tilt [rad], (N,)."""
+        _, _, z, w = self.orientation.T
+        turn: Array = 2 * np.arctan2(z * np.where(w < 0, -1.0, 1.0), np.abs(w))
+        return turn
+
     @classmethod
     def at_rest(cls, position: ArrayLike, orientation: ArrayLike | None = None) -> PlatformMotion:
         """Return poses held still.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pprs_dynamics.errors import (
+    ConvergenceError,
     LimitError,
     MotionError,
     PprsError,
@@ -40,7 +41,7 @@ class Rejection(PprsError):
             return cls(_KINDS[error.kind], str(error))
         if isinstance(error, SingularityError):
             return cls('SINGULAR', str(error))
-        if isinstance(error, WorkspaceError):
+        if isinstance(error, (WorkspaceError, ConvergenceError)):
             return cls('WORKSPACE', str(error))
         if isinstance(error, LimitError):
             return cls('LIMIT', str(error))

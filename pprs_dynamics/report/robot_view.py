@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.mechanism.inverse_kinematics import JointPositions, joint_positions
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.report.page import plotly_objects
 
 FRAMES = 60
 SLIDE, LIFT, PLATFORM, PATH = '#0072B2', '#009E73', '#E69F00', '#999999'
@@ -34,7 +34,7 @@ def animate_robot(model: DriveModel, motion: PlatformMotion, title: str) -> Any:
         Thinned to 60 poses.
     title : str
     """
-    go = _plotly()
+    go = plotly_objects()
     shown = motion[np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int))]
     joints = joint_positions(model.robot.geometry, shown)
     mechanism = model.mechanism(shown)
@@ -139,10 +139,3 @@ def _step(label: str, frame: int) -> dict[str, Any]:
     return {'label': label, 'method': 'animate', 'args': [[str(frame)], {
         'frame': {'duration': 0, 'redraw': True}, 'mode': 'immediate'}]}
 
-
-def _plotly() -> Any:
-    try:
-        from plotly import graph_objects
-    except ImportError:
-        raise MissingLibraryError('plotly', 'drawing the robot', 'report') from None
-    return graph_objects

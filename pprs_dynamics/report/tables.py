@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.measurement.recording import Summary
 from pprs_dynamics.model.reproduction import Claim
@@ -52,3 +53,30 @@ def recording_table(summary: Summary) -> Any:
 
 def _span(bounds: tuple[float, float] | None) -> str:
     return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
+
+
+def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
+    """Return one row of text per drive, and one for all; the page and the terminal show them."""
+    return [(name, f'{drive.rms:.4f}', _percent(drive.relative), f'{drive.bias:+.4f}',
+             f'{drive.peak:.3f}', _percent(drive.explained_variance), f'{drive.noise_floor:.4f}',
+             f'{drive.effective_samples:.0f} of {drive.samples}', drive.verdict)
+            for name, drive in comparison.drives.items()]
+
+
+def comparison_table(comparison: Comparison) -> Any:
+    """Return how wrong the model is, drive by drive."""
+    from rich.table import Table
+
+    colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
+    table = Table(title='Measured minus model', caption=f'overall {comparison.rms:.4f} N rms, '
+                  f'{_percent(comparison.relative)}')
+    for heading in ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained',
+                    'noise [N]'):
+        table.add_column(heading, justify='left' if heading == 'drive' else 'right')
+    for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
+        table.add_row(f'[{colours[drive.grade]}]{row[0]}[/]', *row[1:7])
+    return table
+
+
+def _percent(share: float) -> str:
+    return 'none' if share != share else f'{share:.1%}'

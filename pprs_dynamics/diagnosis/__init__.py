@@ -1,0 +1,1 @@
+"""Model against measurement: how large the error is, where it sits, and what noise explains."""

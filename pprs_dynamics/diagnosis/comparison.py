@@ -1,0 +1,255 @@
+"""How wrong the model is: the numbers per drive and overall, and what they mean in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.localisation import MOST_SAMPLES, Localisation, localise
+from pprs_dynamics.diagnosis.noise import (
+    effective_samples,
+    find_repetition,
+    fit_noise,
+    unrepeated,
+)
+from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.mechanism.robot import Array
+
+# What is left beyond noise is nothing to speak of below this share of the noise itself: the
+# noise is known to about a tenth, and sqrt(1.1^2 - 1) = 0.46.
+NOISE_SHARE = 0.46
+GOOD, POOR = 0.05, 0.2  # relative unexplained error below which a model is good, above poor
+LEAST_TO_FIT = 50  # samples for a noise model
+# Of the effort's size, below which a changing effort is rounding.
+CONSTANT = 1e-9
+
+
+@dataclass(frozen=True)
+class DriveComparison:
+    """Model against measurement on one drive.
+
+    Parameters
+    ----------
+    rms, bias, peak : float
+        Of measured minus model [N]; peak is the largest absolute value.
+    relative : float
+        rms over the rms of the measured effort with its mean removed; NaN where that effort is
+        constant.
+    effort : float
+        rms of the measured effort with its mean removed [N].
+    explained_variance : float
+        1 - var(residual) / var(effort); NaN where the effort is constant.
+    samples : int
+        Measured ones.
+    effective_samples : float
+        Independent samples whose mean would be as uncertain.
+    noise_floor : float
+        rms of what neither repeats nor depends on anything known [N].
+    unexplained : float
+        Root of rms squared minus noise floor squared [N].
+    parts : mapping of str to float
+        rms of each part of the model, its mean removed [N].
+    grade : {'noise', 'good', 'fair', 'poor'}
+    verdict : str
+    """
+
+    rms: float
+    relative: float
+    bias: float
+    peak: float
+    effort: float
+    explained_variance: float
+    samples: int
+    effective_samples: float
+    noise_floor: float
+    unexplained: float
+    parts: Mapping[str, float]
+    grade: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All drives, and what they pool to.
+
+    Parameters
+    ----------
+    drives : mapping of str to DriveComparison
+        Only drives with measurements.
+    rms, relative : float
+        Pooled over drives [N]; and over the pooled effort.
+    verdict : str
+    localisation : Localisation
+        Where it fails.
+    """
+
+    drives: Mapping[str, DriveComparison]
+    rms: float
+    relative: float
+    verdict: str
+    localisation: Localisation
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface; a number that is not defined is null."""
+        return {
+            'drives': {name: {key: _number(getattr(drive, key))
+                              for key in ('rms', 'relative', 'bias', 'peak')}
+                       for name, drive in self.drives.items()},
+            'overall': {'rms': _number(self.rms), 'relative': _number(self.relative)},
+            'where': [statement.to_json() for statement in self.localisation.statements]}
+
+
+def compare(residuals: Residuals, localisation: Localisation | None = None) -> Comparison:
+    """Return how the model compares with the measurement.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    localisation : Localisation, optional
+        Its result where it is known already; what it finds is not noise.
+    """
+    where = localisation or localise(residuals)
+    repetition = _repetition(residuals)
+    drives: dict[str, DriveComparison] = {}
+    squares = efforts = 0.0
+    count = 0
+    for index, name in enumerate(residuals.drives):
+        known = np.isfinite(residuals.measured[:, index])
+        if not known.any():
+            continue
+        error = residuals.error[known, index]
+        effort = residuals.measured[known, index]
+        drives[name] = _compare_drive(residuals, index, name, where, repetition)
+        squares += float(error @ error)
+        efforts += float(np.sum((effort - effort.mean()) ** 2))
+        count += len(error)
+    rms = float(np.sqrt(squares / count))
+    whole = float(np.sqrt(efforts / count))
+    constant = all(np.isnan(drive.relative) for drive in drives.values())
+    relative = float('nan') if constant else rms / whole
+    return Comparison(drives, rms, relative, _overall_verdict(drives, rms, relative), where)
+
+
+def _compare_drive(
+    residuals: Residuals, index: int, name: str, where: Localisation, repetition: int | None,
+) -> DriveComparison:
+    known = np.isfinite(residuals.measured[:, index])
+    error, effort = residuals.error[known, index], residuals.measured[known, index]
+    rms, bias, peak = _rms(error), float(error.mean()), float(np.abs(error).max())
+    swing = _rms(effort - effort.mean())
+    constant = swing <= CONSTANT * max(float(np.abs(effort).max()), CONSTANT)
+    relative = float('nan') if constant else rms / swing
+    explained = float('nan') if constant else 1 - float(np.var(error)) / swing ** 2
+    floor = _noise_floor(residuals, index, name, where, repetition, rms)
+    unexplained = float(np.sqrt(max(rms ** 2 - floor ** 2, 0.0)))
+    parts = {part: _rms(values[known, index] - values[known, index].mean())
+             for part, values in residuals.parts.items()}
+    grade = _grade(unexplained, floor, swing, constant, parts)
+    return DriveComparison(
+        rms, relative, bias, peak, swing, explained, len(error),
+        _effective(residuals, index), floor, unexplained, parts, grade,
+        f'{name}: {_verdict(rms, swing, relative, floor, unexplained, parts, grade)}')
+
+
+def _effective(residuals: Residuals, index: int) -> float:
+    error = residuals.error[:, index]
+    known = int(np.isfinite(error).sum())
+    if known < LEAST_TO_FIT or not error[np.isfinite(error)].any():
+        return float(known)
+    search = DriveSearch(residuals, index)
+    return min(effective_samples(fit_noise(search.error, search.stretches), known), float(known))
+
+
+def _noise_floor(
+    residuals: Residuals, index: int, name: str, where: Localisation, repetition: int | None,
+    rms: float,
+) -> float:
+    """Return the rms of what does not repeat; without a repetition, of what nothing explains.
+
+    What the search for patterns leaves is an upper bound (a pattern too weak to stand out counts
+    as noise), what does not repeat a lower one (noise slower than the repetition is missed).
+    """
+    floor = rms
+    findings = where.drives.get(name)
+    if findings is not None and findings.statements:
+        # Averaging over thinned samples has taken white noise out of what remains; what was
+        # explained has not changed by it.
+        thin = residuals.thinned(MOST_SAMPLES)
+        before = thin.error[findings.index, index]
+        known = np.isfinite(before)
+        gone = _rms(before[known]) ** 2 - _rms(findings.remaining[known]) ** 2
+        floor = float(np.sqrt(max(rms ** 2 - max(gone, 0.0), 0.0)))
+    if repetition is not None:
+        error = residuals.error[:, index]
+        if np.isfinite(error[repetition:] - error[:-repetition]).sum() >= LEAST_TO_FIT:
+            floor = min(floor, unrepeated(error, repetition))
+    return floor
+
+
+def _repetition(residuals: Residuals) -> int | None:
+    position = residuals.variables.get('position')
+    one = bool(np.all(residuals.segment == residuals.segment[0]))
+    if position is None or not one or len(position) < LEAST_TO_FIT:
+        return None
+    return find_repetition(position.reshape(len(position), -1))
+
+
+def _grade(
+    unexplained: float, floor: float, swing: float, constant: bool, parts: Mapping[str, float],
+) -> str:
+    if unexplained <= NOISE_SHARE * floor:
+        return 'noise'
+    smallest = min((size for size in parts.values() if size > 0), default=np.inf)
+    if not constant and unexplained <= GOOD * swing and unexplained <= smallest:
+        return 'good'
+    if constant or unexplained > POOR * swing:
+        return 'poor'
+    return 'fair'
+
+
+def _verdict(
+    rms: float, swing: float, relative: float, floor: float, unexplained: float,
+    parts: Mapping[str, float], grade: str,
+) -> str:
+    of = ('of a constant effort' if np.isnan(relative)
+          else f'of {swing:.3g} N ({relative:.2g} of it)' if relative > 9.995
+          else f'of {swing:.3g} N ({100 * relative:.2g} %)')
+    left = f'the model leaves {rms:.3g} N {of}; '
+    if rms == 0:
+        return f'the model leaves nothing {of}'
+    if grade == 'noise':
+        return left + 'noise accounts for it: nothing else stands out in this recording'
+    left += f'noise accounts for {floor:.3g} N, so {unexplained:.3g} N is unexplained'
+    ranked = sorted(((size, part) for part, size in parts.items() if size > 0), reverse=True)
+    below = [(size, part) for size, part in ranked if size < unexplained]
+    if below:
+        size, part = below[0]
+        left += f' - more than {part.replace("_", " ")} contributes ({size:.3g} N)'
+    elif ranked:
+        size, part = ranked[-1]
+        left += f' - less than {part.replace("_", " ")} contributes ({size:.3g} N)'
+    return f'{left}: {grade}'
+
+
+def _overall_verdict(drives: Mapping[str, DriveComparison], rms: float, relative: float) -> str:
+    share = '' if np.isnan(relative) else f' ({100 * relative:.2g} % of the effort)'
+    beyond = {name: drive for name, drive in drives.items() if drive.grade != 'noise'}
+    if not beyond:
+        return f'the model leaves {rms:.3g} N{share}: noise accounts for it on every drive'
+    worst = max(beyond, key=lambda name: beyond[name].unexplained)
+    where = 'every drive' if len(beyond) == len(drives) > 1 else ', '.join(beyond)
+    return (f'the model leaves {rms:.3g} N{share}: more than noise on {where}; '
+            f'worst on {worst}, {beyond[worst].unexplained:.3g} N unexplained '
+            f'({beyond[worst].grade})')
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values ** 2)))
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,102 @@
+"""From a model and recordings to residuals: both sides on the same motion, treated alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct, treated_forces
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+
+# Variables of the interface that every drive sees alike; the others are one per drive.
+PLATFORM_VARIABLES = ('platform_x', 'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
+DRIVE_VARIABLES = ('position', 'velocity', 'acceleration', 'load', 'rod_angle')
+# Between recordings [s], so that times of all together increase.
+PAUSE = 1.0
+
+
+def measure_residuals(
+    model: DriveModel, recordings: Sequence[Recording],
+    progress: Callable[[float, float], None] | None = None,
+) -> tuple[Residuals, tuple[Reconstruction, ...]]:
+    """Return measured and modelled efforts of recordings side by side.
+
+    Parameters
+    ----------
+    model : DriveModel
+    recordings : sequence of Recording
+        One after the other, with a pause between; each segment stays one of its own.
+    progress : callable, optional
+        Called with (done, total) now and then.
+
+    Raises
+    ------
+    MotionError
+        Where a recording is too short.
+    ConvergenceError, WorkspaceError, SingularityError
+        Where the model cannot follow a recording.
+    ResidualsError
+        Where no effort was measured.
+    """
+    tables, reconstructions = [], []
+    total = 2.0 * sum(len(recording.time) for recording in recordings)
+    done = 0.0
+    for recording in recordings:
+        def report(samples: float, _: float, before: float = done) -> None:
+            if progress is not None:
+                progress(before + samples, total)
+
+        reconstruction = reconstruct(model, recording, report)
+        done += len(recording.time)
+
+        def report_model(samples: float, _: float, before: float = done) -> None:
+            if progress is not None:
+                progress(before + samples, total)
+
+        tables.append(_table(model, reconstruction, report_model))
+        done += len(recording.time)
+        reconstructions.append(reconstruction)
+    return _joined(tables), tuple(reconstructions)
+
+
+def _table(
+    model: DriveModel, reconstruction: Reconstruction, progress: Callable[[int, int], None],
+) -> dict[str, Array]:
+    treat = reconstruction.treat
+    table = treated_forces(model, reconstruction, progress, _variables)
+    table['measured'] = treat(reconstruction.effort)
+    table['time'] = treat(reconstruction.time[:, None])[:, 0]
+    for name in DRIVE_VARIABLES[:3]:
+        table[name] = treat(getattr(reconstruction, name))
+    edges = [segment.start for segment in reconstruction.segments]
+    table['segment'] = np.searchsorted(edges, treat.starts, side='right').astype(float) - 1
+    return table
+
+
+def _variables(forces: DriveForces) -> dict[str, Array]:
+    mechanism = forces.mechanism
+    motion = mechanism.motion
+    platform = np.column_stack((motion.position, motion.tilt, motion.turn))
+    return {'load': mechanism.guide_load, 'platform': platform,
+            'rod_angle': np.tile(mechanism.chains.rod_angle, 2)}
+
+
+def _joined(tables: list[dict[str, Array]]) -> Residuals:
+    start, segments = 0.0, 0.0
+    for table in tables:
+        table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
+        table['segment'] = table['segment'] + segments
+        start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
+    joined = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+    platform = joined.pop('platform')
+    variables = {name: joined.pop(name) for name in DRIVE_VARIABLES}
+    variables.update(zip(PLATFORM_VARIABLES, platform.T, strict=True))
+    time, segment = joined.pop('time'), joined.pop('segment').astype(int)
+    measured, model = joined.pop('measured'), joined.pop('total')
+    steps = np.diff(time)[np.diff(segment) == 0]
+    return Residuals(DRIVES, time, segment, measured, model, joined, variables,
+                     float(np.median(steps)))

@@ -1,0 +1,175 @@
+"""Statements of where a drive's error lies, with their shares and their sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.search import Candidate, DriveSearch
+from pprs_dynamics.mechanism.robot import Array
+
+# How a variable is called, and the unit it is read in: factor from SI, and name.
+UNITS = {
+    'position': (1e3, 'mm'), 'velocity': (1e3, 'mm/s'), 'acceleration': (1.0, 'm/s^2'),
+    'load': (1.0, 'N'), 'rod_angle': (180 / np.pi, 'deg'), 'platform_x': (1e3, 'mm'),
+    'platform_y': (1e3, 'mm'), 'platform_z': (1e3, 'mm'), 'platform_tilt': (180 / np.pi, 'deg'),
+    'platform_turn': (180 / np.pi, 'deg'), 'time': (1.0, 's'), 'frequency': (1.0, 'Hz'),
+}
+WORDS = {'load': 'guide load', 'rod_angle': 'rod angle', 'platform_x': 'platform x',
+         'platform_y': 'platform y', 'platform_z': 'platform z', 'platform_tilt': 'platform tilt',
+         'platform_turn': 'platform turn'}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One place where the model of a drive fails.
+
+    Parameters
+    ----------
+    drive, variable : str
+    range : (float, float) or None
+        Of the variable, SI; of the speed where the pattern follows the direction of motion;
+        [0, 1] or [-1, 0] of the direction; None where all of it is meant.
+    share_of_error : float
+        Of the drive's squared error, within the range; without a range, what the pattern
+        explains.
+    share_of_time : float
+        Of the samples, within the range.
+    text : str
+    evidence : float
+        Gain in deviance with the noise refitted, less the price of the tries.
+    kind : str
+        Of pattern, see `hypotheses.Pattern`; 'scatter' for a changed variance.
+    amplitude : float
+        Size of the pattern [N].
+    rivals : tuple of str
+        Other variables that do nearly as well.
+    """
+
+    drive: str
+    variable: str
+    range: tuple[float, float] | None
+    share_of_error: float
+    share_of_time: float
+    text: str
+    evidence: float
+    kind: str
+    amplitude: float
+    rivals: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'drive': self.drive, 'variable': self.variable,
+                'range': None if self.range is None else list(self.range),
+                'share_of_error': self.share_of_error, 'share_of_time': self.share_of_time,
+                'text': self.text}
+
+
+def word_statement(
+    drive: str, search: DriveSearch, candidate: Candidate, rivals: tuple[str, ...],
+) -> Statement:
+    """Return the statement that a candidate makes."""
+    pattern, variable = candidate.pattern, candidate.family.variable
+    known = search.known
+    error, columns = search.error[known], candidate.columns[:, known]
+    # The coefficients of the pattern alone; adopted columns come first.
+    own = (candidate.fit.coefficients[-len(columns):] if candidate.fit is not None
+           else np.zeros(len(columns)))
+    shape = own @ columns
+    total = max(float(error @ error), 1e-300)
+    limits, share, time = pattern.limits, 0.0, 1.0
+    if limits is None:
+        share = float(np.clip(1 - (error - shape) @ (error - shape) / total, 0.0, 1.0))
+        if pattern.kind == 'line':
+            width = 1 / (len(search.error) * search.residuals.period)
+            limits = (pattern.scale - width, pattern.scale + width)
+    else:
+        held = np.abs(columns[0]) > 0.5
+        if pattern.kind == 'fading':
+            held = np.abs(search.values(variable)[known]) < limits[1]
+        share, time = float(error[held] @ error[held]) / total, float(held.mean())
+    amplitude = float(np.abs(own).max()) if candidate.family.paired is False else float(
+        np.hypot(*own))
+    signed = float(own[0]) if len(own) else 0.0
+    sentence = _sentence(candidate, search, signed, amplitude, share, time, shape)
+    if rivals:
+        sentence += f'; {_listed([_words(name) for name in rivals])} would explain it about as well'
+    return Statement(drive, variable, limits, share, time, f'{drive}: {sentence}',
+                     candidate.score, pattern.kind, amplitude, rivals)
+
+
+def _sentence(
+    candidate: Candidate, search: DriveSearch, signed: float, amplitude: float, share: float,
+    time: float, shape: Array,
+) -> str:
+    pattern, variable = candidate.pattern, candidate.family.variable
+    kind, word = pattern.kind, _words(variable)
+    if kind == 'offset':
+        return (f'its error has a mean of {signed:+.3g} N over the whole recording, '
+                f'{share:.0%} of its squared error')
+    if kind == 'friction':
+        return (f'its error has the sign of the motion, {amplitude:.3g} N: friction is too '
+                f'{"small" if signed > 0 else "large"} in the model; this is {share:.0%} of its '
+                'squared error')
+    if kind == 'ripple':
+        factor, unit = UNITS['position']
+        return (f'its error repeats about every {pattern.scale * factor:.3g} {unit} of position, '
+                f'{amplitude:.3g} N; this is {share:.0%} of its squared error')
+    if kind == 'line':
+        return (f'its error holds a vibration at {pattern.scale:.4g} Hz of {amplitude:.3g} N, '
+                f'{share:.0%} of its squared error')
+    if kind in ('growth', 'directed_growth'):
+        opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
+        low, high = _ends(search, variable, shape, kind == 'directed_growth')
+        return (f'its error changes with {word}: {low:+.3g} N at its least, {high:+.3g} N at its '
+                f'greatest{opposed}; this is {share:.0%} of its squared error')
+    place = _place(candidate, search)
+    where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'
+    if kind == 'scatter':
+        return (f'{where}; it scatters there {np.sqrt(pattern.scale):.2g} times as much as '
+                'elsewhere')
+    along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
+    return f'{where}; it is shifted there by {signed:+.3g} N{along}'
+
+
+def _place(candidate: Candidate, search: DriveSearch) -> str:
+    variable, pattern = candidate.family.variable, candidate.pattern
+    assert pattern.limits is not None
+    low, high = pattern.limits
+    if variable == 'direction':
+        return 'in the positive direction' if low >= 0 else 'in the negative direction'
+    factor, unit = UNITS[variable.partition(' of ')[0]]
+    word = _words(variable)
+    values = search.values(variable)
+    speed = pattern.kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')
+    if variable.startswith('velocity') and (speed or np.isclose(-low, high)):
+        word = word.replace('velocity', 'speed')
+        values, low = np.abs(values), max(low, 0.0)
+    below, above = high < values.max(), low > values.min() and not (speed and low <= 0)
+    if below and (not above or (word.startswith('speed') and low <= 0)):
+        return f'at a {word} below {high * factor:.3g} {unit}'
+    if above and not below:
+        return f'at a {word} above {low * factor:.3g} {unit}'
+    return f'at a {word} between {low * factor:.3g} and {high * factor:.3g} {unit}'
+
+
+def _ends(
+    search: DriveSearch, variable: str, shape: Array, directed: bool,
+) -> tuple[float, float]:
+    values = search.values(variable)[search.known]
+    if directed:
+        shape = shape * search.values('direction')[search.known]
+    order = np.argsort(values)
+    few = max(1, len(order) // 100)
+    return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
+
+
+def _words(variable: str) -> str:
+    name, of, other = variable.partition(' of ')
+    return WORDS.get(name, name) + of + other
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f'{", ".join(names[:-1])} or {names[-1]}'
