@@ -179,9 +179,12 @@ class _Listener:
         self.status = message.data  # type: ignore[attr-defined]
 
     def wait_for_nodes(self) -> None:
-        """Spin until both nodes are seen."""
+        """Spin until the robot speaks and its commander is seen.
+
+        The mere sight of a robot proves nothing: one that was killed is seen for a while.
+        """
         deadline = time.monotonic() + PATIENCE
-        while not all(each.get_publisher_count() for each in self.subscriptions):
+        while not (self.states and self.subscriptions[0].get_publisher_count()):
             if time.monotonic() > deadline:
                 raise TimeoutError('the nodes did not appear')
             self.executor.spin_once(timeout_sec=0.05)

@@ -2,7 +2,7 @@
 
 Per drive, patterns along every variable are proposed under two noise models, compared by
 likelihoods in which the noise is refitted (`search`), and the best is stated where its gain, less
-the price of the number of tries, exceeds what white innovations would reach in one of a hundred
+the price of the number of tries, exceeds what white innovations would reach in one of two hundred
 recordings, over all drives, variables and ranges together. What was stated is taken out with all
 that its variable can carry, and the search goes on; then the scatter of what remains is searched.
 """
@@ -22,7 +22,7 @@ from pprs_dynamics.diagnosis.search import FINE, Candidate, DriveSearch
 from pprs_dynamics.diagnosis.wording import Statement, word_statement
 from pprs_dynamics.mechanism.robot import Array
 
-FALSE_ALARMS = 0.01
+FALSE_ALARMS = 0.005
 DRAWS = 64
 MOST_SAMPLES = 16_000
 LEAST_SAMPLES = 100
@@ -208,7 +208,7 @@ def _best(state: _Open, needed: float) -> tuple[Candidate | None, tuple[str, ...
     fine = [search.refine(c, c.fit.noise, state.columns, FINE) for c in scored[:FINELY]
             if c.fit is not None and c.score + c.family.penalty > 0]
     scored = sorted(scored + search.compare(fine, state.columns), key=lambda c: -c.score)
-    for _ in range(REVISIONS):
+    for revision in range(REVISIONS):
         standing = [c for c in scored if c.score >= needed]
         if not standing:
             return None, ()
@@ -216,9 +216,10 @@ def _best(state: _Open, needed: float) -> tuple[Candidate | None, tuple[str, ...
         assert winner.fit is not None
         # Beside a good pattern the noise is nearly the true one, and shows better patterns.
         noise, fresh = winner.fit.noise, []
+        seen = chosen if revision else {}
         for candidate in search.propose(noise, state.columns)[0][:PROPOSALS[1]]:
             key = (candidate.family.variable, candidate.pattern)
-            if candidate.family.variable not in stated and key not in chosen:
+            if candidate.family.variable not in stated and key not in seen:
                 chosen[key] = search.refine(candidate, noise, state.columns)
                 fresh.append(chosen[key])
         if not fresh:

@@ -18,6 +18,14 @@ from scipy.ndimage import median_filter
 
 from pprs_dynamics.diagnosis.hypotheses import LEAST_SHARE, Family, Pattern, build_families
 from pprs_dynamics.diagnosis.noise import COEFFICIENT_PENALTY, NoiseModel, fit_noise
+from pprs_dynamics.diagnosis.regression import (
+    one_degree,
+    orthonormal,
+    pattern_gains,
+    slow_noise,
+    solve,
+    trial_limits,
+)
 from pprs_dynamics.diagnosis.residuals import Residuals, bridged, find_stretches
 from pprs_dynamics.mechanism.robot import Array
 
@@ -27,9 +35,8 @@ FIT_ITERATIONS = 2
 # What a simulation without noise leaves can be explained to rounding, and no measurement can:
 # innovations are at least this share of the error.
 LEAST_INNOVATION = 1e-4
-# Periods of the lowest frequency at which a record tells how strong its noise is.
-GUARD_PERIODS = 8
 # Limits move by up to a bin, then by shares of it: a step in time has to be met to the sample.
+REFINEMENT_PRICE = 3.0  # for the best of limits that the threshold's draws do not try
 COARSE, FINE = (1.0, 0.2), (0.04, 0.008)
 LOWEST_LINE = 3  # periods within the record, below which a line is a drift
 BACKGROUND_WIDTH = 41  # frequencies over which a line's background is taken
@@ -193,7 +200,7 @@ class DriveSearch:
                 continue
             x = self.whiten(noise, family.columns).astype(np.float32)
             cross = x @ basis.T.astype(np.float32)
-            gains = _gains(family, x @ sides, x @ x.T - cross @ cross.T,
+            gains = pattern_gains(family, x @ sides, x @ x.T - cross @ cross.T,
                            np.einsum('ij,ij->i', x, x))
             largest = np.maximum(largest, gains[:, 1:].max(axis=0) - family.penalty)
             best = int(np.argmax(gains[:, 0]))
@@ -205,7 +212,7 @@ class DriveSearch:
             candidates.append(line)
             power = np.abs(np.fft.rfft(sides[:, 1:], axis=0)) ** 2
             highest = 2 * power[LOWEST_LINE:-1].max(axis=0) / max(int(self.known.sum()), 1)
-            largest = np.maximum(largest, _one_degree(highest) - line.family.penalty)
+            largest = np.maximum(largest, one_degree(highest) - line.family.penalty)
         candidates.sort(key=lambda candidate: -candidate.proposal)
         return candidates, largest
 
@@ -227,15 +234,22 @@ class DriveSearch:
         family = Family('frequency', columns, np.zeros((0, 0)), (pattern,), rivals=len(gain),
                         paired=True)
         return Candidate(family, pattern, columns,
-                         float(_one_degree(np.asarray(gain.max()))) - family.penalty)
+                         float(one_degree(np.asarray(gain.max()))) - family.penalty)
 
     def _refined(self, frequency: float, white: Array) -> float:
-        """Return the frequency of the largest power within one resolution of the given one."""
+        """Return the frequency of the largest power within one resolution of the given one.
+
+        To a thousandth of the resolution: where noise is small at that frequency, what a wrong
+        one leaves is still a line.
+        """
         t = self.residuals.time
-        resolution = 1 / (len(self.error) * self.residuals.period)
-        trial = frequency + resolution * np.linspace(-1, 1, 21)
-        power = np.abs(np.exp(-2j * np.pi * trial[:, None] * t) @ white)
-        return float(trial[int(np.argmax(power))])
+        step = 1 / (len(self.error) * self.residuals.period)
+        for _ in range(3):
+            trial = frequency + step * np.linspace(-1, 1, 21)
+            power = np.abs(np.exp(-2j * np.pi * trial[:, None] * t) @ white)
+            frequency = float(trial[int(np.argmax(power))])
+            step /= 10
+        return frequency
 
     def refine(
         self, candidate: Candidate, noise: NoiseModel, adopted: Array,
@@ -258,7 +272,7 @@ class DriveSearch:
         for end, width in ((end, width) for width in widths for end in (0, 1)):
             if limits[end] == outer[end]:
                 continue
-            trials = _around(limits[end], outer, family.edges, width)
+            trials = trial_limits(limits[end], outer, family.edges, width)
             low = np.where(end == 0, trials, limits[0])
             high = np.where(end == 1, trials, limits[1])
             columns = np.asarray(
@@ -280,7 +294,7 @@ class DriveSearch:
                 best, column, limits[end] = float(gains[top]), columns[top], float(trials[top])
         if not np.isfinite(best):
             return candidate
-        price = candidate.price + 2 * float(np.log(tries).sum())
+        price = max(candidate.price, REFINEMENT_PRICE) + 2 * float(np.log(tries).sum())
         return replace(candidate, pattern=replace(pattern, limits=(limits[0], limits[1])),
                        columns=column[None], proposal=best - family.penalty - price, price=price)
 
@@ -302,32 +316,15 @@ class DriveSearch:
             gain = min(without.deviance - fit.deviance,
                        self._guarded_gain(fit.noise, candidate.columns, adopted))
             if candidate.family.paired:
-                gain = float(_one_degree(np.asarray(gain)))
+                gain = float(one_degree(np.asarray(gain)))
             score = gain - candidate.family.penalty - candidate.price
             scored.append(replace(candidate, score=score, fit=fit))
         return sorted(scored, key=lambda candidate: -candidate.score)
 
     def _guarded_gain(self, noise: NoiseModel, columns: Array, adopted: Array) -> float:
-        """Return the gain if noise went on growing towards low frequencies as where it is seen.
-
-        A record of length T says little about noise below a few 1/T, and there 1/f noise looks
-        like an offset or a step. So its spectrum is continued downwards by the power law
-        that it follows just above, as random cosines that compete with the pattern.
-        """
-        n = len(self.error)
-        size = 4 * max(n, len(noise.filter))
-        power = noise.spectrum(size)
-        corner = GUARD_PERIODS * size / n
-        at = np.array([1, 4]) * int(corner)
-        slope = float(np.clip(np.log(power[at[0]] / power[at[1]]) / np.log(4), 0.0, 2.0))
-        k = np.arange(2 * GUARD_PERIODS)
-        cosines = np.cos(np.pi * np.outer(k, np.arange(n) + 0.5) / n)
-        # The k-th cosine has frequency k / (2 T); the mean stands for all below 1 / (4 T).
-        ratio = 2 * GUARD_PERIODS / np.maximum(k, 0.5)
-        excess = power[at[0]] * ratio ** slope - power[(k * size) // (2 * n)]
-        prior = np.maximum(excess, 1e-9 * power[at[0]]) * np.where(k == 0, 1.0, 2.0) / n
-        white = self.whiten(noise, np.concatenate((self.error[None], columns, adopted,
-                                                   cosines * np.sqrt(prior)[:, None])))
+        """Return the gain if noise went on growing towards low frequencies, see `slow_noise`."""
+        cosines = slow_noise(noise, len(self.error))
+        white = self.whiten(noise, np.concatenate((self.error[None], columns, adopted, cosines)))
         y, x = white[0], white[1:1 + len(columns)]
         basis = orthonormal(white[1 + len(columns):1 + len(columns) + len(adopted)])
         slow = white[1 + len(columns) + len(adopted):]
@@ -338,62 +335,3 @@ class DriveSearch:
         gram = x @ x.T - xs @ np.linalg.solve(inner, xs.T)
         return float(cross @ np.linalg.solve(gram + 1e-12 * np.trace(gram) * np.eye(len(gram)),
                                              cross))
-
-
-def _around(
-    limit: float, outer: tuple[float, float], edges: Array, width: float,
-) -> Array:
-    """Return trial limits within a share of the way to a limit's neighbouring edges."""
-    grid = np.unique(np.concatenate((edges, np.abs(edges), outer)))
-    below, above = grid[grid < limit - 1e-12], grid[grid > limit + 1e-12]
-    low = below[-1] if len(below) else outer[0]
-    high = above[0] if len(above) else outer[1]
-    share = np.arange(1, 5) / 5 * width
-    return np.unique(np.concatenate((limit - share * (limit - low), [limit],
-                                     limit + share * (high - limit))))
-
-
-def solve(columns: Array, values: Array) -> Array:
-    """Return least-squares coefficients; columns may be linearly dependent."""
-    if not len(columns):
-        return np.zeros(0)
-    gram = columns @ columns.T
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    gram = gram / np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
-    result: Array = np.linalg.solve(gram, columns @ values / scale) / scale
-    return result
-
-
-def orthonormal(rows: Array) -> Array:
-    """Return an orthonormal basis of the rows' span, (K, N)."""
-    if not len(rows):
-        return rows
-    _, sizes, basis = np.linalg.svd(rows, full_matrices=False)
-    kept: Array = basis[sizes > 1e-7 * sizes.max()]
-    return kept
-
-
-def _gains(family: Family, b: Array, gram: Array, plain: Array) -> Array:
-    """Return twice the log-likelihood gain of every pattern, (P, R)."""
-    if family.paired:
-        cc, ss = gram[0::2, 0::2].diagonal()[:, None], gram[1::2, 1::2].diagonal()[:, None]
-        cs = np.diagonal(gram, 1)[0::2, None]
-        bc, bs = b[0::2], b[1::2]
-        det = cc * ss - cs * cs
-        possible = det > 1e-3 * (plain[0::2] * plain[1::2])[:, None]
-        gain = (ss * bc * bc - 2 * cs * bc * bs + cc * bs * bs) / np.where(possible, det, np.inf)
-        return _one_degree(gain.astype(float))
-    weights = family.weights.astype(np.float32)
-    size = np.einsum('ij,jk,ik->i', weights, gram, weights)
-    whole = (weights ** 2) @ plain
-    # What the adopted columns explain already is left out, not divided by rounding.
-    possible = size > 1e-3 * whole
-    gains = (weights @ b) ** 2 / np.where(possible, size, np.inf)[:, None]
-    result: Array = gains.astype(float)
-    return result
-
-
-def _one_degree(gain: Array) -> Array:
-    """Return the gain of one degree of freedom that is as rare as this one of two."""
-    result: Array = gain - np.log(np.maximum(np.pi * gain / 2, 1.0))
-    return result

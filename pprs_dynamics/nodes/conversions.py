@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +28,7 @@ PLATFORM = 'platform'
 BASE_FRAMES = ('', 'base')
 NANOSECONDS = 1_000_000_000
 LATEST_SECOND = 2 ** 31 - 1
+_NAMES = list(DRIVES)
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def write_trajectory(
 
 def commands(forces: DriveForces) -> Float64MultiArray:
     """Return the forces of the first sample, in drive order."""
-    return Float64MultiArray(data=forces.total[0].tolist())
+    return Float64MultiArray(data=_doubles(forces.total[0]))
 
 
 def joint_command(request: TrajectoryRequest, forces: DriveForces) -> JointState:
@@ -159,9 +161,9 @@ def joint_state(
     stamp: int, effort: Array, position: Array | None = None, velocity: Array | None = None,
 ) -> JointState:
     """Return efforts, and what else is known, at a time [ns]."""
-    message = JointState(name=list(DRIVES), effort=effort.tolist())
+    message = JointState(name=_NAMES, effort=_doubles(effort))
     if position is not None and velocity is not None:
-        message.position, message.velocity = position.tolist(), velocity.tolist()
+        message.position, message.velocity = _doubles(position), _doubles(velocity)
     message.header.stamp, message.header.frame_id = time(stamp), BASE_FRAMES[1]
     return message
 
@@ -182,13 +184,13 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Ar
     if len(values) != len(names):
         raise Rejection('SIZE', f'{field} has {len(values)} values, but it must have '
                         f'{len(names)}, as name')
-    array = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
+    drives = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
     if may_be_nan:
         # Not a number, and no measurement either.
-        return np.where(np.isfinite(array), array, np.nan)
-    if not np.all(np.isfinite(array)):
-        raise Rejection('NON_FINITE', f'{field} is {array.tolist()}, but it must be finite')
-    return array
+        return np.where(np.isfinite(drives), drives, np.nan)
+    if not np.all(np.isfinite(drives)):
+        raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, but it must be finite')
+    return drives
 
 
 def nanoseconds(moment: Time | Duration) -> int:
@@ -206,6 +208,11 @@ def duration(moment: int) -> Duration:
     """Return a duration from nanoseconds, held within what the message can say."""
     seconds, rest = divmod(moment, NANOSECONDS)
     return Duration(sec=min(seconds, LATEST_SECOND), nanosec=rest)
+
+
+def _doubles(values: Array) -> array[float]:
+    """Return values in the form that messages take over without looking at each one."""
+    return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
 
 
 def _require_one_of_each(points: Sequence[Any]) -> None:

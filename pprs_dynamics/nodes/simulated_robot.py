@@ -44,8 +44,9 @@ PARAMETERS = (
     NodeParameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
 # A node that was stopped for longer than this [s] goes on from now instead of catching up.
-LONGEST_CATCH_UP = 0.1
-CYCLES_AT_ONCE = 5
+LONGEST_CATCH_UP = 0.5
+# Between them the executor takes one command: with more, commands at 200 Hz would pile up.
+CYCLES_AT_ONCE = 2
 WHITE_SHARE = 0.64
 LATE_SHARE = 0.001
 
