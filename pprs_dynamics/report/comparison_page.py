@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.diagnosis.residuals import Residuals
@@ -24,7 +25,7 @@ def comparison_page(
     """Return the page of one comparison, most important first."""
     page = Page('Model against measurement')
     page.text(comparison.verdict, 'lead')
-    page.text(f'Model: {model.source or "built in memory"}. Recordings: '
+    page.text(f'Model: {Path(model.source).name or "built in memory"}. Recordings: '
               f'{", ".join(recording.name for recording in recordings)}.', 'note')
     page.table(HEADINGS, comparison_rows(comparison),
                [drive.grade for drive in comparison.drives.values()])

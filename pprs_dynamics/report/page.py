@@ -18,7 +18,7 @@ p { margin: .3rem 0; max-width: 60rem; } .note { color: #555; }
 .lead { font-size: 1.1rem; } li { margin: .25rem 0; }
 table { border-collapse: collapse; margin: .6rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .8rem; border-bottom: 1px solid #ddd; text-align: right; }
-th:first-child, td:first-child { text-align: left; }
+th:first-child, td:first-child, th:last-child { text-align: left; }
 th { border-bottom: 2px solid #888; font-weight: 600; }
 td.text { text-align: left; max-width: 34rem; } td.poor { background: #fbe3dc; }
 td.fair { background: #fdf3d8; } td.good, td.noise { background: #e3f1e6; }

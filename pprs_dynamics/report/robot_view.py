@@ -56,7 +56,7 @@ def animate_robot(model: DriveModel, motion: PlatformMotion, title: str) -> Any:
     figure.update_layout(
         title=f'{title}<br><sub>{captions[0]}</sub>', template='plotly_white', height=760,
         legend={'x': 0.0, 'y': 0.95}, margin={'l': 0, 'r': 0, 't': 70, 'b': 70},
-        scene={'aspectmode': 'data', 'camera': {'eye': {'x': 1.2, 'y': -1.2, 'z': 0.7}},
+        scene={'aspectmode': 'data', 'camera': {'eye': {'x': 1.4, 'y': -1.4, 'z': 0.75}},
                'xaxis_title': 'x [m]', 'yaxis_title': 'y [m]', 'zaxis_title': 'z [m]'},
         updatemenus=[{
             'type': 'buttons', 'x': 0.02, 'y': 0.06, 'direction': 'left',
@@ -89,7 +89,7 @@ def _rails(go: Any, model: DriveModel, joints: JointPositions, motion: PlatformM
     path = motion.position
     return [
         _lines(go, rails, SLIDE, 'guides of the slides', width=4),
-        _lines(go, path, PATH, 'path of the platform', width=2, dash='dot'),
+        _lines(go, path, PATH, 'path of the platform', width=2),
         go.Scatter3d(
             x=[1.02 * geometry.base_radius * v[0] for v in e],
             y=[1.02 * geometry.base_radius * v[1] for v in e], z=[0.0] * 3, mode='text',
@@ -103,11 +103,11 @@ def _moving(go: Any, joints: JointPositions, sines: Array, k: int) -> list[Any]:
     lifts = np.concatenate((foot[:, None], elbow[:, None], gap), axis=1).reshape(-1, 3)
     rods = [go.Scatter3d(
         x=[elbow[i, 0], tip[i, 0]], y=[elbow[i, 1], tip[i, 1]], z=[elbow[i, 2], tip[i, 2]],
-        mode='lines', name='rods, by |sin u|', legendgroup='rods', showlegend=i == 0,
+        mode='lines', name=f'rod {i + 1}', showlegend=False,
         hovertext=f'rod {i + 1}: |sin u| = {sines[k, i]:.2f}', hoverinfo='text',
         line={'width': 9, 'color': [sines[k, i]] * 2, 'colorscale': WEAKNESS, 'cmin': 0.0,
               'cmax': 1.0, 'showscale': i == 0,
-              'colorbar': {'title': '|sin u|<br>0: singular', 'len': 0.5}}) for i in range(3)]
+              'colorbar': {'title': 'rods: |sin u|<br>0: singular', 'len': 0.5}}) for i in range(3)]
     return [
         _lines(go, lifts, LIFT, 'lifts', width=6),
         *rods,
@@ -122,11 +122,10 @@ def _moving(go: Any, joints: JointPositions, sines: Array, k: int) -> list[Any]:
     ]
 
 
-def _lines(go: Any, points: Array, colour: str, name: str, width: float,
-           dash: str = 'solid') -> Any:
+def _lines(go: Any, points: Array, colour: str, name: str, width: float) -> Any:
     x, y, z = points.T
     return go.Scatter3d(x=x, y=y, z=z, mode='lines', name=name, hoverinfo='skip',
-                        line={'color': colour, 'width': width, 'dash': dash})
+                        line={'color': colour, 'width': width})
 
 
 def _button(label: str, frames: Any, duration: int) -> dict[str, Any]:

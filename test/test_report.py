@@ -1,0 +1,163 @@
+"""pprs compare from files to its page, and the page in a real browser."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+from browser import find_browser, render
+from ros_processes import executable
+
+from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.measurement.recording import read_recording, write_recording
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.report.comparison_figures import thinned, worst_spans
+from pprs_dynamics.report.page import Page
+
+needs_browser = pytest.mark.skipif(
+    find_browser() is None, reason='no Chromium on PATH to look at the page with')
+
+
+def pprs(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
+                          text=True, timeout=300)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Simulate a robot with a hidden effect, and compare the model with it."""
+    folder = tmp_path_factory.mktemp('compare')
+    # A name that would be a script where it is not escaped.
+    run = folder / '<script>alert(1)</script>.mcap'.replace('/', '')
+    done = pprs('simulate', '--output', run, '--effect', 'coulomb_friction', '--seed', '11',
+                '--duration', '15', '--json', folder / 'truth.json', '--report',
+                folder / 'robot.html')
+    assert done.returncode == 0, done.stderr
+    done = pprs('compare', run, '--json', folder / 'mcap.json', '--report', folder / 'page.html')
+    assert done.returncode == 0, done.stderr
+    (folder / 'stdout.txt').write_text(done.stdout)
+    return folder
+
+
+def test_compare_finds_the_hidden_effects_drive_and_its_size(folder: Path) -> None:
+    truth = json.loads((folder / 'truth.json').read_text())['effects'][0]['parameters']
+    result = json.loads((folder / 'mcap.json').read_text())
+    assert set(result['drives']) == set(DRIVES)
+    for name, drive in result['drives'].items():
+        assert set(drive) == {'rms', 'relative', 'bias', 'peak'}
+        if name in truth:
+            # Nearly all of the error of a dry friction is its size.
+            assert drive['rms'] == pytest.approx(abs(truth[name]['force']), rel=0.25)
+        else:
+            assert drive['rms'] < 0.08
+    assert result['where'], 'a dry friction stands out'
+    first = result['where'][0]
+    assert first['drive'] in truth
+    assert first['variable'] in ('direction', 'velocity')
+    assert set(first) == {'drive', 'variable', 'range', 'share_of_error', 'share_of_time', 'text'}
+    squares = [drive['rms'] ** 2 for drive in result['drives'].values()]
+    assert result['overall']['rms'] == pytest.approx(np.sqrt(np.mean(squares)))
+
+
+def test_the_same_samples_from_other_files_give_the_same_numbers(folder: Path) -> None:
+    run = next(folder.glob('*.mcap'))
+    recording = read_recording(run)
+    for name in ('run.csv', 'bag', 'run.db3'):
+        write_recording(folder / name, recording)
+        done = pprs('compare', folder / name, '--json', folder / 'other.json')
+        assert done.returncode == 0, done.stderr
+        assert json.loads((folder / 'other.json').read_text()) == json.loads(
+            (folder / 'mcap.json').read_text()), name
+
+
+def test_info_says_what_is_in_a_file_and_what_is_wrong_with_it(folder: Path) -> None:
+    recording = read_recording(next(folder.glob('*.mcap')))
+    broken = folder / 'broken.csv'
+    write_recording(broken, recording)
+    lines = broken.read_text().splitlines()
+    del lines[3000:3500]
+    broken.write_text('\n'.join(lines))
+    done = pprs('info', broken, '--json', folder / 'info.json')
+    assert done.returncode == 0
+    for drive in DRIVES:
+        assert drive in done.stdout
+    content = json.loads((folder / 'info.json').read_text())['recordings'][0]
+    assert [finding['kind'] for finding in content['findings']] == ['gap']
+    assert len(content['segments']) == 2
+    assert '1 gap' in done.stdout
+
+
+@pytest.mark.parametrize('content', [b'', b'time,a\n1,2\n', bytes(range(256)) * 20])
+def test_a_foreign_file_is_one_line_and_status_2(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / 'x.csv'
+    file.write_bytes(content)
+    for command in ('compare', 'info'):
+        done = pprs(command, file)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f'pprs {command}: {file}: ')
+        assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_page_needs_no_network_and_escapes_names(folder: Path) -> None:
+    text = (folder / 'page.html').read_text()
+    assert not re.search(r'<(script|link|img)[^>]+(src|href)=', text)
+    assert '<script>alert(1)' not in text
+    assert '&lt;script&gt;alert(1)' in text
+
+
+@needs_browser
+@pytest.mark.parametrize('name', ['page.html', 'robot.html'])
+def test_a_browser_draws_the_page_without_complaints(
+    folder: Path, tmp_path: Path, name: str,
+) -> None:
+    seen = render(folder / name, tmp_path / 'page.png')
+    assert seen.console == []
+    drawn = seen.document.count('class="main-svg"')
+    figures = (folder / name).read_text().count('class="plotly-graph-div"')
+    assert figures >= 1
+    assert drawn >= figures
+    picture = matplotlib.image.imread(seen.picture)
+    assert picture.shape[:2] == (1600, 1280)
+    # Text and curves: dark and coloured pixels, on a page mostly white.
+    pixels = picture[..., :3]
+    assert 0.01 < np.mean(pixels.min(axis=2) < 0.5) < 0.5
+    assert np.mean(np.ptp(pixels, axis=2) > 0.2) > 0.002
+
+
+def test_long_recordings_are_thinned_without_losing_a_peak() -> None:
+    time = np.arange(1_000_000.0)
+    values = np.zeros(1_000_000)
+    values[[123_456, 777_777]] = (5.0, -7.0)
+    values[500_000:500_500] = np.nan
+    shown_time, shown = thinned(time, values)
+    assert len(shown) <= 3000
+    assert {5.0, -7.0} <= set(shown)
+    assert np.all(np.diff(shown_time) > 0)
+
+
+def test_the_worst_second_is_the_one_with_the_planted_error() -> None:
+    time = np.arange(0, 20, 0.01)
+    error = np.zeros((len(time), 6))
+    error[700:760, 2] = 1.0
+    residuals = Residuals(DRIVES, time, np.zeros(len(time), dtype=int), error, np.zeros_like(error))
+    start, end = worst_spans(residuals, 2)[0]
+    assert start <= 7.0
+    assert end >= 7.59
+    assert worst_spans(residuals, 1) == []
+
+
+def test_text_from_files_is_escaped_everywhere() -> None:
+    page = Page('<b>')
+    page.heading('<i>')
+    page.text('<u>', 'lead')
+    page.bullets(['<s>'])
+    page.table(('<p>', 'x'), [('<q>', '<r>')], ['good'])
+    html = page.html()
+    for letter in 'biuspqr':
+        assert f'&lt;{letter}&gt;' in html
+    assert '<td class="good">&lt;q&gt;' in html
