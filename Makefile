@@ -7,12 +7,14 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
 	&& echo $$p && break; done)
 
-.PHONY: help demo test reproduce lint clean
+.PHONY: help demo test reproduce feedforward localisation lint clean
 
 help:
 	@echo 'make demo       install into $(VENV), run the nodes, show forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
+	@echo 'make feedforward   the table and picture of docs/feedforward.md (4 minutes)'
+	@echo 'make localisation  how often compare is right about where the model fails (long)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
 demo: $(VENV)/.demo
@@ -27,6 +29,12 @@ lint: $(VENV)/.test
 
 reproduce: $(VENV)/.demo
 	$(BIN)/pprs reproduce --output output
+
+feedforward: $(VENV)/.demo
+	$(BIN)/python docs/feedforward.py
+
+localisation: $(VENV)/.demo
+	$(BIN)/python benchmarks/localisation.py 100
 
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python

@@ -13,6 +13,8 @@ NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'chrome')
 # Nothing is to be fetched, and nothing is: an address that leads nowhere stands for a network.
 OFFLINE = ('--proxy-server=127.0.0.1:9', '--disable-background-networking', '--disable-sync',
            '--disable-component-update', '--no-first-run', '--disable-quic')
+# The software renderer's remarks on its own pace, told as if the page had spoken.
+ABOUT_PACE = ('GL Driver Message', 'Canvas2D: Multiple readback operations')
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,6 @@ def render(page: Path, picture: Path, width: int = 1280, height: int = 1600) -> 
                 capture_output=True, text=True, timeout=120)
         document = document or done.stdout
         # Chromium's own remarks stand beside those of the page, which carry this mark.
-        # The software renderer tells its own pace as if the page had spoken.
         console += [line for line in re.findall(r'CONSOLE[^"]*"(.*)", source', done.stderr)
-                    if 'GL Driver Message' not in line]
+                    if not any(remark in line for remark in ABOUT_PACE)]
     return Rendered(document, console, picture)
