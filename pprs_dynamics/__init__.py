@@ -1,8 +1,29 @@
 """Dynamics of the 3-PPRS parallel robot with friction in every joint."""
 
-from pprs_dynamics.errors import PprsError
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel, ModelState
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pprs_dynamics.errors import PprsError
+    from pprs_dynamics.mechanism.motion import PlatformMotion
+    from pprs_dynamics.model.drive_model import DriveForces, DriveModel, ModelState
 
 __all__ = ['DriveForces', 'DriveModel', 'ModelState', 'PlatformMotion', 'PprsError']
 __version__ = '0.1.0'
+
+# Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
+_HOMES = {
+    'DriveForces': 'pprs_dynamics.model.drive_model',
+    'DriveModel': 'pprs_dynamics.model.drive_model',
+    'ModelState': 'pprs_dynamics.model.drive_model',
+    'PlatformMotion': 'pprs_dynamics.mechanism.motion',
+    'PprsError': 'pprs_dynamics.errors',
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(import_module(_HOMES[name]), name)

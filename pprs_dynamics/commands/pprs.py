@@ -13,6 +13,7 @@ from importlib import import_module
 
 from pprs_dynamics import __version__
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.threads import use_one_thread
 
 # Each a module of this folder with a docstring, add_arguments and run.
 COMMANDS = ('compare', 'info', 'reproduce', 'simulate')
@@ -20,6 +21,7 @@ COMMANDS = ('compare', 'info', 'reproduce', 'simulate')
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
+    use_one_thread()
     options = _parser().parse_args(arguments)
     try:
         status: int = import_module(f'{__package__}.{options.command}').run(options)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import sys
 
+from pprs_dynamics.threads import use_one_thread
+
 
 def feedforward() -> int:
     """Run `ros2 run pprs_dynamics feedforward`."""
@@ -27,6 +29,7 @@ def simulated_robot() -> int:
 
 
 def _run(module: str, node: str) -> int:
+    use_one_thread()
     try:
         import rclpy  # noqa: F401
     except ImportError:
