@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
         for finding in recording.findings:
             screen.print(f'[yellow]![/] {escape(recording.name)}: {escape(finding.text)}')
     with progress_bar(screen, 'motion and model') as progress:
-        residuals, reconstructions = measure_residuals(model, recordings, progress)
+        residuals, notes = measure_residuals(model, recordings, progress)
     with progress_bar(screen, 'where it fails') as progress:
         where = localise(residuals, progress=lambda share: progress(share, 1.0))
     comparison = compare(residuals, where)
@@ -49,6 +49,6 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, {**comparison.to_json(), 'verdict': comparison.verdict})
     if options.report:
-        page = comparison_page(model, recordings, residuals, comparison, reconstructions)
+        page = comparison_page(model, recordings, residuals, comparison, notes)
         screen.print(f'page: {escape(str(page.write(options.report)))}')
     return 0

@@ -22,8 +22,8 @@ PAUSE = 1.0
 def measure_residuals(
     model: DriveModel, recordings: Sequence[Recording],
     progress: Callable[[float, float], None] | None = None,
-) -> tuple[Residuals, tuple[Reconstruction, ...]]:
-    """Return measured and modelled efforts of recordings side by side.
+) -> tuple[Residuals, tuple[str, ...]]:
+    """Return measured and modelled efforts of recordings side by side, and how, in words.
 
     Parameters
     ----------
@@ -42,7 +42,8 @@ def measure_residuals(
     ResidualsError
         Where no effort was measured.
     """
-    tables, reconstructions = [], []
+    tables: list[dict[str, Array]] = []
+    notes: list[str] = []
     total = 2.0 * sum(len(recording.time) for recording in recordings)
     done = 0.0
     for recording in recordings:
@@ -59,8 +60,10 @@ def measure_residuals(
 
         tables.append(_table(model, reconstruction, report_model))
         done += len(recording.time)
-        reconstructions.append(reconstruction)
-    return _joined(tables), tuple(reconstructions)
+        notes += reconstruction.notes
+        # Motion at full rate takes several times the room of all that follows.
+        del reconstruction
+    return _joined(tables), tuple(notes)
 
 
 def _table(
@@ -91,7 +94,8 @@ def _joined(tables: list[dict[str, Array]]) -> Residuals:
         table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
         table['segment'] = table['segment'] + segments
         start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
-    joined = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+    joined = (tables[0] if len(tables) == 1 else
+              {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
     platform = joined.pop('platform')
     variables = {name: joined.pop(name) for name in DRIVE_VARIABLES}
     variables.update(zip(PLATFORM_VARIABLES, platform.T, strict=True))

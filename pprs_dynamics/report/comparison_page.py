@@ -7,7 +7,6 @@ from pathlib import Path
 
 from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.measurement.reconstruction import Reconstruction
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.report import comparison_figures as figures
@@ -20,7 +19,7 @@ HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained',
 
 def comparison_page(
     model: DriveModel, recordings: Sequence[Recording], residuals: Residuals,
-    comparison: Comparison, reconstructions: Sequence[Reconstruction],
+    comparison: Comparison, notes: Sequence[str],
 ) -> Page:
     """Return the page of one comparison, most important first."""
     page = Page('Model against measurement')
@@ -53,7 +52,7 @@ def comparison_page(
     page.heading('Spectrum of the error')
     page.figure(figures.spectrum(residuals, comparison))
     page.heading('How it was computed')
-    page.bullets([note for reconstruction in reconstructions for note in reconstruction.notes])
+    page.bullets(notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
     if findings:
