@@ -21,13 +21,12 @@ from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.robot_view import write_robot_page
 from pprs_dynamics.report.tables import console
 from pprs_dynamics.simulation.drive_control import ControlSettings
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
+from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM, draw_effects
 from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import SensorSettings
 
 RATE = 500.0
 FEEDFORWARDS = ('friction', 'rigid_body', 'none')
-WHITE_SHARE = 0.64
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', metavar='RECORDING', required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*HIDDEN_EFFECTS, 'random'),
+                        choices=(*HIDDEN_EFFECTS, RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
                         f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}')
     parser.add_argument('--scale', type=at_least(0.0), default=1.0,
@@ -61,9 +60,7 @@ def run(options: argparse.Namespace) -> int:
     forces = model.drive_forces(motion)
     model.limits.check_strokes(forces.mechanism.position)
     rng = np.random.default_rng(options.seed)
-    names = [str(rng.choice(sorted(HIDDEN_EFFECTS))) if name == 'random' else name
-             for name in options.effect]
-    effects = [draw_effect(name, rng, options.scale) for name in names]
+    effects = draw_effects(options.effect, rng, options.scale)
     effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
     with progress_bar(screen, 'simulating') as progress:
         result = simulate(
@@ -71,8 +68,7 @@ def run(options: argparse.Namespace) -> int:
                                   effort[options.feedforward]),
             effects, seed=options.seed, rate=RATE, truth=False,
             control=ControlSettings(gravity_compensation=options.feedforward == 'none'),
-            sensors=SensorSettings(white_noise=options.noise * WHITE_SHARE ** 0.5,
-                                   coloured_noise=options.noise * (1 - WHITE_SHARE) ** 0.5),
+            sensors=SensorSettings.with_effort_noise(options.noise),
             progress=lambda share: progress(share, 1.0))
     write_recording(options.output, Recording.from_arrays(
         Path(options.output).name, result.time, result.position, result.velocity, result.effort))

@@ -22,7 +22,7 @@ from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.setpoints import SetpointQueue
 from pprs_dynamics.nodes.status import StatusReporter
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
+from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.robot import SimulatedRobot
 from pprs_dynamics.simulation.sensors import SensorSettings
 
@@ -47,7 +47,6 @@ PARAMETERS = (
 LONGEST_CATCH_UP = 0.5
 # Between them the executor takes one command: with more, commands at 200 Hz would pile up.
 CYCLES_AT_ONCE = 2
-WHITE_SHARE = 0.64
 LATE_SHARE = 0.001
 
 
@@ -161,16 +160,12 @@ def _robot(values: Any, own: dict[str, Any]) -> SimulatedRobot:
     if 2000 % own['rate']:
         raise ModelError('rate', own['rate'], PARAMETERS[0].rule)
     rng = np.random.default_rng(own['seed'])
-    names = [str(rng.choice(sorted(HIDDEN_EFFECTS))) if name == 'random' else name
-             for name in own['hidden_effects']]
-    effects = [draw_effect(name, rng, own['hidden_scale']) for name in names]
-    noise = own['effort_noise']
+    effects = draw_effects(own['hidden_effects'], rng, own['hidden_scale'])
     return SimulatedRobot(
         values, effects, seed=own['seed'], rate=own['rate'],
         control=ControlSettings(
             own['stiffness'], own['damping'], gravity_compensation=not own['use_effort'],
             command_timeout=own['command_timeout'],
             actuation_delay=own['actuation_delay']),
-        sensors=SensorSettings(
-            quantisation=own['encoder_resolution'], white_noise=noise * WHITE_SHARE ** 0.5,
-            coloured_noise=noise * (1 - WHITE_SHARE) ** 0.5))
+        sensors=SensorSettings.with_effort_noise(
+            own['effort_noise'], own['encoder_resolution']))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -34,6 +35,22 @@ NOT_IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effec
 """Effects that no catalogue effect explains."""
 
 HIDDEN_EFFECTS = {**IN_CATALOGUE, **NOT_IN_CATALOGUE}
+RANDOM = 'random'
+
+
+def draw_effects(
+    names: Sequence[str], rng: np.random.Generator, scale: float = 1.0,
+) -> list[HiddenEffect]:
+    """Return a hidden effect per name; the name `random` stands for one drawn at random.
+
+    Raises
+    ------
+    HiddenEffectError
+        For a name that no effect has.
+    """
+    drawn = [str(rng.choice(sorted(HIDDEN_EFFECTS))) if name == RANDOM else name
+             for name in names]
+    return [draw_effect(name, rng, scale) for name in drawn]
 
 
 def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> HiddenEffect:
