@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -119,7 +120,7 @@ class PlatformMotion:
         return PlatformMotion.from_poses(
             self.time, self.position, self.orientation, at=grid).with_time(grid)
 
-    @property
+    @cached_property
     def rotation(self) -> Array:
         """Rotation matrices from `platform` to `base`, (N, 3, 3)."""
         x, y, z, w = self.orientation.T

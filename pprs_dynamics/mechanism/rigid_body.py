@@ -15,7 +15,7 @@ import numpy as np
 from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics
 from pprs_dynamics.mechanism.jacobians import Jacobians, wrench_rows
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array, ChainVector, Robot
+from pprs_dynamics.mechanism.robot import Array, ChainVector, Robot, cross_rows
 
 
 class Reactions(NamedTuple):
@@ -63,12 +63,12 @@ def platform_wrench(robot: Robot, motion: PlatformMotion) -> Array:
     omega, epsilon = motion.angular_velocity, motion.angular_acceleration
     d = rotation @ np.asarray(masses.centre)
     inertia = rotation @ masses.inertia_tensor @ np.swapaxes(rotation, 1, 2)
-    a_centre = (motion.linear_acceleration + np.cross(epsilon, d)
-                + np.cross(omega, np.cross(omega, d)))
+    a_centre = (motion.linear_acceleration + cross_rows(epsilon, d)
+                + cross_rows(omega, cross_rows(omega, d)))
     force = masses.total * (a_centre - np.asarray(robot.gravity))              # Eq. (6)
     I_epsilon = (inertia @ epsilon[..., None])[..., 0]
     I_omega = (inertia @ omega[..., None])[..., 0]
-    moment = I_epsilon + np.cross(omega, I_omega) + np.cross(d, force)         # Eq. (6)
+    moment = I_epsilon + cross_rows(omega, I_omega) + cross_rows(d, force)         # Eq. (6)
     return np.concatenate((force, moment), axis=1)
 
 

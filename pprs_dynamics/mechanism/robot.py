@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 ELBOWS = ('up', 'down')
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class ChainVector(NamedTuple):
@@ -36,6 +37,11 @@ def add(a: ChainVector, b: ChainVector) -> ChainVector:
 def cross(a: ChainVector, b: ChainVector) -> ChainVector:
     """Return a x b."""
     return ChainVector(a.n * b.k - a.k * b.n, a.k * b.e - a.e * b.k, a.e * b.n - a.n * b.e)
+
+
+def cross_rows(a: Array, b: Array) -> Array:
+    """Return a x b for (N, 3) arrays; a quarter of the time of numpy's, which does more."""
+    return a[:, _NEXT] * b[:, _LAST] - a[:, _LAST] * b[:, _NEXT]
 
 
 class ChainFrames:
@@ -67,8 +73,12 @@ class ChainFrames:
 
     def base(self, vector: ChainVector) -> Array:
         """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
-        e, n, k = np.broadcast_arrays(*vector)
-        return np.stack((e * self.cos - n * self.sin, e * self.sin + n * self.cos, k), axis=-1)
+        e, n, k = vector
+        result = np.empty((*e.shape, 3))
+        result[..., 0] = e * self.cos - n * self.sin
+        result[..., 1] = e * self.sin + n * self.cos
+        result[..., 2] = k
+        return result
 
 
 @dataclass(frozen=True)
