@@ -16,9 +16,6 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MissingLibraryError, MotionError
 from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
 from pprs_dynamics.model.model_file import build_model
-
-pytest.importorskip('mujoco')
-
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import DRIVES, HiddenEffectError
 from pprs_dynamics.simulation.hidden_effects import (
