@@ -142,9 +142,11 @@ class LiveComparison:
 
     def _forces(self, samples: list[LiveSample]) -> Array:
         found = solve_forward_motion(
-            self._model.robot.geometry, np.stack([sample.position for sample in samples]),
+            self._model.robot.geometry,
+            np.stack([sample.position for sample in samples]) - self._model.position_error,
             np.stack([sample.velocity for sample in samples]),
             np.stack([sample.acceleration for sample in samples]), self._seed)
         self._seed = found.motion[-1:]
         motion = found.motion.with_time([sample.time for sample in samples])
-        return self._model.drive_forces(motion, self._state).total
+        forces = self._model.drive_forces(motion, self._state)
+        return self._model.measured(forces, self._state).total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -58,19 +58,32 @@ def measure_residuals(
             if progress is not None:
                 progress(before + samples, total)
 
-        tables.append(_table(model, reconstruction, report_model))
+        tables.append(treated_table(model, reconstruction, report_model))
         done += len(recording.time)
         notes += reconstruction.notes
         # Motion at full rate takes several times the room of all that follows.
         del reconstruction
-    return _joined(tables), tuple(notes)
+    return join_tables(tables), tuple(notes)
 
 
-def _table(
-    model: DriveModel, reconstruction: Reconstruction, progress: Callable[[int, int], None],
+def treated_table(
+    model: DriveModel, reconstruction: Reconstruction,
+    progress: Callable[[int, int], None] | None = None,
+    more: Callable[[DriveForces], Mapping[str, Array]] = lambda forces: {},
 ) -> dict[str, Array]:
+    """Return all that a comparison needs of one recording, treated, by name.
+
+    Parameters
+    ----------
+    model : DriveModel
+    reconstruction : Reconstruction
+    progress : callable, optional
+    more : callable, optional
+        Gives further quantities to be treated, see `treated_forces`.
+    """
     treat = reconstruction.treat
-    table = treated_forces(model, reconstruction, progress, _variables)
+    table = treated_forces(model, reconstruction, progress,
+                           lambda forces: {**_variables(forces), **more(forces)})
     table['measured'] = treat(reconstruction.effort)
     table['time'] = treat(reconstruction.time[:, None])[:, 0]
     for name in DRIVE_VARIABLES[:3]:
@@ -88,7 +101,8 @@ def _variables(forces: DriveForces) -> dict[str, Array]:
             'rod_angle': np.tile(mechanism.chains.rod_angle, 2)}
 
 
-def _joined(tables: list[dict[str, Array]]) -> Residuals:
+def join_tables(tables: list[dict[str, Array]]) -> Residuals:
+    """Return the residuals of recordings one after the other, from their tables."""
     start, segments = 0.0, 0.0
     for table in tables:
         table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import Any, ClassVar, Self
 
 from pprs_dynamics.errors import MISSING, ModelError
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 
 
@@ -25,6 +23,8 @@ class Parameter:
         Bounds, both allowed.
     default : float, optional
         Value where a model file is silent; required in the file without one.
+    scale : float
+        A size at which it matters, for numerical derivatives.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Parameter:
     lower: float
     upper: float
     default: float | None = None
+    scale: float = 1.0
 
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
@@ -53,13 +54,16 @@ class Effect(ABC):
     ----------------
     name : str
         Name in files, topics and reports.
+
+    Attributes
+    ----------
     is_measurement : bool
         True where it describes what the sensor says, not what the drive must do: it enters
         comparisons and the monitor, never a command.
     """
 
     name: ClassVar[str]
-    is_measurement: ClassVar[bool] = False
+    is_measurement: bool = False
 
     @abstractmethod
     def force(self, state: MechanismState, memory: Any = None) -> Array:
@@ -85,34 +89,110 @@ class Effect(ABC):
                              f'come from a model with this very {self.name}')
 
 
+@dataclass(frozen=True)
+class Card:
+    """What a person needs to know of an effect.
+
+    Parameters
+    ----------
+    equation : str
+    looks_like : str
+        How it shows in the residual.
+    causes : str
+        What usually causes it.
+    confirm : str
+        How to confirm it on the machine.
+    reference : str
+    """
+
+    equation: str
+    looks_like: str
+    causes: str
+    confirm: str
+    reference: str
+
+
 class CatalogueEffect(Effect):
     """An effect that a model file may add under `effects`, with values for its parameters.
 
+    What is fitted is linear in `coefficients`, which are the linear parameters unless a subclass
+    says how the one follows from the other, and not linear in `shape`.
+
     Class attributes
     ----------------
+    card : Card
+    linear, shape : tuple of Parameter
     parameters : tuple of Parameter
+        Both.
+    coefficients : tuple of Parameter
+    variants : tuple of tuple of str
+        Sets of coefficients that are tried, the others being zero; by default all at once.
+    scanned : tuple of str
+        Coefficients with which shapes are searched; by default all.
+    unphysical_below : mapping of str to float
+        Parameters that make the force unphysical below that value (negative friction).
+    may_be_measurement : bool
+        True where a model file may declare it a sensor's, in `effects.measured`.
     """
 
+    card: ClassVar[Card]
+    linear: ClassVar[tuple[Parameter, ...]]
+    shape: ClassVar[tuple[Parameter, ...]] = ()
     parameters: ClassVar[tuple[Parameter, ...]]
+    coefficients: ClassVar[tuple[Parameter, ...]]
+    variants: ClassVar[tuple[tuple[str, ...], ...]]
+    scanned: ClassVar[tuple[str, ...]]
+    unphysical_below: ClassVar[Mapping[str, float]] = {}
+    may_be_measurement: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        if hasattr(cls, 'linear'):
+            cls.parameters = cls.linear + cls.shape
+            if 'coefficients' not in vars(cls):
+                cls.coefficients = cls.linear
+            if 'variants' not in vars(cls):
+                cls.variants = (tuple(c.name for c in cls.coefficients),)
+            if 'scanned' not in vars(cls):
+                cls.scanned = tuple(c.name for c in cls.coefficients)
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(self.name)
 
     @classmethod
     @abstractmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> CatalogueEffect:
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
         """Build the effect from its block in a model file, or raise ModelError.
 
         With `complete` false, values may be missing and the result only says that those given
         are right: a node gets an effect's parameters one by one before it becomes active.
         """
 
+    @abstractmethod
+    def to_file(self) -> dict[str, Any]:
+        """Return the block from which `from_file` makes this effect."""
+
+    @classmethod
+    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the coefficients that belong to parameters."""
+        return {c.name: values[c.name] for c in cls.coefficients}
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """Return the linear parameters that belong to coefficients."""
+        return dict(coefficients)
+
     @classmethod
     def _checked(cls, prefix: str, values: Any, complete: bool) -> dict[str, float]:
         if not isinstance(values, Mapping):
-            raise ModelError(prefix, values, f'map {_names(cls.parameters)} to numbers')
+            raise ModelError(prefix, values, f'map {names(cls.parameters)} to numbers')
         known = {parameter.name: parameter for parameter in cls.parameters}
         for name in values:
             if name not in known:
                 raise ModelError(f'{prefix}.{name}', values[name],
-                                 f'not be there: {cls.name} has {_names(cls.parameters)}')
+                                 f'not be there: {cls.name} has {names(cls.parameters)}')
         checked = {}
         for name, parameter in known.items():
             if name not in values and parameter.default is None:
@@ -124,74 +204,6 @@ class CatalogueEffect(Effect):
         return checked
 
 
-class DriveEffect(CatalogueEffect):
-    """An effect that acts in drives, each with its own parameters.
-
-    Its force is linear in the parameters called `linear`: the sum of coefficient times column.
-    What is not linear (`shape`) enters the columns.
-    """
-
-    linear: ClassVar[tuple[Parameter, ...]]
-    shape: ClassVar[tuple[Parameter, ...]] = ()
-
-    def __init_subclass__(cls) -> None:
-        if hasattr(cls, 'linear'):
-            cls.parameters = cls.linear + cls.shape
-
-    def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
-        self.drives = {drive: dict(values) for drive, values in drives.items()}
-
-    def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and vars(self) == vars(other)
-
-    def __hash__(self) -> int:
-        return hash((self.name, tuple(self.drives)))
-
-    @abstractmethod
-    def columns(self, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return one (N,) column per linear parameter, for one drive."""
-
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return the effect's drive forces [N], (N, 6)."""
-        force = np.zeros_like(state.velocity)
-        for name, values in self.drives.items():
-            index = DRIVES.index(name)
-            samples = DriveSamples(
-                state.time, state.position[:, index], state.velocity[:, index],
-                state.acceleration[:, index], state.direction[:, index],
-                state.guide_load[:, index], None if memory is None else memory[name])
-            columns = self.columns(samples, **{p.name: values[p.name] for p in self.shape})
-            for parameter, column in zip(self.linear, columns, strict=True):
-                force[:, index] += values[parameter.name] * column
-        return force
-
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> DriveEffect:
-        """Build the effect from `{drive: {parameter: value}}`."""
-        prefix = f'effects.{cls.name}'
-        if not isinstance(values, Mapping) or not values:
-            raise ModelError(prefix, values, 'map drives to parameters, e.g. lift_1: '
-                             f'{{{_names(cls.parameters)}}}')
-        for drive in values:
-            if drive not in DRIVES:
-                raise ModelError(f'{prefix}.{drive}', values[drive],
-                                 f'sit on one of the drives {", ".join(DRIVES)}')
-        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
-                    for drive, block in values.items()})
-
-
-@dataclass(frozen=True)
-class DriveSamples:
-    """What one drive did: all (N,); `time` is None where unknown, `direction` is sgn."""
-
-    time: Array | None
-    position: Array
-    velocity: Array
-    acceleration: Array
-    direction: Array
-    guide_load: Array
-    memory: Any = None
-
-
-def _names(parameters: tuple[Parameter, ...]) -> str:
+def names(parameters: tuple[Parameter, ...]) -> str:
+    """Return the names of parameters, for a sentence."""
     return ', '.join(parameter.name for parameter in parameters)

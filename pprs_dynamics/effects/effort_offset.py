@@ -1,4 +1,4 @@
-"""A constant force on a drive, whatever it does."""
+"""A constant force on a drive, whatever it does: F_0."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from pprs_dynamics.effects.effect import DriveEffect, DriveSamples, Parameter
+from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.mechanism.robot import Array
 
 
@@ -14,8 +15,19 @@ class EffortOffset(DriveEffect):
     """Constant force: a counterbalance, a hanging cable, a biased amplifier."""
 
     name: ClassVar[str] = 'effort_offset'
-    linear = (Parameter('force', 'F_0', 'N', 'constant force', -1e6, 1e6),)
+    may_be_measurement: ClassVar[bool] = True
+    linear = (Parameter('force', 'F_0', 'N', 'constant force', -1e6, 1e6, scale=0.5),)
+    card = Card(
+        'F_0',
+        'the same error at every position, speed and direction, at rest as well',
+        'zero of the force or current sensor, bias of the amplifier, a counterbalance or a '
+        'hanging cable, a slide that is not level (then all drives show it: base_tilt)',
+        'read the effort with the drive uncoupled or the amplifier disabled: what is left is the '
+        'sensor\'s; else hang the cable or counterbalance off and repeat',
+        'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
+        'on the offset of motor currents')
 
-    def columns(self, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return (1,)."""
         return (np.ones_like(drive.velocity),)

@@ -36,8 +36,7 @@ class JointFriction:
     def resistance(self, load: Array, speed: Array, reversal_rate: float) -> Array:
         """Return k = c + mu d/2 N sgn(s)/s [N m s/rad], so that the moment is -k s."""
         dry = self.coulomb * self.diameter / 2 * load                          # Eq. (1)
-        k: Array = self.viscous + dry * sign_over_speed(speed, reversal_rate)  # Eq. (2), (9)
-        return k
+        return resistance(self.viscous, dry, speed, reversal_rate)
 
 
 class Resistances(NamedTuple):
@@ -45,6 +44,51 @@ class Resistances(NamedTuple):
 
     revolute: Array
     spherical: Array
+
+
+def resistance(viscous: float, dry: Array | float, speed: Array, reversal_rate: float) -> Array:
+    """Return k = c + M sgn(s)/s [N m s/rad] for dry friction M [N m]: the moment is -k s."""
+    k: Array = viscous + dry * sign_over_speed(speed, reversal_rate)           # Eq. (2), (9)
+    return k
+
+
+def relative_rate(state: MechanismState) -> ChainVector:
+    """Return omega_n = u_dot_i n_i - omega, of the rod relative to the platform [rad/s]."""
+    omega = state.chains.angular_velocity
+    return ChainVector(-omega.e, state.chains.u_dot - omega.n, -omega.k)       # Eq. (9)
+
+
+def spherical_speed(state: MechanismState) -> Array:
+    """Return |omega_n| in A_i [rad/s], (N, 3)."""
+    omega_n = relative_rate(state)
+    speed: Array = np.sqrt(omega_n.e ** 2 + omega_n.n ** 2 + omega_n.k ** 2)
+    return speed
+
+
+def overcome(state: MechanismState, resistances: Resistances, printed: bool = False) -> Array:
+    """Return the drive forces that overcome resistances in the joints, (N, 6) [N].
+
+    By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
+
+    Notes
+    -----
+    The corrected form is exact: k_si acts on u_dot_i n_i - omega of its own chain. The printed
+    form gives the same total power and another share per drive.
+    """
+    k_r, k_s = resistances
+    u_dot, omega = state.chains.u_dot, state.motion.angular_velocity
+    omega_n = state.chains.angular_velocity.n
+    if printed:
+        about_u = (k_r + k_s) * u_dot - 2 * k_s * omega_n                      # Eq. (12)
+        about_platform = k_s.sum(axis=1, keepdims=True) * omega                # Eq. (12)
+    else:
+        relative = state.robot.geometry.frames.base(relative_rate(state))
+        about_u = (k_r + k_s) * u_dot - k_s * omega_n                          # Eq. (12)
+        about_platform = -np.einsum('ni,nij->nj', k_s, relative)               # Eq. (12)
+    jacobians = state.jacobians
+    force: Array = (np.einsum('nij,ni->nj', jacobians.J_u, about_u)
+                    + np.einsum('nij,ni->nj', jacobians.J_omega, about_platform))
+    return force
 
 
 @dataclass(frozen=True)
@@ -70,17 +114,9 @@ class PassiveFriction(Effect):
         r, chains, rate = state.rigid_body.reactions, state.chains, state.reversal.rate
         k_r = self.revolute.resistance(
             np.sqrt(r.V_star ** 2 + r.W_star ** 2), np.abs(chains.u_dot), rate)
-        omega_n = self.relative_rate(state)
         k_s = self.spherical.resistance(
-            np.sqrt(r.H ** 2 + r.V ** 2 + r.W ** 2),
-            np.sqrt(omega_n.e ** 2 + omega_n.n ** 2 + omega_n.k ** 2), rate)
+            np.sqrt(r.H ** 2 + r.V ** 2 + r.W ** 2), spherical_speed(state), rate)
         return Resistances(k_r, k_s)
-
-    @staticmethod
-    def relative_rate(state: MechanismState) -> ChainVector:
-        """Return omega_n = u_dot_i n_i - omega, of the rod relative to the platform [rad/s]."""
-        omega = state.chains.angular_velocity
-        return ChainVector(-omega.e, state.chains.u_dot - omega.n, -omega.k)   # Eq. (9)
 
     @abstractmethod
     def force(self, state: MechanismState, memory: Any = None) -> Array:
@@ -89,34 +125,13 @@ class PassiveFriction(Effect):
 
 @dataclass(frozen=True)
 class WholeMechanismFriction(PassiveFriction):
-    """The first approach: a virtual motion of a drive moves every passive joint, Eq. (12).
-
-    Notes
-    -----
-    The corrected form is exact: k_si acts on u_dot_i n_i - omega of its own chain. The printed
-    form gives the same total power and another share per drive.
-    """
+    """The first approach: a virtual motion of a drive moves every passive joint, Eq. (12)."""
 
     approach: ClassVar[str] = 'whole_mechanism'
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N], by virtual power."""
-        k_r, k_s = self.resistances(state)
-        u_dot, omega = state.chains.u_dot, state.motion.angular_velocity
-        omega_n = state.chains.angular_velocity.n
-        if self.printed:
-            about_u = (k_r + k_s) * u_dot - 2 * k_s * omega_n                  # Eq. (12)
-            about_platform = k_s.sum(axis=1, keepdims=True) * omega            # Eq. (12)
-        else:
-            frames = state.robot.geometry.frames
-            relative = self.relative_rate(state)
-            about_u = (k_r + k_s) * u_dot - k_s * omega_n                      # Eq. (12)
-            about_platform = -np.einsum(
-                'ni,nij->nj', k_s, frames.base(relative))                      # Eq. (12)
-        jacobians = state.jacobians
-        force: Array = (np.einsum('nij,ni->nj', jacobians.J_u, about_u)
-                        + np.einsum('nij,ni->nj', jacobians.J_omega, about_platform))
-        return force
+        return overcome(state, self.resistances(state), self.printed)
 
 
 @dataclass(frozen=True)
@@ -160,7 +175,7 @@ class IndependentChainsFriction(PassiveFriction):
                 f'{smallest.min():.3g}, where friction.approach independent_chains is unbounded',
                 f'limits.rod_cosine is {self.minimum_cosine:g}')
         k_r, k_s = self.resistances(state)
-        omega_n = self.relative_rate(state)
+        omega_n = relative_rate(state)
         lever = state.robot.geometry.rod_length * state.chains.cos_u
         sign = -1.0 if self.printed else 1.0
         M_s_up, M_s_n = -k_s * omega_n.k, -k_s * omega_n.n                     # Eq. (9)

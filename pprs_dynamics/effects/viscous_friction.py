@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
-from pprs_dynamics.effects.effect import DriveEffect, DriveSamples, Parameter
+from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.mechanism.robot import Array
 
 
@@ -12,8 +14,20 @@ class ViscousFriction(DriveEffect):
     """Force in proportion to velocity: lubricant, motor damping, a current loop's back-EMF."""
 
     name: ClassVar[str] = 'viscous_friction'
-    linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity', -1e6, 1e6),)
+    linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity', -1e6, 1e6, scale=5.0),)
+    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
+    card = Card(
+        'c q_dot',
+        'a straight line through zero over velocity, the same forwards and backwards; nothing '
+        'at low speed',
+        'stiff or cold grease, too much grease, seals, eddy currents and back-EMF of the motor, '
+        'a damper or cable chain that drags',
+        'run the drive at several constant speeds, both ways: the force must rise in proportion; '
+        'repeat warm, or with other grease: the slope must change',
+        'Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and '
+        'compensation methods for the control of machines with friction, Automatica 30, 1994')
 
-    def columns(self, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return (q_dot,)."""
         return (drive.velocity,)

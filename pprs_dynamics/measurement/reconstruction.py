@@ -8,7 +8,7 @@ Jacobian. Effort is only cut to the same samples. `Reconstruction.treat` is for 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -148,6 +148,8 @@ def reconstruct(
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(DRIVES)}, in this order', 'shape')
     drives = smooth_drives(recording, window)
+    if isinstance(robot, DriveModel) and np.any(robot.position_error):
+        drives = replace(drives, position=drives.position - robot.position_error)
     time, total = recording.time[drives.index], len(drives.index)
     motion, near, jumps = _platform_motion(geometry, time, drives, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
@@ -193,7 +195,7 @@ def treated_forces(
     for chunk in reconstruction.chunks():
         if chunk.is_start:
             state = model.initial_state()
-        forces = model.drive_forces(chunk.motion, state)
+        forces = model.measured(model.drive_forces(chunk.motion, state), state)
         for name, values in {**forces.parts, 'total': forces.total, **more(forces)}.items():
             if name not in treated:
                 treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))

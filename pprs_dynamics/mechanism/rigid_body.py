@@ -18,6 +18,24 @@ from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import Array, ChainVector, Robot, cross_rows
 
 
+class StructureLoad(NamedTuple):
+    """What the drives must overcome beside bodies and gravity.
+
+    Parameters
+    ----------
+    wrench : (N, 6) array
+        Force [N] and moment about o [N m] on the platform, in `base`.
+    hinge : (N, 3) array
+        Moment about n_i that resists growing u_i in C_i [N m].
+    """
+
+    wrench: Array
+    hinge: Array
+
+    def __add__(self, other: StructureLoad) -> StructureLoad:  # type: ignore[override]
+        return StructureLoad(self.wrench + other.wrench, self.hinge + other.hinge)
+
+
 class Reactions(NamedTuple):
     """Reactions of the spherical joints on the platform, and loads of the joints below.
 
@@ -74,7 +92,7 @@ def platform_wrench(robot: Robot, motion: PlatformMotion) -> Array:
 
 def solve_inverse_dynamics(
     robot: Robot, motion: PlatformMotion, chains: ChainKinematics, jacobians: Jacobians,
-    *, printed: bool = False,
+    *, printed: bool = False, load: StructureLoad | None = None,
 ) -> RigidBody:
     """Return frictionless drive forces, reactions and guide loads.
 
@@ -86,6 +104,8 @@ def solve_inverse_dynamics(
     jacobians : Jacobians
     printed : bool
         Take Eq. (7) to the letter, which lacks the factor l in its rod term.
+    load : StructureLoad, optional
+        Loads beside bodies and gravity.
     """
     frames, l = robot.geometry.frames, robot.geometry.rod_length
     m_slide, m_lift = np.asarray(robot.masses.slides), np.asarray(robot.masses.lifts)
@@ -96,10 +116,13 @@ def solve_inverse_dynamics(
 
     # Step 1: the rod about C_i.
     W = m_b * (c_u * f.k + s_u * f.e) / 2 + m_b * l * u_ddot / 3               # Eq. (5)
+    wrench = platform_wrench(robot, motion)
+    if load is not None:
+        W, wrench = W + load.hinge / l, wrench + load.wrench
 
     # Step 2: the platform. Rows of [B] are the wrenches of unit H_i and V_i.
     pushed = np.einsum('ni,nij->nj', W, wrench_rows(frames, chains.rod_normal, chains.arm))
-    remaining = platform_wrench(robot, motion) - pushed
+    remaining = wrench - pushed
     HV = np.einsum('nij,ni->nj', jacobians.B_inverse, remaining)               # Eq. (6)
     H, V = HV[:, :3], HV[:, 3:]
 

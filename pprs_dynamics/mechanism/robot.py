@@ -13,6 +13,7 @@ from pprs_dynamics.errors import ModelError
 Array = NDArray[np.float64]
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
+AXIS = 'axis'  # the drive of a single axis
 ELBOWS = ('up', 'down')
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import Effect
+from pprs_dynamics.effects.structure_effect import BodyEffect
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal
-from pprs_dynamics.mechanism.robot import Array, Robot
+from pprs_dynamics.mechanism.robot import DRIVES, Array, Robot
 from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
 from pprs_dynamics.model.limits import Limits
 
@@ -152,17 +154,61 @@ class DriveModel:
             See `mechanism`. Strokes and efforts are not checked here: `limits` does that, so
             that recordings beyond them can still be compared.
         """
-        mechanism = self.mechanism(motion)
+        return self.forces_at(self.mechanism(motion), state)
+
+    def forces_at(
+        self, mechanism: MechanismState, state: ModelState | None = None,
+    ) -> DriveForces:
+        """Return the forces at a solved state of the mechanism; see `drive_forces`."""
         parts = {RIGID_BODY: mechanism.rigid_body.force}
         state = self.initial_state() if state is None else state
         for effect in self.effects:
             effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            # Bodies and what acts on them change the loads that friction follows: they go first.
             for effect in self.effects:
-                if not effect.is_measurement:
+                if isinstance(effect, BodyEffect):
+                    loaded = effect.apply(mechanism)
+                    parts[effect.name] = loaded.rigid_body.force - mechanism.rigid_body.force
+                    mechanism = loaded
+            for effect in self.effects:
+                if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
             total: Array = np.sum(list(parts.values()), axis=0)                # Eq. (14)
         return DriveForces(total, parts, mechanism)
+
+    def measured(self, forces: DriveForces, state: ModelState | None = None) -> DriveForces:
+        """Return what the sensors say where the drives apply `forces`.
+
+        Effects of measurement become parts of their own; without any, `forces` are returned.
+
+        Parameters
+        ----------
+        forces : DriveForces
+            Consecutive samples with times, of `drive_forces`.
+        state : ModelState, optional
+            As there.
+        """
+        sensors = [effect for effect in self.effects if effect.is_measurement]
+        if not sensors:
+            return forces
+        mechanism, parts, total = forces.mechanism, dict(forces.parts), forces.total
+        state = self.initial_state() if state is None else state
+        for effect in sensors:
+            memory = state.memories[effect.name]
+            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
+                     if isinstance(effect, MeasurementEffect)
+                     else total + effect.force(mechanism, memory))
+            parts[effect.name], total = after - total, after
+        return DriveForces(total, parts, mechanism)
+
+    @property
+    def position_error(self) -> Array:
+        """What must be taken off measured drive positions [m], (6,)."""
+        errors = [effect.position_error(DRIVES) for effect in self.effects
+                  if isinstance(effect, MeasurementEffect)]
+        total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(DRIVES))
+        return total
 
     def condition_number(self, motion: PlatformMotion) -> Array:
         """Return the condition number of the drive Jacobian, rotations times r, (N,).

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -35,10 +37,30 @@ class Limits:
     rod_sine: float
     rod_cosine: float
 
+    @cached_property
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each drive [m], (6,) each."""
+        return (np.repeat((self.slide_stroke[0], self.lift_stroke[0]), 3),
+                np.repeat((self.slide_stroke[1], self.lift_stroke[1]), 3))
+
+    @cached_property
+    def efforts(self) -> Array:
+        """Largest absolute force of each drive [N], (6,)."""
+        return np.asarray(self.effort, dtype=float)
+
+    def with_efforts(self, effort: Sequence[float]) -> Limits:
+        """Return these limits with the smaller of two limits on every drive's force [N]."""
+        first, second, third, fourth, fifth, sixth = np.minimum(self.efforts, effort).tolist()
+        return replace(self, effort=(first, second, third, fourth, fifth, sixth))
+
+    def clamped(self, forces: Array) -> Array:
+        """Return forces, (N, 6), moved to the limit where they are over it."""
+        clamped: Array = np.clip(forces, -self.efforts, self.efforts)
+        return clamped
+
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, 6), outside its stroke."""
-        lower = np.repeat((self.slide_stroke[0], self.lift_stroke[0]), 3)
-        upper = np.repeat((self.slide_stroke[1], self.lift_stroke[1]), 3)
+        lower, upper = self.strokes
         outside = ~((positions >= lower) & (positions <= upper))
         if np.any(outside):
             sample, drive = (int(i) for i in np.argwhere(outside)[0])
@@ -49,7 +71,7 @@ class Limits:
 
     def check_efforts(self, forces: Array) -> None:
         """Raise LimitError for the first force, (N, 6), over its limit."""
-        over = ~(np.abs(forces) <= np.asarray(self.effort))
+        over = ~(np.abs(forces) <= self.efforts)
         if np.any(over):
             sample, drive = (int(i) for i in np.argwhere(over)[0])
             raise LimitError(sample, DRIVES[drive], float(forces[sample, drive]),

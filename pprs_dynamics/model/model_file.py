@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,15 @@ from typing import Any
 import yaml
 
 from pprs_dynamics.effects.active_friction import ActiveFriction
-from pprs_dynamics.effects.catalogue import CATALOGUE
-from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.effects.passive_friction import (
     IndependentChainsFriction,
     JointFriction,
     PassiveFriction,
     WholeMechanismFriction,
 )
+from pprs_dynamics.effects.structure_effect import BodyEffect
 from pprs_dynamics.errors import MISSING, ModelError, UnreadableFileError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.robot import Geometry, Masses, Robot
@@ -33,6 +34,7 @@ from pprs_dynamics.model.limits import Limits
 
 DEFAULT_MODEL = 'config/paper.yaml'
 # Blocks whose keys are not listed one by one.
+LISTS = ('effects.active', 'effects.measured')
 ADDED = ('effects.', 'tolerances.', 'history.')
 
 
@@ -156,6 +158,7 @@ def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
     else:
         passive = IndependentChainsFriction(*joints, printed, limits.rod_cosine)
     effects = (ActiveFriction(**group('friction.drives.')), passive, *_added_effects(parameters))
+    _require_bodies(robot, effects)
     for name, value in parameters.items():
         if name.startswith(ADDED):
             values[name] = value
@@ -172,22 +175,46 @@ def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
     if len(set(active)) < len(active):
         raise ModelError('effects.active', list(active), 'name each effect once')
     for name in active:
-        if name not in CATALOGUE:
+        if find_effect(name) is None:
             raise ModelError('effects.active', list(active), f'name known effects, not {name!r}'
-                             + _suggestion(name, CATALOGUE) + f': {", ".join(CATALOGUE)}')
+                             + _suggestion(name, catalogue()) + f': {", ".join(catalogue())}')
     blocks = _nested('effects', {key: value for key, value in parameters.items()
-                                 if key.startswith('effects.') and key != 'effects.active'})
+                                 if key.startswith('effects.') and key not in LISTS})
+    of_sensors = _effects_of_sensors(parameters)
     for name, block in blocks.items():
-        if name not in CATALOGUE:
+        kind = find_effect(name)
+        if kind is None:
             raise ModelError(f'effects.{name}', block, 'belong to a known effect'
-                             + _suggestion(name, CATALOGUE) + f': {", ".join(CATALOGUE)}')
+                             + _suggestion(name, catalogue()) + f': {", ".join(catalogue())}')
         # A block that is not active is checked all the same, but may still be incomplete.
-        effect = CATALOGUE[name].from_file(block, complete=name in active)
+        effect = kind.from_file(block, complete=name in active)
         if name in active:
+            if name in of_sensors:
+                effect.is_measurement = True
             yield effect
     missing = [name for name in active if name not in blocks]
     if missing:
         raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
+
+
+def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
+    names = parameters.get('effects.measured', [])
+    if not isinstance(names, (list, tuple)) or not all(
+            isinstance(name, str) and (kind := find_effect(name)) is not None
+            and kind.may_be_measurement for name in names):
+        raise ModelError('effects.measured', names, "be a list of effects that may be a sensor's:"
+                         ' effort_offset')
+    return list(names)
+
+
+def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:
+    """Raise ModelError where effects leave bodies that cannot be."""
+    for effect in effects:
+        if isinstance(effect, BodyEffect):
+            robot = effect.changed(robot)
+            if not robot.masses.total > 0 or min(robot.masses.rods) < 0:
+                raise ModelError(f'effects.{effect.name}', effect.to_file(),
+                                 'leave masses greater than 0')
 
 
 def _check_tolerances(parameters: Mapping[str, Any]) -> None:

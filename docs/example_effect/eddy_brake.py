@@ -1,0 +1,50 @@
+"""Eddy current brake on a drive: c q_dot / (1 + (q_dot / v_c)^2).
+
+An effect of one's own, complete: this file, and one line in pyproject.toml. After `pip install .`
+it may stand in model files, and `pprs diagnose` looks for it.
+
+References
+----------
+J. H. Wouterse, Critical torque and speed of eddy current brake with widely separated soft iron
+poles, IEE Proceedings B 138 (1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.mechanism.robot import Array
+
+
+class EddyBrake(DriveEffect):
+    """A magnet over a conducting rail: it brakes most at the critical velocity, less beyond."""
+
+    name: ClassVar[str] = 'eddy_brake'
+    # The force is linear in these: one column each ...
+    linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity near rest', 0.0, 1e6,
+                        scale=1.0),)
+    # ... and these shape the columns: they are searched for, starting from `trials`.
+    shape = (Parameter('critical_velocity', 'v_c', 'm/s', 'velocity of the largest force', 1e-4,
+                       100.0, scale=0.05),)
+    card = Card(
+        'c q_dot / (1 + (q_dot / v_c)^2)',
+        'grows with velocity, then falls again; never a step at a reversal',
+        'a magnet near a conducting part that moves',
+        'take the magnet away and repeat',
+        'Wouterse, IEE Proceedings B 138, 1991')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (q_dot / (1 + (q_dot / v_c)^2),)."""
+        return (drive.velocity / (1 + (drive.velocity / shape['critical_velocity']) ** 2),)
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return critical velocities from a tenth of the top speed to twice it."""
+        top = np.clip(covered.top_speed, 1e-3, 50.0)
+        return [{'critical_velocity': float(v)} for v in np.geomspace(0.1 * top, 2 * top, 6)]

@@ -1,0 +1,252 @@
+"""Which effects the errors call for: proposed by a scan, judged with the noise refitted.
+
+A scan under one noise model only proposes: noise fitted to an error that holds an effect
+swallows part of it, and noise fitted to what a rich regression leaves is too optimistic where
+noise is slow. Each proposal is judged by likelihoods in which the noise is fitted once with the
+effect and once without it, must pay its penalty and a margin, and must predict blocks of the
+recording that it was not fitted to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.diagnosis.noise import NoiseModel
+from pprs_dynamics.diagnosis.regression import solve
+from pprs_dynamics.diagnosis.scan import Candidate, Library, Scan
+
+MOST_EFFECTS = 6
+MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
+PROPOSALS = 4  # of each scan
+# What an adopted effect leaves may be its form, which is an idealisation: a further effect on
+# the same drives has to gain this share of what it gained.
+FORM_SHARE = 0.03
+FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0  # standard errors of the blocks' losses
+# A rival this near in score, or as near as one standard error of the blocks' losses, explains
+# as well.
+NEAR_SCORE = 10.0
+SWAP = 4.0  # in score, for which an adopted effect gives way to another
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate beside what is adopted, with the noise refitted.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    fit : JointFit
+        With it.
+    evidence : float
+        Gain less penalty and margin.
+    """
+
+    candidate: Candidate
+    fit: JointFit
+    evidence: float
+
+
+@dataclass
+class Selection:
+    """What was adopted, and what competed.
+
+    Parameters
+    ----------
+    adopted : list of Judged
+        In order.
+    fit : JointFit
+        Of all.
+    candidates : list of Judged
+        The best of every effect that was judged as the first, best first.
+    suspects : list of Judged
+        What only slow noise could explain otherwise.
+    rivals : dict of str to list of str
+        Effects that explain as well as an adopted one.
+    """
+
+    adopted: list[Judged]
+    fit: JointFit
+    start: JointFit
+    candidates: list[Judged] = field(default_factory=list)
+    suspects: list[Judged] = field(default_factory=list)
+    rivals: dict[str, list[str]] = field(default_factory=dict)
+
+
+class Selector:
+    """Forward selection with pruning and swapping.
+
+    Parameters
+    ----------
+    regression : Regression
+    progress : callable, optional
+        Called with the share that is done.
+    """
+
+    def __init__(self, regression: Regression,
+                 progress: Callable[[float], None] | None = None) -> None:
+        self.regression = regression
+        self._report = progress or (lambda share: None)
+        self.library = Library(regression)
+        self.rich = {d: self._rich_noise(d) for d in regression.series}
+
+    def select(self) -> Selection:
+        """Return the effects that the errors call for."""
+        start = self.regression.fit((), self.rich)
+        selection = Selection([], start, start)
+        while len(selection.adopted) < MOST_EFFECTS:
+            judged = self._judge_proposals(selection)
+            if not selection.adopted:
+                selection.candidates = judged
+            self._report((len(selection.adopted) + 1) / (MOST_EFFECTS + 2))
+            winner = next((one for one in judged if self._stands(one, selection)), None)
+            if winner is None:
+                selection.suspects = [one for one in judged if self._is_suspect(one, selection)]
+                break
+            selection.adopted.append(winner)
+            selection.fit = winner.fit
+            self._prune(selection)
+        self._swap(selection)
+        selection.rivals = self._find_rivals(selection)
+        self._report(1.0)
+        return selection
+
+    def _rich_noise(self, d: int) -> NoiseModel:
+        """Noise of what a drive's regression on nearly all effects leaves."""
+        series = self.regression.series[d]
+        rows = [self.regression.base_rows[d]]
+        rows += [term.rows[d][:, series.index] for term in self.library.structure
+                 if d in term.rows]
+        seen: dict[str, int] = {}
+        for term in self.library.local[d]:
+            name = term.effect.name
+            seen[name] = seen.get(name, 0) + 1
+            every = max(1, self.library.trials[name, d] // 3)
+            if name != 'force_ripple' and not term.fixed and seen[name] % every == every // 2:
+                rows.append(term.rows[d][:, series.index])
+        stacked = np.concatenate(rows)
+        stacked = stacked[np.any(stacked, axis=1)]
+        rest = series.error - solve(stacked, series.error) @ stacked
+        noise = series.fit_noise(rest)
+        white = series.whiten(noise, np.concatenate((stacked, series.error[None])))
+        return series.fit_noise(series.error - solve(white[:-1], white[-1]) @ stacked)
+
+    def _actives(self, adopted: Sequence[Judged]) -> tuple[Active, ...]:
+        return tuple(active for one in adopted for active in one.candidate.active)
+
+    def _judge_proposals(self, selection: Selection) -> list[Judged]:
+        """Return proposals of two scans, each judged, best first."""
+        active = self._actives(selection.adopted)
+        chosen: dict[tuple[str, tuple[int, ...] | None], Candidate] = {}
+        for noises in (selection.fit.noises, self.rich):
+            scan = Scan(self.library, active, noises)
+            for candidate in scan.candidates()[:PROPOSALS]:
+                if candidate.score > -MARGIN:
+                    refined = scan.refined(candidate)
+                    chosen.setdefault((refined.name, refined.drives), refined)
+        judged = [self.judge(candidate, selection.fit, active) for candidate in chosen.values()]
+        best: dict[str, Judged] = {}
+        for one in sorted(judged, key=lambda one: -one.evidence):
+            best.setdefault(one.candidate.name, one)
+        return list(best.values())
+
+    def judge(self, candidate: Candidate, without: JointFit,
+              active: tuple[Active, ...]) -> Judged:
+        """Return a candidate's evidence beside active terms, the noise refitted."""
+        spans = candidate.drives is None or any(
+            len(one.term.rows) > 1 for one in candidate.active)
+        touched = list(self.regression.series) if spans else list(candidate.drives or ())
+        starts = {**without.noises, **{d: self.rich[d] for d in touched}}
+        fit = self.regression.fit((*active, *candidate.active), starts, touched)
+        gain = without.deviance - fit.deviance
+        if gain > candidate.penalty:
+            gain = min(gain, self.regression.guarded_gain(fit, active))
+        return Judged(candidate, fit, gain - candidate.penalty - MARGIN)
+
+    def _stands(self, one: Judged, selection: Selection) -> bool:
+        if one.evidence <= 0:
+            return False
+        active = self._actives(selection.adopted)
+        before = self.regression.block_losses(active, one.fit.noises)
+        after = self.regression.block_losses(one.fit.active, one.fit.noises)
+        change = before - after
+        errors = FURTHER_ERRORS if selection.adopted else FIRST_ERRORS
+        if change.mean() <= errors * change.std(ddof=1) / np.sqrt(len(change)):
+            return False
+        mine = one.candidate.drives
+        for other in selection.adopted:
+            theirs = other.candidate.drives
+            shared = mine is None or theirs is None or set(mine) & set(theirs)
+            if shared and one.evidence < FORM_SHARE * other.evidence:
+                return False
+        return True
+
+    def _is_suspect(self, one: Judged, selection: Selection) -> bool:
+        """Return whether an effect would stand if the noise were as a rich regression says."""
+        if one.evidence > 0:
+            return False
+        scan = Scan(self.library, self._actives(selection.adopted), self.rich)
+        gain = sum(scan.gain(active) for active in one.candidate.active)
+        return gain - one.candidate.penalty - MARGIN > 0
+
+    def _prune(self, selection: Selection) -> None:
+        """Drop what no longer pays beside what came after it."""
+        while len(selection.adopted) > 1:
+            worst, drop = 0.0, None
+            for k, one in enumerate(selection.adopted[:-1]):
+                others = selection.adopted[:k] + selection.adopted[k + 1:]
+                fit = self.regression.fit(self._actives(others), selection.fit.noises)
+                value = fit.deviance - selection.fit.deviance - one.candidate.penalty - MARGIN
+                if value < worst:
+                    worst, drop, kept = value, k, fit
+            if drop is None:
+                return
+            del selection.adopted[drop]
+            selection.fit = kept
+
+    def _swap(self, selection: Selection) -> None:
+        """Give an adopted effect's place to another that does better beside the rest."""
+        for k in range(len(selection.adopted) if len(selection.adopted) > 1 else 0):
+            others = selection.adopted[:k] + selection.adopted[k + 1:]
+            active = self._actives(others)
+            scan = Scan(self.library, active, selection.fit.noises)
+            without = self.regression.fit(active, selection.fit.noises)
+            found = [scan.refined(one) for one in scan.candidates()[:2]]
+            judged = [self.judge(one, without, active) for one in found]
+            own = next((one for one in judged
+                        if one.candidate.name == selection.adopted[k].candidate.name), None)
+            current = without.deviance - selection.fit.deviance - (
+                selection.adopted[k].candidate.penalty + MARGIN)
+            best = max(judged, key=lambda one: one.evidence)
+            limit = max(current, own.evidence if own else current)
+            if best.evidence > limit + SWAP or best is own:
+                selection.adopted[k] = best
+                selection.fit = best.fit
+
+    def _find_rivals(self, selection: Selection) -> dict[str, list[str]]:
+        """Return, for each adopted effect, those that explain as well in its place."""
+        rivals: dict[str, list[str]] = {}
+        for k, one in enumerate(selection.adopted):
+            others = selection.adopted[:k] + selection.adopted[k + 1:]
+            active = self._actives(others)
+            noises = selection.fit.noises
+            scan = Scan(self.library, active, noises)
+            found = scan.candidates()
+            mine = next((c for c in found if c.name == one.candidate.name), one.candidate)
+            mine = scan.refined(mine)
+            losses = self.regression.block_losses((*active, *mine.active), noises)
+            near = []
+            for candidate in found[:8]:
+                if candidate.name == mine.name or candidate.score < mine.score / 2:
+                    continue
+                refined = scan.refined(candidate)
+                change = self.regression.block_losses((*active, *refined.active), noises) - losses
+                error = change.std(ddof=1) / np.sqrt(len(change))
+                if refined.score > mine.score - NEAR_SCORE or change.mean() <= error:
+                    near.append(refined.name)
+            if near:
+                rivals[one.candidate.name] = near
+        return rivals

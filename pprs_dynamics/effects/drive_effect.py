@@ -1,0 +1,153 @@
+"""Effects that act in single drives, each with its own parameters."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from pprs_dynamics.effects.effect import CatalogueEffect, names
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.mechanism.robot import AXIS, DRIVES, Array
+from pprs_dynamics.mechanism.state import DriveStates
+
+
+@dataclass(frozen=True)
+class DriveSamples:
+    """What one drive did: all (N,); `time` is None where unknown, `direction` is sgn."""
+
+    time: Array | None
+    position: Array
+    velocity: Array
+    acceleration: Array
+    direction: Array
+    guide_load: Array
+    memory: Any = None
+
+    @classmethod
+    def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
+        """Return one drive's share of a state."""
+        return cls(state.time, state.position[:, drive], state.velocity[:, drive],
+                   state.acceleration[:, drive], state.direction[:, drive],
+                   state.guide_load[:, drive], memory)
+
+    def with_memory(self, memory: Any) -> DriveSamples:
+        """Return the same with a memory."""
+        return replace(self, memory=memory)
+
+
+@dataclass(frozen=True)
+class DriveRange:
+    """What a recording covers, from which grids of shape parameters are made.
+
+    Parameters
+    ----------
+    duration, step : float
+        Of the recording, and between samples [s].
+    stroke : float
+        Between the lowest and the highest position [m].
+    top_speed : float
+        [m/s]
+    """
+
+    duration: float
+    step: float
+    stroke: float
+    top_speed: float
+
+
+class DriveEffect(CatalogueEffect):
+    """An effect that acts in drives, each with its own parameters.
+
+    Its force is linear in the coefficients: the sum of coefficient times column. What is not
+    linear (`shape`) enters the columns.
+    """
+
+    def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
+        self.drives = {drive: dict(values) for drive, values in drives.items()}
+
+    @classmethod
+    @abstractmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return one (N,) column per coefficient, for one drive.
+
+        An effect with memory finds it in `drive.memory` and advances it to the last sample.
+        """
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return the shape parameters to try first; they are refined between them."""
+        return ({},)
+
+    @classmethod
+    def averaged(cls, drive: DriveSamples, period: float,
+                 shapes: Sequence[Mapping[str, float]]) -> Array | None:
+        """Return columns of `scanned` for many shapes from means over `period`, (S, k, N).
+
+        None where columns of means do not give means of columns: then every sample is used.
+        """
+        return None
+
+    @classmethod
+    def drive_memory(cls) -> Any:
+        """Return a fresh memory of one drive, or None for an effect without one."""
+        return None
+
+    def initial_memory(self) -> Any:
+        """Return a fresh memory per drive, or None for an effect without one."""
+        if self.drive_memory() is None:
+            return None
+        return {drive: self.drive_memory() for drive in self.drives}
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N], (N, D)."""
+        force = np.zeros_like(state.velocity)
+        for name, values in self.drives.items():
+            index = state.drives.index(name)
+            samples = DriveSamples.of(state, index, None if memory is None else memory[name])
+            columns = self.columns(samples, **{p.name: values[p.name] for p in self.shape})
+            coefficients = self.to_coefficients(values)
+            for coefficient, column in zip(self.coefficients, columns, strict=True):
+                force[:, index] += coefficients[coefficient.name] * column
+        return force
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from `{drive: {parameter: value}}`."""
+        prefix = f'effects.{cls.name}'
+        if not isinstance(values, Mapping) or not values:
+            raise ModelError(prefix, values, 'map drives to parameters, e.g. lift_1: '
+                             f'{{{names(cls.parameters)}}}')
+        for drive in values:
+            if drive not in (*DRIVES, AXIS):
+                raise ModelError(f'{prefix}.{drive}', values[drive],
+                                 f'sit on one of the drives {", ".join(DRIVES)}')
+        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
+                    for drive, block in values.items()})
+
+    def to_file(self) -> dict[str, Any]:
+        """Return `{drive: {parameter: value}}`."""
+        return {drive: dict(values) for drive, values in self.drives.items()}
+
+
+class MeasurementEffect(DriveEffect):
+    """What the sensors of a drive say beside the truth. It never enters a command."""
+
+    is_measurement = True
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return no force: the drive does not feel its sensors."""
+        return tuple(np.zeros_like(drive.velocity) for _ in cls.coefficients)
+
+    def position_error(self, drives: Sequence[str]) -> Array:
+        """Return what must be taken off measured positions [m], (D,)."""
+        return np.zeros(len(drives))
+
+    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
+               memory: Any = None) -> Array:
+        """Return what the sensors say where the drives apply `effort` (N, D) [N]."""
+        return effort

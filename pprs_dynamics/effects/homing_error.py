@@ -1,0 +1,37 @@
+"""A drive whose zero is off: its encoder says q + z where the drive stands at q.
+
+References
+----------
+J.-P. Merlet, Parallel Robots, 2nd ed., 2006, chapter on calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.mechanism.robot import Array
+
+
+class HomingError(MeasurementEffect):
+    """The whole mechanism stands elsewhere than its encoders say."""
+
+    name: ClassVar[str] = 'homing_error'
+    linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
+                        scale=0.001),)
+    card = Card(
+        'measured position = q + z',
+        'a slowly changing error on several drives at once, largest where the rods lean most: '
+        'weight and inertia are shared out among the drives by the wrong pose',
+        'a homing switch that moved, a lost encoder count, an index pulse one turn away, a '
+        'drive mounted a little aside',
+        'home the drive again and repeat; check the zero with a gauge block',
+        'Merlet, Parallel Robots, 2006')
+
+    def position_error(self, drives: Sequence[str]) -> Array:
+        """Return z of each drive [m], (D,)."""
+        return np.array([self.drives.get(name, {}).get('zero', 0.0) for name in drives])

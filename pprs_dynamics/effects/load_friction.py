@@ -1,0 +1,34 @@
+"""A friction coefficient of the guide that is not the model's: dmu N sgn(q_dot)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.mechanism.robot import Array
+
+
+class LoadFriction(DriveEffect):
+    """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
+
+    name: ClassVar[str] = 'load_friction'
+    linear = (Parameter('coefficient', 'dmu', '1', 'friction coefficient beyond the model\'s',
+                        -100.0, 100.0, scale=0.02),)
+    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
+    card = Card(
+        'dmu N sgn(q_dot), N the load of the guide',
+        'a step at each reversal, like coulomb_friction, but higher where the guide carries more: '
+        'with payload, at full reach, while the platform accelerates',
+        'a friction coefficient from a catalogue, dry, worn or dirty guides; plain guides where '
+        'rolling ones were assumed',
+        'run the drive slowly to and fro without payload, then with it: the step at reversal must '
+        'grow with the load (if it does not: coulomb_friction); clean and lubricate, and repeat',
+        'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
+        'depending on load and velocity, IROS, 2010')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (N sgn q_dot,)."""
+        return (drive.guide_load * drive.direction,)

@@ -1,0 +1,38 @@
+"""A payload heavier or lighter than the model's, in the same place.
+
+References
+----------
+J. Swevers, W. Verdonck, J. De Schutter, Dynamic model identification for industrial robots,
+IEEE Control Systems Magazine 27 (2007), on payload identification.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pprs_dynamics.effects.altered_masses import with_masses
+from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.mechanism.robot import Robot
+
+
+class PayloadMass(BodyEffect):
+    """Mass more at the centre of mass, as a point: the inertia about it stays."""
+
+    name: ClassVar[str] = 'payload_mass'
+    linear = (Parameter('mass', 'm_+', 'kg', 'mass beyond masses.payload', -1e3, 1e3,
+                        scale=0.1),)
+    card = Card(
+        'M + m -> M + m + m_+, at the centre of mass',
+        'an offset of all three lifts with the sign of the mass, about a third of its weight '
+        'each, and with it errors on all six drives that follow the acceleration of the platform',
+        'another tool or workpiece than the model was told, a hose or cable that hangs on the '
+        'platform, a gripper that was not counted',
+        'weigh the payload; repeat without it, or with a known weight more: the offset must '
+        'change by just that weight. Only accelerations tell it from a constant downward force, '
+        'so move fast',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+
+    def changed(self, robot: Robot) -> Robot:
+        """Return the robot with the other payload."""
+        return with_masses(robot, payload=robot.masses.payload + self.values['mass'])

@@ -1,0 +1,45 @@
+"""More moments of inertia of platform and payload than the model says.
+
+References
+----------
+J. Swevers, W. Verdonck, J. De Schutter, Dynamic model identification for industrial robots,
+IEEE Control Systems Magazine 27 (2007), on payload identification.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pprs_dynamics.effects.altered_masses import with_masses
+from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.mechanism.robot import Robot
+
+MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
+
+
+class PlatformInertia(BodyEffect):
+    """Inertia more about the centre of mass, without mass."""
+
+    name: ClassVar[str] = 'platform_inertia'
+    linear = (
+        *(Parameter(axes, f'I_{axes}', 'kg m^2', f'moment of inertia beyond {axes} of the model',
+                    -1e3, 1e3, scale=0.005) for axes in MOMENTS),
+        *(Parameter(axes, f'I_{axes}', 'kg m^2', f'tensor element beyond {axes} of the model',
+                    -1e3, 1e3, 0.0, scale=0.005) for axes in PRODUCTS))
+    variants = (MOMENTS, MOMENTS + PRODUCTS)
+    card = Card(
+        '[I] -> [I] + [I_xx I_xy I_xz; I_xy I_yy I_yz; I_xz I_yz I_zz], in platform',
+        'errors that follow the angular acceleration of the platform, and nothing at rest, at '
+        'steady speed or while it keeps its orientation',
+        'a wide or long payload taken as a point, an inertia from a drawing that left out the '
+        'gripper, axes of the tensor mixed up',
+        'turn the platform back and forth about one axis, with its position kept: the error must '
+        'grow with the square of the frequency',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+
+    def changed(self, robot: Robot) -> Robot:
+        """Return the robot with the other inertia."""
+        more = (self.values[p.name] for p in self.parameters)
+        inertia = tuple(I + I_more for I, I_more in zip(robot.masses.inertia, more, strict=True))
+        return with_masses(robot, inertia=inertia)

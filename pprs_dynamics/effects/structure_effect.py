@@ -1,0 +1,73 @@
+"""Effects on the platform, in the rods and in the passive joints: one set of parameters each."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, Self
+
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.mechanism.rigid_body import StructureLoad
+from pprs_dynamics.mechanism.robot import Array, Robot
+from pprs_dynamics.mechanism.state import MechanismState
+
+
+class StructureEffect(CatalogueEffect):
+    """An effect that is not in the drives.
+
+    Parameters
+    ----------
+    values : mapping
+        By name of the parameter.
+    """
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self.values = dict(values)
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from `{parameter: value}`."""
+        return cls(cls._checked(f'effects.{cls.name}', values, complete))
+
+    def to_file(self) -> dict[str, Any]:
+        """Return `{parameter: value}`."""
+        return dict(self.values)
+
+    @classmethod
+    def at(cls, coefficients: Mapping[str, float]) -> Self:
+        """Return the effect with these coefficients; those not given are zero."""
+        every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
+        return cls(cls.from_coefficients(every))
+
+
+class BodyEffect(StructureEffect):
+    """An effect that changes what moves or is carried: masses, gravity, forces on the bodies.
+
+    It changes the loads of the guides and joints, too, and with them the friction that follows
+    loads: the model applies it before it evaluates friction.
+    """
+
+    def changed(self, robot: Robot) -> Robot:
+        """Return the robot with the effect; by default as it was."""
+        return robot
+
+    def load(self, state: MechanismState) -> StructureLoad | None:
+        """Return what the drives must overcome beside bodies and gravity; by default nothing."""
+        return None
+
+    def apply(self, state: MechanismState) -> MechanismState:
+        """Return the state with the effect in its rigid body."""
+        return state.loaded(self.changed(state.robot), self.load(state))
+
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
+        """Return what the effect adds to the rigid body's drive forces [N], (N, 6)."""
+        added: Array = self.apply(state).rigid_body.force - state.rigid_body.force
+        return added
+
+
+class PassiveJointEffect(StructureEffect):
+    """Friction in the passive joints: a force on top of the rigid body's."""
+
+    @abstractmethod
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N], (N, 6)."""

@@ -1,0 +1,61 @@
+"""How far a motion keeps from what would be refused, so that a warning can come before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.effects.passive_friction import IndependentChainsFriction
+from pprs_dynamics.mechanism.jacobians import condition_number
+from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.state import MechanismState
+from pprs_dynamics.model.drive_model import DriveModel
+
+# Of a long trajectory that many samples are looked at for their condition number, evenly spread:
+# neighbours hardly differ, and a singular value decomposition each would cost more than the model.
+MOST_CONDITIONS = 64
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Smallest distances from the limits over all samples: 0 at the limit, at most 1.
+
+    Parameters
+    ----------
+    singularity : float
+        1 minus the largest of: condition number over its limit, smallest sine of a rod angle
+        over that of the rods, and, with independent chains, the same for the cosine.
+    workspace : float
+        Distance of a drive from an end of its stroke, over half the stroke.
+    drive : str
+        The drive nearest to an end of its stroke.
+    """
+
+    singularity: float
+    workspace: float
+    drive: str
+
+
+def margins(model: DriveModel, mechanism: MechanismState) -> Margins:
+    """Return the margins of a motion that the model has accepted.
+
+    Parameters
+    ----------
+    model : DriveModel
+    mechanism : MechanismState
+        What `model.drive_forces` returned with the forces.
+    """
+    limits = model.limits
+    J = mechanism.jacobians.J
+    step = -(-len(J) // MOST_CONDITIONS)
+    number = condition_number(model.robot.geometry, J[::step])
+    used = [number.max() / limits.condition_number,
+            limits.rod_sine / np.abs(mechanism.chains.sin_u).min()]
+    if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
+        used.append(limits.rod_cosine / np.abs(mechanism.chains.cos_u).min())
+    lower, upper = limits.strokes
+    position = mechanism.position
+    room: Array = np.minimum(position - lower, upper - position).min(axis=0) / (upper - lower) * 2
+    nearest = int(room.argmin())
+    return Margins(float(1 - max(used)), float(room[nearest]), DRIVES[nearest])
