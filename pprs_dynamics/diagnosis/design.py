@@ -86,7 +86,10 @@ class BaseColumn:
 
 @dataclass(frozen=True)
 class FullRate:
-    """What the drives did at every sample of a recording, in segments; (N, 6) arrays."""
+    """What the drives did at every sample of a recording, in segments; (N, 6) arrays.
+
+    `effort` is the model's, `effort_measured` the recording's.
+    """
 
     time: Array
     position: Array
@@ -95,6 +98,7 @@ class FullRate:
     direction: Array
     guide_load: Array
     effort: Array
+    effort_measured: Array
     segments: tuple[slice, ...]
     treat: Treatment
 
@@ -145,7 +149,9 @@ class Design:
         numbers = known_numbers(model)
         absent = [e for e in catalogue().values() if issubclass(e, StructureEffect)
                   and e.name not in {effect.name for effect in model.effects}]
-        tables, full, notes = [], [], []
+        tables: list[dict[str, Array]] = []
+        full: list[FullRate] = []
+        notes: list[str] = []
         for k, recording in enumerate(recordings):
             reconstruction = reconstruct(model, recording)
 
@@ -324,4 +330,4 @@ class _Collector:
             np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
         return FullRate(
             reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
-            effort, reconstruction.segments, reconstruction.treat)
+            effort, reconstruction.effort, reconstruction.segments, reconstruction.treat)

@@ -42,6 +42,36 @@ class Active:
         """Number of coefficients that are fitted."""
         return 0 if self.term.fixed else len(self.variant)
 
+    @property
+    def fixed(self) -> bool:
+        """True where its only row has the coefficient 1."""
+        return self.term.fixed
+
+    def on(self, d: int) -> Array | None:
+        """Return its rows on a drive, (k, M), None where it has none."""
+        rows = self.term.rows.get(d)
+        return rows if rows is None or self.fixed else rows[self.chosen]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns without an effect behind them, to be fitted beside active terms."""
+
+    rows: dict[int, Array]
+    fixed: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients that are fitted."""
+        return len(next(iter(self.rows.values())))
+
+    def on(self, d: int) -> Array | None:
+        """Return its rows on a drive, (k, M), None where it has none."""
+        return self.rows.get(d)
+
+
+Fitted = Active | Columns
+
 
 @dataclass(frozen=True)
 class JointFit:
@@ -60,7 +90,7 @@ class JointFit:
         -2 log-likelihood, with the priors and the noise models' penalties.
     """
 
-    active: tuple[Active, ...]
+    active: tuple[Fitted, ...]
     coefficients: Array
     covariance: Array
     noises: dict[int, NoiseModel]
@@ -89,6 +119,8 @@ class Regression:
             rows = [design.base[k].rows[d][series.index] for k in index]
             self.base_index[d] = index
             self.base_rows[d] = (np.stack(rows) if rows else np.zeros((0, len(series.index))))
+        self.nuisance = np.array([k for k, column in enumerate(design.base)
+                                  if column.kind == 'width'], dtype=int)
         self.precision = np.array([column.precision for column in design.base])
         self._white: dict[tuple[int, int], tuple[NoiseModel, Array, Array]] = {}
 
@@ -109,15 +141,12 @@ class Regression:
                 self._white.pop(next(iter(self._white)))
         return self._white[key][1:]
 
-    def rows(self, active: Active, d: int) -> Array | None:
+    def rows(self, active: Fitted, d: int) -> Array | None:
         """Return an active term's rows on a drive, (k, n), None where it has none."""
-        rows = active.term.rows.get(d)
-        if rows is None:
-            return None
-        rows = rows if active.term.fixed else rows[active.chosen]
-        return rows[:, self.series[d].index]
+        rows = active.on(d)
+        return None if rows is None else rows[:, self.series[d].index]
 
-    def assemble(self, active: Sequence[Active], d: int, noise: NoiseModel,
+    def assemble(self, active: Sequence[Fitted], d: int, noise: NoiseModel,
                  ) -> tuple[list[int], Array, Array]:
         """Return places in the coefficients, whitened rows and whitened error of a drive."""
         base, y = self.whitened_base(d, noise)
@@ -127,7 +156,7 @@ class Regression:
             rows = self.rows(one, d)
             if rows is not None:
                 white = self.series[d].whiten(noise, rows)
-                if one.term.fixed:
+                if one.fixed:
                     y = y - white[0]
                 else:
                     blocks.append(white)
@@ -135,7 +164,7 @@ class Regression:
             place += one.size
         return index, np.concatenate(blocks), y
 
-    def solve(self, active: Sequence[Active], noises: dict[int, NoiseModel],
+    def solve(self, active: Sequence[Fitted], noises: dict[int, NoiseModel],
               ) -> tuple[Array, Array, float]:
         """Return coefficients, covariance, and the penalised sum of squares, whitened."""
         count = len(self.design.base) + sum(one.size for one in active)
@@ -154,7 +183,7 @@ class Regression:
         covariance = cho_solve(factor, np.eye(count)) * np.outer(scale, scale)
         return coefficients, covariance, yy - float(b @ coefficients)
 
-    def rest(self, active: Sequence[Active], coefficients: Array, d: int) -> Array:
+    def rest(self, active: Sequence[Fitted], coefficients: Array, d: int) -> Array:
         """Return what the fit leaves of a drive's error [N]."""
         series = self.series[d]
         rest = series.error - coefficients[self.base_index[d]] @ self.base_rows[d]
@@ -162,12 +191,12 @@ class Regression:
         for one in active:
             rows = self.rows(one, d)
             if rows is not None:
-                rest = rest - (rows[0] if one.term.fixed
+                rest = rest - (rows[0] if one.fixed
                                else coefficients[place:place + one.size] @ rows)
             place += one.size
         return rest
 
-    def fit(self, active: Sequence[Active], noises: dict[int, NoiseModel],
+    def fit(self, active: Sequence[Fitted], noises: dict[int, NoiseModel],
             refit: Sequence[int] | None = None, iterations: int = FIT_ITERATIONS) -> JointFit:
         """Return the fit with the noise of the drives `refit` (default all) fitted beside it."""
         drives = list(self.series) if refit is None else [d for d in refit if d in self.series]
@@ -182,7 +211,7 @@ class Regression:
         assert best is not None
         return best
 
-    def at(self, active: Sequence[Active], noises: dict[int, NoiseModel]) -> JointFit:
+    def at(self, active: Sequence[Fitted], noises: dict[int, NoiseModel]) -> JointFit:
         """Return the fit under given noise models."""
         coefficients, covariance, squares = self.solve(active, noises)
         deviance = squares
@@ -193,7 +222,7 @@ class Regression:
         rest = {d: self.rest(active, coefficients, d) for d in noises}
         return JointFit(tuple(active), coefficients, covariance, noises, rest, deviance)
 
-    def guarded_gain(self, fit: JointFit, without: Sequence[Active]) -> float:
+    def guarded_gain(self, fit: JointFit, without: Sequence[Fitted]) -> float:
         """Return twice the log-likelihood gain over `without` if noise went on growing slowly.
 
         See `slow_noise`: at the noise of the fit, both sides may use noise slower than the
@@ -221,9 +250,9 @@ class Regression:
             squares.append(yy - float(scale * b @ c))
         return squares[0] - squares[1]
 
-    def block_losses(self, active: Sequence[Active], noises: dict[int, NoiseModel],
-                     blocks: int = BLOCKS) -> Array:
-        """Return the whitened squared error of each block, fitted on the others, (blocks,).
+    def block_losses(self, active: Sequence[Fitted], noises: dict[int, NoiseModel],
+                     blocks: int = BLOCKS) -> BlockLosses:
+        """Return the whitened squared error of each block, fitted on the others.
 
         The priors take part in the fits, so that a number that is known within a tolerance may
         move within it in either.
@@ -242,11 +271,66 @@ class Regression:
                 yy[k] += float(y[at[k]:at[k + 1]] @ y[at[k]:at[k + 1]])
         prior = np.concatenate((self.precision, np.zeros(count - len(self.precision))))
         whole_H, whole_b = H.sum(axis=0) + np.diag(prior), b.sum(axis=0)
-        losses = np.empty(blocks)
-        for k in range(blocks):
-            others = whole_H - H[k]
-            scale = 1 / np.sqrt(np.diag(others) * (1 + WEAK) + 1e-12)
-            matrix = others * np.outer(scale, scale) + 1e-9 * np.eye(count)
-            c = scale * np.linalg.solve(matrix, scale * (whole_b - b[k]))
-            losses[k] = yy[k] - 2 * c @ b[k] + c @ H[k] @ c
-        return losses
+        fits = np.stack([_solved(whole_H - H[k], whole_b - b[k]) for k in range(blocks)])
+        losses = yy - 2 * np.einsum('ki,ki->k', fits, b) + np.einsum('ki,kij,kj->k', fits, H, fits)
+        return BlockLosses(losses, fits, edges)
+
+    def squares(self, active: Sequence[Fitted], coefficients: Array, samples: slice | None = None,
+                ) -> tuple[float, int]:
+        """Return the sum of squared errors [N^2] and their number, without `Regression.nuisance`.
+
+        Parameters
+        ----------
+        active : sequence of Active
+        coefficients : (P,) array
+        samples : slice, optional
+            Of the design's samples; all by default.
+        """
+        kept = coefficients.copy()
+        kept[self.nuisance] = 0.0
+        total, count = 0.0, 0
+        for d, series in self.series.items():
+            part = series.known.copy()
+            if samples is not None:
+                part &= (series.index >= samples.start) & (series.index < samples.stop)
+            rest = self.rest(active, kept, d)[part]
+            total, count = total + float(rest @ rest), count + len(rest)
+        return total, count
+
+    def error(self, active: Sequence[Fitted], coefficients: Array) -> float:
+        """Return the root of the mean squared error, over samples and drives [N]."""
+        total, count = self.squares(active, coefficients)
+        return float(np.sqrt(total / max(count, 1)))
+
+    def held_out_error(self, active: Sequence[Fitted], noises: dict[int, NoiseModel]) -> float:
+        """Return the same over blocks, each predicted from the others [N]."""
+        found = self.block_losses(active, noises)
+        parts = [self.squares(active, fit, slice(round(a), round(b))) for fit, a, b in zip(
+            found.fits, found.edges[:-1], found.edges[1:], strict=True)]
+        return float(np.sqrt(sum(part[0] for part in parts) / max(sum(p[1] for p in parts), 1)))
+
+
+@dataclass(frozen=True)
+class BlockLosses:
+    """Block cross-validation.
+
+    Parameters
+    ----------
+    losses : (B,) array
+        Whitened squared error of each block.
+    fits : (B, P) array
+        Coefficients fitted on the others.
+    edges : (B + 1,) array
+        Of the blocks, in samples of the design.
+    """
+
+    losses: Array
+    fits: Array
+    edges: Array
+
+
+def _solved(H: Array, b: Array) -> Array:
+    scale = 1 / np.sqrt(np.diag(H) * (1 + WEAK) + 1e-12)
+    matrix = H * np.outer(scale, scale) + 1e-9 * np.eye(len(H))
+    solution: Array = scale * np.linalg.solve(matrix, scale * b)
+    return solution

@@ -52,12 +52,15 @@ class DriveFindings:
         The error at `index` without what was stated [N].
     index : (N,) int array
         Samples (of the thinned residuals) that were searched.
+    columns : (C, N) array
+        All that the variables of the statements can carry.
     """
 
     statements: tuple[Statement, ...]
     noise: NoiseModel | None
     remaining: Array
     index: np.typing.NDArray[np.int_]
+    columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -180,7 +183,7 @@ def _search(name: str, state: _Open, threshold: float) -> DriveFindings:
                        {candidate.family.variable for candidate, _ in state.stated})
     if scatter is not None:
         statements.append(word_statement(name, search, scatter, ()))
-    return DriveFindings(tuple(statements), fit.noise, remaining, search.index)
+    return DriveFindings(tuple(statements), fit.noise, remaining, search.index, state.columns)
 
 
 def _best(state: _Open, needed: float) -> tuple[Candidate | None, tuple[str, ...]]:

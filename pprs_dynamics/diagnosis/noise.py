@@ -95,13 +95,13 @@ class NoiseModel:
 
         Linear in `values`: applied to the columns of a regression as to its left-hand side.
         """
-        white = np.zeros(values.shape)
+        white = np.zeros(values.shape, dtype=values.dtype)
         for part in stretches:
             white[..., part] = self._whiten_stretch(values[..., part])
         return white
 
     def _whiten_stretch(self, y: Array) -> Array:
-        white = np.empty(y.shape)
+        white = np.empty(y.shape, dtype=y.dtype)
         n = y.shape[-1]
         reaches = [self.windows[order - 1][1] if order else 0 for order in self.orders]
         total = _running_sum(y) if self.order > SINGLE_LAGS else None
@@ -269,7 +269,7 @@ def _regressors(y: Array, windows: tuple[tuple[int, int], ...], reach: int) -> A
 
 def _running_sum(y: Array) -> Array:
     zero = np.zeros((*y.shape[:-1], 1))
-    return np.concatenate((zero, np.cumsum(y, axis=-1)), axis=-1)
+    return np.concatenate((zero, np.cumsum(y, axis=-1, dtype=float)), axis=-1)
 
 
 def _window_mean(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -22,6 +21,8 @@ from pprs_dynamics.mechanism.robot import Array
 # What the model and the adopted effects have taken already cannot be told apart from them: of
 # its square, at least this share of a column must be its own.
 OWN_SHARE = 1e-7
+SCANNED_SHARE = 1e-5  # the same in single precision
+LEAST_EIGENVALUE = 1e-5
 REFINEMENTS = 12  # evaluations of a shape parameter between its neighbours in the grid
 
 
@@ -64,6 +65,61 @@ class Candidate:
         return self.gain - self.penalty
 
 
+@dataclass(frozen=True)
+class Group:
+    """Terms on one drive with equally many rows.
+
+    Parameters
+    ----------
+    active : list of n Active
+    rows : (n, k) int array
+        Places in the drive's stacked rows.
+    penalties : (n,) array
+    effects : dict of str to slice
+        Of the n, by effect.
+    fixed : bool
+    """
+
+    active: list[Active]
+    rows: np.typing.NDArray[np.int_]
+    penalties: Array
+    effects: dict[str, slice]
+    fixed: bool
+
+    @classmethod
+    def of(cls, active: list[Active], rows: list[list[int]], penalties: list[float],
+           fixed: bool) -> Group:
+        """Return the group, its effects each in one run."""
+        order = sorted(range(len(active)), key=lambda k: active[k].term.effect.name)
+        names = [active[k].term.effect.name for k in order]
+        effects = {name: slice(names.index(name), names.index(name) + names.count(name))
+                   for name in dict.fromkeys(names)}
+        return cls([active[k] for k in order], np.array([rows[k] for k in order]),
+                   np.array([penalties[k] for k in order]), effects, fixed)
+
+    def gains(self, white: Array, gone: Array, sides: Array) -> Array:
+        """Return twice the log-likelihood gain of each, (n,)."""
+        own = white[self.rows]
+        gram = (own @ own.transpose(0, 2, 1)).astype(float)
+        taken = gone.T[self.rows]
+        S = gram - taken @ taken.transpose(0, 2, 1)
+        b = sides[self.rows]
+        size = np.einsum('nkk->nk', S)
+        if self.fixed:
+            gains: Array = 2 * b[:, 0] - size[:, 0]
+            return gains
+        possible = np.all(size > SCANNED_SHARE * np.einsum('nkk->nk', gram), axis=1)
+        scale = 1 / np.sqrt(np.where(possible[:, None], size, 1.0))
+        b = b * scale
+        if self.rows.shape[1] == 1:
+            return np.where(possible, b[:, 0] ** 2, 0.0)
+        values, axes = np.linalg.eigh(S * scale[:, :, None] * scale[:, None, :])
+        along = np.einsum('nkj,nk->nj', axes, b)
+        kept = values > LEAST_EIGENVALUE
+        gains = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
+        return np.where(possible, gains, 0.0)
+
+
 class Library:
     """All terms that the catalogue offers for a design.
 
@@ -92,16 +148,40 @@ class Library:
                 shapes = effect.trials(design.covered[d])
                 self.trials[effect.name, d] = len(shapes)
                 self.local[d] += design.trial_terms(effect, d, shapes)
-        self._stacked: dict[int, tuple[Array, list[int]]] = {}
+        self._groups: dict[int, list[Group]] = {}
+        self._rows: dict[int, Array] = {}
+        self._white: dict[int, list[tuple[NoiseModel, Array]]] = {d: [] for d in self.local}
 
-    def stacked(self, d: int) -> tuple[Array, list[int]]:
-        """Return all local rows of a drive, (n, N), and where each term's begin."""
-        if d not in self._stacked:
-            series = self.regression.series[d]
-            rows = [term.rows[d][:, series.index] for term in self.local[d]]
-            ends = np.cumsum([0, *(len(block) for block in rows)]).tolist()
-            self._stacked[d] = (np.concatenate(rows), ends)
-        return self._stacked[d]
+    def groups(self, d: int) -> list[Group]:
+        """Return all local terms in all variants, grouped by their number of rows."""
+        if d not in self._groups:
+            sizes: dict[tuple[int, bool], list[tuple[Active, list[int]]]] = {}
+            first = 0
+            for term in self.local[d]:
+                for variant in scanned_variants(term.effect):
+                    active = Active(term, variant)
+                    rows = [0] if term.fixed else active.chosen
+                    sizes.setdefault((len(rows), term.fixed), []).append(
+                        (active, [first + row for row in rows]))
+                first += len(term.rows[d])
+            self._groups[d] = [
+                Group.of([active for active, _ in found], [rows for _, rows in found],
+                         [self.penalty(active) for active, _ in found], fixed)
+                for (_, fixed), found in sizes.items()]
+        return self._groups[d]
+
+    def whitened(self, d: int, noise: NoiseModel) -> Array:
+        """Return all local rows of a drive, whitened, (n, N), in single precision."""
+        for known, white in self._white[d]:
+            if known is noise:
+                return white
+        series = self.regression.series[d]
+        if d not in self._rows:
+            self._rows[d] = np.concatenate(
+                [term.rows[d][:, series.index] for term in self.local[d]]).astype(np.float32)
+        white = series.whiten(noise, self._rows[d])
+        self._white[d] = [*self._white[d][-1:], (noise, white)]
+        return white
 
     def penalty(self, active: Active) -> float:
         """Return the price of one term: its coefficients, shapes, variants and place."""
@@ -174,7 +254,7 @@ class Scan:
         return _gain(S, b, whole, active)
 
     def terms(self) -> Iterator[tuple[Active, float]]:
-        """Yield every term in every variant, with its gain."""
+        """Yield every term that is not on one drive alone, in every variant, with its gain."""
         taken = {(one.term.effect.name, one.term.drive) for one in self.active}
         for term in (*self.library.structure, *self.library.spanning):
             if (term.effect.name, term.drive) in taken or not any(
@@ -184,23 +264,28 @@ class Scan:
             for variant in term.effect.variants or ((),):
                 active = Active(term, variant)
                 yield active, _gain(S, b, whole, active)
-        for d, terms in self.library.local.items():
-            rows, ends = self.library.stacked(d)
+
+    def local_bests(self) -> Iterator[Candidate]:
+        """Yield the best shape and variant of every effect on every drive."""
+        taken = {(one.term.effect.name, one.term.drive) for one in self.active}
+        for d in self.library.local:
             index, known, y = self._parts[d]
-            white = self.regression.series[d].whiten(self.noises[d], rows)
+            white = self.library.whitened(d, self.noises[d])
             cross = np.zeros((len(self._scale), len(white)))
-            cross[index] = known @ white.T
-            taken_by = solve_triangular(self._root, self._scale[:, None] * cross, lower=True)
-            sides = white @ y - taken_by.T @ self._b
-            for term, (a, z) in zip(terms, pairwise(ends), strict=True):
-                if (term.effect.name, d) in taken:
-                    continue
-                block, gone = white[a:z], taken_by[:, a:z]
-                gram = block @ block.T
-                S, whole = gram - gone.T @ gone, np.diag(gram)
-                for variant in scanned_variants(term.effect):
-                    active = Active(term, variant)
-                    yield active, _gain(S, sides[a:z], whole, active)
+            cross[index] = known.astype(np.float32) @ white.T
+            gone = solve_triangular(self._root, self._scale[:, None] * cross, lower=True)
+            sides = (white @ y.astype(np.float32)).astype(float) - gone.T @ self._b
+            best: dict[str, Candidate] = {}
+            for group in self.library.groups(d):
+                gains = group.gains(white, gone, sides)
+                scores = gains - group.penalties
+                for name, part in group.effects.items():
+                    at = part.start + int(np.argmax(scores[part]))
+                    if (name, d) not in taken and (
+                            name not in best or scores[at] > best[name].score):
+                        best[name] = Candidate((group.active[at],), float(gains[at]),
+                                               float(group.penalties[at]))
+            yield from best.values()
 
     def candidates(self) -> list[Candidate]:
         """Return every effect on the drives where it pays, the best first."""
@@ -210,6 +295,8 @@ class Scan:
             one = Candidate((active,), gain, self.library.penalty(active))
             if key not in best or one.score > best[key].score:
                 best[key] = one
+        for one in self.local_bests():
+            best[one.name, one.active[0].term.drive] = one
         effects: dict[str, list[Candidate]] = {}
         for (name, _), one in best.items():
             effects.setdefault(name, []).append(one)
@@ -238,7 +325,8 @@ class Scan:
 
     def _refined(self, active: Active) -> Active:
         term, d = active.term, active.term.drive
-        assert d is not None and issubclass(term.effect, DriveEffect)
+        assert d is not None
+        assert issubclass(term.effect, DriveEffect)
         effect = term.effect
         design = self.regression.design
         shape = dict(term.shape)
@@ -255,8 +343,11 @@ class Scan:
             if len(values) < 3:
                 continue
             low, high = values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)]
-            trial, gain = _best_between(low, high, lambda value, name=name: gain_at(
-                {**shape, name: value}))
+
+            def gain_of(value: float, name: str = name) -> float:
+                return gain_at({**shape, name: value})
+
+            trial, gain = _best_between(low, high, gain_of)
             if gain > best_gain:
                 shape[name], best_gain = trial, gain
         return Active(design.term(effect, d, shape), active.variant)
@@ -292,5 +383,5 @@ def _gain(S: Array, b: Array, whole: Array, active: Active) -> float:
     if len(b) == 1:
         return float(b[0] ** 2)
     values, axes = np.linalg.eigh(S)
-    kept = values > 1e-6
+    kept = values > LEAST_EIGENVALUE
     return float(np.sum((axes[:, kept].T @ b) ** 2 / values[kept]))

@@ -170,8 +170,8 @@ class Selector:
         if one.evidence <= 0:
             return False
         active = self._actives(selection.adopted)
-        before = self.regression.block_losses(active, one.fit.noises)
-        after = self.regression.block_losses(one.fit.active, one.fit.noises)
+        before = self.regression.block_losses(active, one.fit.noises).losses
+        after = self.regression.block_losses(one.fit.active, one.fit.noises).losses
         change = before - after
         errors = FURTHER_ERRORS if selection.adopted else FIRST_ERRORS
         if change.mean() <= errors * change.std(ddof=1) / np.sqrt(len(change)):
@@ -237,13 +237,14 @@ class Selector:
             found = scan.candidates()
             mine = next((c for c in found if c.name == one.candidate.name), one.candidate)
             mine = scan.refined(mine)
-            losses = self.regression.block_losses((*active, *mine.active), noises)
+            losses = self.regression.block_losses((*active, *mine.active), noises).losses
             near = []
             for candidate in found[:8]:
                 if candidate.name == mine.name or candidate.score < mine.score / 2:
                     continue
                 refined = scan.refined(candidate)
-                change = self.regression.block_losses((*active, *refined.active), noises) - losses
+                change = self.regression.block_losses(
+                    (*active, *refined.active), noises).losses - losses
                 error = change.std(ddof=1) / np.sqrt(len(change))
                 if refined.score > mine.score - NEAR_SCORE or change.mean() <= error:
                     near.append(refined.name)

@@ -132,7 +132,7 @@ class ClosedChains:
         across = np.zeros((9, 3, 3, 3))
         for i in range(3):
             across[i, i, 0, [0, 2]] = across[3 + i, i, 1, [0, 1]] = across[6 + i, i, 2, [0, 2]] = 1
-        self._across = across.reshape(9, 27)
+        self._across = np.ascontiguousarray(across.reshape(9, 27).T)
         self._T = np.zeros((DOFS, 6))
         self._T[DRIVE_DOFS, np.arange(6)] = 1.0
         self._g = np.zeros(DOFS)
@@ -304,10 +304,21 @@ class ClosedChains:
         self._pushes[:] = reactions
         self.qacc[:] = acceleration
         self.engine.mj_rnePostConstraint(self.model, self.data)
-        # Bodies 1..9 are slide, lift, rod of each chain; their forces in the chain's (e, n, k).
-        forces = (self._forces.reshape(3, 3, 3) @ self._frames).ravel()
-        through = (reactions * reactions).dot(self._ones)
-        loads: Array = np.sqrt(np.concatenate((self._across.dot(forces * forces), through)))
+        return self.joint_loads(self._forces.reshape(3, 3, 3), reactions)
+
+    def joint_loads(self, forces: Array, reactions: Array) -> Array:
+        """Return the loads of the joints from the forces in them [N], (..., 12).
+
+        Parameters
+        ----------
+        forces : (..., 3, 3, 3) array
+            On slide, lift and rod of each chain and all further out, in `base` [N].
+        reactions : (..., 3, 3) array
+            In A_i [N].
+        """
+        along = (forces @ self._frames).reshape(*forces.shape[:-3], 27)
+        squares = (along * along).dot(self._across), (reactions * reactions).dot(self._ones)
+        loads: Array = np.sqrt(np.concatenate(squares, axis=-1))
         return loads
 
     @property

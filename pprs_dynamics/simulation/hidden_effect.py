@@ -76,9 +76,9 @@ class Range:
 
 @dataclass(slots=True)
 class DriveMoment:
-    """What the drives do at one moment; arrays (6,), in SI units."""
+    """What the drives do at one moment, in SI units; arrays (6,), or at many moments (N, 6)."""
 
-    time: float
+    time: float | Array
     position: Array
     velocity: Array
     guide_load: Array

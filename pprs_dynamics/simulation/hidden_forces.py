@@ -124,7 +124,7 @@ class DriveCoupling(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return c times the velocity of the source."""
         sources = self.values['source'].astype(int)
-        force: Array = self.values['coefficient'] * moment.velocity[sources]
+        force: Array = self.values['coefficient'] * moment.velocity[..., sources]
         return force
 
 

@@ -52,19 +52,19 @@ class JointFriction:
         self.smallest_squares = (SMALLEST_SHARE * self.width) ** 2
 
     def resist(self, squares: Array, loads: Array) -> tuple[Array, Array]:
-        """Return force per speed, (12,), and the drives' slopes of force over speed, (6,).
+        """Return force per speed, (..., 12), and the drives' slopes over speed, (..., 6).
 
         Parameters
         ----------
-        squares : (12,) array
+        squares : (..., 12) array
             Of the speeds in the joints [m^2/s^2, rad^2/s^2].
-        loads : (12,) array
+        loads : (..., 12) array
             N [N].
         """
         speeds = np.sqrt(squares + self.smallest_squares)
         sign = np.tanh(speeds / self.width)
         dry = self.dry * loads
         resistances: Array = self.viscous + dry * sign / speeds
-        sign = sign[:6]
-        slopes: Array = self.viscous[:6] + dry[:6] / self.width[:6] * (1.0 - sign * sign)
+        sign = sign[..., :6]
+        slopes: Array = self.viscous[:6] + dry[..., :6] / self.width[:6] * (1.0 - sign * sign)
         return resistances, slopes

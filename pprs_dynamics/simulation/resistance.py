@@ -28,7 +28,7 @@ VELOCITY_NUDGE = 1e-7  # [m/s], for slopes of hidden forces; below every width o
 
 # Joint (of 12) to which each relative velocity (of 18) belongs.
 JOINT_OF_RATE = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 10, 10, 10, 11, 11, 11])
-SUM_PER_JOINT = np.equal.outer(np.arange(12), JOINT_OF_RATE).astype(float)
+SUM_PER_JOINT = np.equal.outer(JOINT_OF_RATE, np.arange(12)).astype(float)
 
 
 class Resistance:
@@ -44,25 +44,25 @@ class Resistance:
 
     def __init__(self, friction: JointFriction, effects: Sequence[HiddenEffect]) -> None:
         self.friction = friction
-        self._drive_forces = [e for e in effects if isinstance(e, DriveForce)]
+        self.drive_forces = [e for e in effects if isinstance(e, DriveForce)]
         self._passive_friction = [e for e in effects if isinstance(e, PassiveFriction)]
-        for force in self._drive_forces:
+        for force in self.drive_forces:
             force.prepare(friction)
         self._resolved = RESOLVED_SHARE * float(friction.width[:6].min())
 
     def in_drives(self, equations: Equations, moment: DriveMoment, loads: Array) -> Array:
         """Return what the drives must apply more [N], (6,), at loads (12,) [N]."""
         relative = equations.rates.dot(moment.velocity)
-        resistances, _ = self._of_joints(relative, loads)
+        resistances, _ = self.of_joints(relative, loads)
         force: Array = (resistances.take(JOINT_OF_RATE) * relative).dot(equations.rates)
-        for effect in self._drive_forces:
+        for effect in self.drive_forces:
             force += effect.force(moment)
         return force
 
     def of_passive_joints(self, equations: Equations, velocity: Array, loads: Array) -> Array:
         """Return what friction takes from hinges and platform [N m], (9,)."""
         relative = equations.rates.dot(velocity)
-        resistances, _ = self._of_joints(relative, loads)
+        resistances, _ = self.of_joints(relative, loads)
         moments = resistances.take(JOINT_OF_RATE) * relative
         passive: Array = moments[9:].dot(equations.axes)
         passive[:3] += moments[6:9]
@@ -109,16 +109,24 @@ class Resistance:
 
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Advance the memory of hidden effects by a time step."""
-        for effect in self._drive_forces:
+        for effect in self.drive_forces:
             effect.advance(moment, duration)
 
-    def _of_joints(self, relative: Array, loads: Array) -> tuple[Array, Array]:
-        """Return forces per speed in the joints, (12,), and slopes of the drives, (6,)."""
-        squares = SUM_PER_JOINT.dot(relative * relative)
+    def of_joints(self, relative: Array, loads: Array) -> tuple[Array, Array]:
+        """Return forces per speed in the joints, (..., 12), and slopes of the drives, (..., 6).
+
+        Parameters
+        ----------
+        relative : (..., 18) array
+            Relative velocities, see `Equations.rates`.
+        loads : (..., 12) array
+        """
+        squares = (relative * relative).dot(SUM_PER_JOINT)
         resistances, slopes = self.friction.resist(squares, loads)
         for effect in self._passive_friction:
             part = slice(6, 9) if effect.joint == 'revolute' else slice(9, 12)
-            resistances[part] += effect.resistance(np.sqrt(squares[part]), loads[part])
+            resistances[..., part] += effect.resistance(
+                np.sqrt(squares[..., part]), loads[..., part])
         return resistances, slopes
 
     def _with_slopes(
@@ -127,13 +135,13 @@ class Resistance:
         """Return `in_drives`, and its slopes over the drive velocities, (6, 6)."""
         rates = equations.rates
         relative = rates.dot(moment.velocity)
-        resistances, slopes = self._of_joints(relative, loads)
+        resistances, slopes = self.of_joints(relative, loads)
         weights = resistances.take(JOINT_OF_RATE)
         force = (weights * relative).dot(rates)
         # Of the passive joints the secant is taken: not smaller than the slope, so that the
         # matrix stays positive, and their share is small.
         weights[:6] = slopes
-        for effect in self._drive_forces:
+        for effect in self.drive_forces:
             hidden = effect.force(moment)
             force += hidden
             if effect.steep:

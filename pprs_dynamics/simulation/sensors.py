@@ -56,6 +56,40 @@ class SensorSettings:
         """
         return cls(quantisation, white_noise=0.8 * noise, coloured_noise=0.6 * noise)
 
+    def quantised(self, position: Array) -> Array:
+        """Return positions [m] as the encoders count them."""
+        grain = self.quantisation
+        return np.round(position / grain) * grain if grain > 0 else position
+
+
+@dataclass(frozen=True)
+class SensorFaults:
+    """What is wrong with the sensors, summed over hidden effects; (6,) arrays.
+
+    Parameters
+    ----------
+    zero : (6,) array
+        By which positions are measured too high [m].
+    gain : (6,) array
+        Share by which efforts are.
+    effort_delay, position_delay : (6,) arrays
+        By which they are late [s], at least 0.
+    """
+
+    zero: Array
+    gain: Array
+    effort_delay: Array
+    position_delay: Array
+
+    @classmethod
+    def of(cls, effects: Sequence[HiddenEffect]) -> SensorFaults:
+        """Return the faults among effects."""
+        faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
+        zero, gain, delay = (
+            np.sum([effect.values[name] for effect in faults if name in effect.values]
+                   or [np.zeros(6)], axis=0) for name in ('zero', 'gain', 'delay'))
+        return cls(zero, gain, np.maximum(delay, 0), np.maximum(-delay, 0))
+
 
 class EffortNoise:
     """White, AR(1) and 1/f noise of six efforts, one sample at a time.
@@ -88,6 +122,26 @@ class EffortNoise:
         self._states = self._keep[:, None] * self._states + self._add[:, None] * news[1:]
         noise: Array = self._white * news[0] + self._sizes @ self._states
         return noise
+
+    def samples(self, count: int) -> Array:
+        """Return the next samples [N], (count, 6): those that `sample` would give."""
+        from scipy.signal import lfilter
+
+        news = self._rng.standard_normal((count, len(self._keep) + 1, 6))
+        noise: Array = self._white * news[:, 0]
+        for i, (keep, add, size) in enumerate(zip(self._keep, self._add, self._sizes,
+                                                  strict=True)):
+            states, last = lfilter([add], [1.0, -keep], news[:, i + 1], axis=0,
+                                   zi=keep * self._states[None, i])
+            self._states[i] = last[0] / keep if keep else states[-1]
+            noise += size * states
+        return noise
+
+    def autocovariance(self, lags: Array) -> Array:
+        """Return that of one effort's noise at whole lags [samples], (L,) [N^2]."""
+        steps = np.abs(np.asarray(lags, dtype=float))
+        slow: Array = (self._sizes ** 2) @ self._keep[:, None] ** steps
+        return slow + self._white ** 2 * (steps == 0)
 
 
 @dataclass(frozen=True)
@@ -124,12 +178,10 @@ class Sensors:
         self._noise = EffortNoise(settings, rng)
         self.smoothing = 1.0 if settings.true_velocity else 1 - float(
             np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
-        faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
-        self.zero, self._gain, delay = (
-            np.sum([effect.values[name] for effect in faults if name in effect.values]
-                   or [np.zeros(6)], axis=0) for name in ('zero', 'gain', 'delay'))
-        self._effort_delay, self._position_delay = np.maximum(delay, 0), np.maximum(-delay, 0)
-        length = int(np.ceil(np.abs(delay).max() / step)) + 2
+        self._faults = SensorFaults.of(effects)
+        self.zero = self._faults.zero
+        delays = (self._faults.effort_delay, self._faults.position_delay)
+        length = int(np.ceil(np.max(delays) / step)) + 2
         self._past: deque[tuple[Array, Array, Array]] = deque(maxlen=length)
         self.position, self.velocity = np.zeros(6), np.zeros(6)
 
@@ -158,15 +210,14 @@ class Sensors:
 
     def measure(self, time: float) -> Measurement:
         """Return what is published now, with faults and noise."""
-        position, velocity = (self._delayed(i, self._position_delay) for i in (0, 1))
-        effort = self._delayed(2, self._effort_delay)
+        faults = self._faults
+        position, velocity = (self._delayed(i, faults.position_delay) for i in (0, 1))
+        effort = self._delayed(2, faults.effort_delay)
         return Measurement(time, position, velocity,
-                           (1 + self._gain) * effort + self._noise.sample())
+                           (1 + faults.gain) * effort + self._noise.sample())
 
     def _encoder(self, position: Array) -> Array:
-        seen: Array = position + self.zero
-        grain = self.settings.quantisation
-        return np.round(seen / grain) * grain if grain > 0 else seen
+        return self.settings.quantised(position + self.zero)
 
     def _delayed(self, quantity: int, delay: Array) -> Array:
         if not delay.any():

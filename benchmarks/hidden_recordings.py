@@ -1,0 +1,299 @@
+"""Recordings of the simulated robot with physics hidden in it, and what the truth is.
+
+The robot follows a random motion. Its numbers are off by up to the model file's tolerances, its
+friction turns over in widths unlike the model's, its loads are those with friction, encoders
+count micrometres and efforts carry correlated noise. `make_case` builds one recording, `save_case`
+and `load_case` keep it in a file.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hidden_motions import draw_motion
+from hidden_strength import Refit, Whitening, sensitivities, tolerated_numbers
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.measurement.treatment import Treatment, block_length
+from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
+from pprs_dynamics.model.model_file import build_model, default_parameters
+from pprs_dynamics.simulation.driven_motion import DrivenMotion
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.plant import PlantSettings
+from pprs_dynamics.simulation.prescribed import PrescribedPlant, Readings
+from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+
+DURATION, RATE = 40.0, 500.0  # [s, Hz]
+LEAD = 50  # samples before the recording, for what looks back in time
+NOISE = 0.08  # [N], of which 70 % of the variance is correlated
+QUIETEST = 0.01  # [N]; an effect that would need less is drawn anew
+DRAWS = 8
+NARROWEST, WIDEST = 0.2, 5.0  # widths of the robot's reversals over the model's
+TOLERANCES = (0.03, 0.05)
+# Strengths of a hidden effect, as a multiple of what it is drawn with. Where they do not do, the
+# noise is another.
+SCALES = (0.01, 3.0)
+# Over a vanishing distance hysteresis would be nothing but a sharp reversal.
+SCALES_OF = {'hysteresis': (0.5, 3.0)}
+SCALINGS, SCALED = 8, 0.03  # rounds, and relative error of the strength that is good enough
+PINK = '1/f'
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recording.
+
+    Parameters
+    ----------
+    row : str
+        Of the table, e.g. 'effects'.
+    effects : tuple of str
+        Names of hidden effects.
+    seed : int
+        Of motion and robot.
+    snr : float
+        Wanted strength of every effect; 0: drawn from 1 to 3 for each.
+    noise : float or '1/f'
+        Correlation of 70 % of the noise from sample to sample; '1/f': all of it is 1/f.
+    width : float
+        Of the robot's reversals over the model's; 0: drawn, for all drives or each of them.
+    """
+
+    row: str
+    effects: tuple[str, ...]
+    seed: int
+    snr: float = 1.0
+    noise: float | str = 0.9
+    width: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        what = '+'.join(self.effects) or 'none'
+        noise = str(self.noise).replace('/', '-')
+        return f'{self.row}_{what}_snr{self.snr:g}_noise{noise}_width{self.width:g}_{self.seed}'
+
+    def rng(self, what: str) -> np.random.Generator:
+        """Return random numbers for one purpose."""
+        return np.random.default_rng((self.seed, zlib.crc32(what.encode())))
+
+
+class Scene:
+    """Robot and motion of one seed, and all about them that no hidden effect changes.
+
+    Parameters
+    ----------
+    seed : int
+    width : float
+        See `Case`.
+    """
+
+    def __init__(self, seed: int, width: float) -> None:
+        rng = np.random.default_rng((seed, 2))
+        self.tolerance = float(rng.uniform(*TOLERANCES))
+        self.model = tolerant_model(self.tolerance)
+        numbers = list(tolerated_numbers(self.model.values))
+        self.off = rng.uniform(-1, 1, len(numbers))
+        self.robot: dict[str, Any] = {}
+        for (key, index), off in zip(numbers, self.off, strict=True):
+            value = self.robot.get(key, self.model.values[key])
+            factor = 1 + self.tolerance * off
+            self.robot[key] = value * factor if index is None else tuple(
+                v * factor if i == index else v for i, v in enumerate(value))
+        self.settings = PlantSettings(
+            drive_width=_draw_widths(rng) if not width else (width,) * 6,
+            passive_width=width or _draw_width(rng), actual_loads=True)
+        self.path, self.motion = _motion(seed)
+        self.platform = self.path.motion(self.motion.time)
+        self.plant = PrescribedPlant({**self.model.values, **self.robot}, self.motion,
+                                     self.settings)
+        kept = len(self.motion) - LEAD
+        self.block = block_length(1 / RATE)
+        self.treat = Treatment(np.arange(0, kept, self.block), kept)
+        self._refits: dict[str | float, Refit] = {}
+
+    @cached_property
+    def plain(self) -> Readings:
+        """What is measured without hidden effects."""
+        return self.plant.readings()
+
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        return sensitivities(self.model, self.platform[LEAD:], self.treat, self.tolerance)
+
+    def refit(self, noise: float | str) -> Refit:
+        """Return the refitted model under noise of `NOISE` of one sort."""
+        if noise not in self._refits:
+            self._refits[noise] = Refit(self._columns, self.off,
+                                        Whitening(noise_settings(noise, NOISE), self.block))
+        return self._refits[noise]
+
+    def contribution(self, effect: HiddenEffect) -> np.ndarray:
+        """Return what an effect adds to the treated residual of the model, (M, 6) [N]."""
+        read, plain = self.plant.readings([effect]), self.plain
+        added = read.effort - plain.effort
+        if np.any(read.position != plain.position):
+            added -= self._model_force(read) - self.model.drive_forces(self.platform).total
+        return self.treat(added[LEAD:])
+
+    def _model_force(self, read: Readings) -> np.ndarray:
+        found = solve_forward_motion(self.model.robot.geometry, read.position, read.velocity,
+                                     read.acceleration, self.platform[:1])
+        return self.model.drive_forces(found.motion.with_time(self.motion.time)).total
+
+
+@lru_cache(maxsize=2)
+def scene(seed: int, width: float) -> Scene:
+    """Return a scene, the last ones from memory."""
+    return Scene(seed, width)
+
+
+@lru_cache(maxsize=2)
+def _motion(seed: int) -> tuple[Any, DrivenMotion]:
+    model = DriveModel.load()
+    path = draw_motion(model, seed, DURATION)
+    time = np.arange(-LEAD, round(DURATION * RATE)) / RATE
+    drives = model.mechanism(path.motion(time))
+    return path, DrivenMotion.of_drives(model.values, time, drives.position, drives.velocity,
+                                        drives.acceleration)
+
+
+def tolerant_model(tolerance: float) -> DriveModel:
+    """Return the paper's robot, its masses and friction coefficients known to a tolerance."""
+    values = default_parameters()
+    model = build_model(values)
+    keys = dict.fromkeys(key for key, _ in tolerated_numbers(model.values))
+    return build_model({**values, **{f'tolerances.{key}': tolerance for key in keys}})
+
+
+def noise_settings(noise: float | str, deviation: float) -> SensorSettings:
+    """Return sensors whose efforts carry noise of a sort and a standard deviation [N]."""
+    if noise == PINK:
+        return SensorSettings(white_noise=0.0, coloured_noise=0.0, pink_noise=deviation)
+    return SensorSettings(white_noise=np.sqrt(0.3) * deviation,
+                          coloured_noise=np.sqrt(0.7) * deviation, noise_correlation=float(noise))
+
+
+def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
+    """Return the model, a recording, and the truth about it as data for JSON."""
+    place = scene(case.seed, case.width)
+    found = [_draw(case, place, name) for name in case.effects]
+    deviation = min([one.noise for one in found], default=NOISE)
+    effects = [one.effect for one in found]
+    read = place.plant.readings(effects)
+    settings = noise_settings(case.noise, deviation)
+    time = place.motion.time[LEAD:]
+    noise = EffortNoise(settings, case.rng(f'noise {case.name}')).samples(len(time))
+    recording = Recording.from_arrays(case.name, time, settings.quantised(read.position[LEAD:]),
+                                      None, read.effort[LEAD:] + noise)
+    truth = {
+        'case': asdict(case), 'name': case.name,
+        'effects': [{**one.effect.truth(), 'scale': one.scale,
+                     'snr': one.snr * NOISE / deviation,
+                     'snr_by_drive': (one.by_drive * NOISE / deviation).tolist()}
+                    for one in found],
+        'noise': deviation, 'noise_floor': float(np.sqrt(np.mean(place.treat(noise) ** 2))),
+        'drive_width': list(place.settings.drive_width),
+        'passive_width': place.settings.passive_width,
+        'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.as_data()}
+    # As it comes back from a file.
+    return place.model, recording, json.loads(json.dumps(truth))
+
+
+def save_case(folder: Path, case: Case) -> Path:
+    """Make a case's recording, unless there is one, and return its file."""
+    path = folder / f'{case.name}.npz'
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        _, recording, truth = make_case(case)
+        partial = path.with_suffix('.part')
+        with partial.open('wb') as file:
+            np.savez_compressed(file, time=recording.time, position=recording.position,
+                                effort=recording.effort.astype(np.float32),
+                                truth=json.dumps(truth))
+        partial.rename(path)
+    return path
+
+
+def load_case(path: Path | str) -> tuple[DriveModel, Recording, dict[str, Any]]:
+    """Return model, recording and truth of a file of `save_case`."""
+    with np.load(path) as content:
+        truth = json.loads(str(content['truth']))
+        recording = Recording.from_arrays(Path(path).stem, content['time'], content['position'],
+                                          None, content['effort'].astype(float))
+    return tolerant_model(truth['tolerance']), recording, truth
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    effect: HiddenEffect
+    scale: float
+    snr: float  # at a noise of NOISE
+    by_drive: np.ndarray  # the same, (6,)
+    noise: float  # [N], that gives the wanted strength
+
+
+def _draw(case: Case, place: Scene, name: str) -> _Drawn:
+    """Return an effect of the wanted strength, in noise as near to `NOISE` as can be."""
+    wanted = case.snr or float(np.exp(case.rng(f'strength {name}').uniform(0, np.log(3.0))))
+    for attempt in range(DRAWS):
+        drawn = _scaled(case, place, name, f'{name} {attempt}', wanted)
+        if drawn.noise > QUIETEST:
+            break
+    return drawn
+
+
+def _scaled(case: Case, place: Scene, name: str, what: str, wanted: float) -> _Drawn:
+    refit, scale = place.refit(case.noise), 1.0
+    past: list[tuple[float, float]] = []
+    rays = {}
+    for _ in range(SCALINGS):
+        effect = draw_effect(name, case.rng(what), scale)
+        ray = refit.beyond(place.contribution(effect))
+        strength = ray.strength()
+        past.append((scale, strength))
+        rays[scale] = ray
+        if abs(strength / wanted - 1) < SCALED:
+            break
+        following = float(np.clip(_next_scale(past, ray.factor(wanted), wanted),
+                                  *SCALES_OF.get(name, SCALES)))
+        if following == scale:
+            break
+        scale = following
+    scale, strength = min(past, key=lambda pair: abs(np.log(max(pair[1], 1e-9) / wanted)))
+    effect = draw_effect(name, case.rng(what), scale)
+    near = abs(strength / wanted - 1) < SCALED
+    return _Drawn(effect, scale, strength, rays[scale].by_drive(),
+                  NOISE if near else NOISE * strength / wanted)
+
+
+def _next_scale(past: Sequence[tuple[float, float]], factor: float, wanted: float) -> float:
+    scale, strength = past[-1]
+    if len(past) > 1 and min(strength, past[-2][1]) > 0 and scale != past[-2][0]:
+        # Not every effect grows as its parameter does.
+        power = np.log(strength / past[-2][1]) / np.log(scale / past[-2][0])
+        if 0.1 < power < 0.9:
+            return float(scale * (wanted / strength) ** (1 / power))
+    return scale * factor
+
+
+def _draw_width(rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(np.log(NARROWEST), np.log(WIDEST))))
+
+
+def _draw_widths(rng: np.random.Generator) -> tuple[float, ...]:
+    """Return widths of the drives: the same for all, or each its own."""
+    if rng.random() < 0.5:
+        return (_draw_width(rng),) * 6
+    return tuple(_draw_width(rng) for _ in range(6))
+
+

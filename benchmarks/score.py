@@ -1,0 +1,228 @@
+"""How often `diagnose` is right about physics hidden in recordings.
+
+    python benchmarks/score.py --quick
+    python benchmarks/score.py --seeds 20 --nothing 200 --jobs 2 --table docs/diagnosis_table.md
+
+Every case's outcome is appended to FILE at once, and cases that are there are not run again: the
+run can be stopped and continued, and `--seeds` raised later. The table is made from that file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import itertools
+import json
+import os
+import sys
+import time
+import traceback
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+# The arrays are small: threads of the linear algebra would only wait for one another.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+import numpy as np
+from hidden_recordings import PINK, Case, load_case, make_case, save_case
+from score_table import judge, make_table
+
+from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
+
+OUTPUT = Path(__file__).resolve().parents[1] / 'output'
+SNRS = (0.25, 0.5, 1.0, 3.0)
+NOISES: tuple[float | str, ...] = (0.0, 0.9, 0.98, 0.997, 0.999, PINK)
+SLOW_NOISES = (0.98, 0.997)
+WIDTHS = (0.2, 0.5, 2.0, 5.0)
+SETS_PER_SEED = 3  # pairs, and triples
+ROWS = ('effects', 'nothing', 'width', 'pairs', 'unknown', 'slow')
+# Of what a diagnosis says, this many candidates are kept.
+CANDIDATES = 6
+
+Diagnose = Callable[..., Any]
+
+
+def cases(rows: Iterable[str], seeds: int, nothing: int, snrs: Iterable[float]) -> list[Case]:
+    """Return the cases of rows of the table, those of one seed together."""
+    levels = tuple(snrs)
+    found: list[Case] = []
+    for row in rows:
+        if row == 'nothing':
+            found += [Case(row, (), s, noise=n) for s in range(nothing) for n in NOISES]
+        elif row == 'width':
+            found += [Case(row, (), s, width=WIDTHS[s % len(WIDTHS)]) for s in range(nothing)]
+        elif row == 'pairs':
+            found += [Case(row, names, s, 0.0) for s in range(seeds) for names in _sets(s)]
+        elif row == 'slow':
+            found += [Case(row, (name,), s, snr, noise) for s in range(seeds)
+                      for name in IN_CATALOGUE for snr in levels if snr == 1
+                      for noise in SLOW_NOISES]
+        else:
+            names = IN_CATALOGUE if row == 'effects' else NOT_IN_CATALOGUE
+            found += [Case(row, (name,), s, snr) for s in range(seeds) for name in names
+                      for snr in levels if row == 'effects' or snr >= 1]
+    return sorted(found, key=lambda case: (case.seed, case.width))
+
+
+def quick_cases() -> list[Case]:
+    """Return a few cases of most kinds, for work on the diagnosis."""
+    return (cases(('effects', 'unknown'), 1, 0, (1.0,))
+            + [Case('nothing', (), s, noise=n) for s, n in enumerate(NOISES[:5])])
+
+
+def development_cases() -> list[Case]:
+    """Return more of them."""
+    return (cases(('effects', 'unknown'), 3, 0, (1.0, 3.0))
+            + cases(('nothing',), 2, 2, ()))
+
+
+def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> dict[str, Any]:
+    """Return a case's outcome: truth, what was said, and how right that is."""
+    try:
+        content = load_case(save_case(recordings, case)) if recordings else make_case(case)
+        model, recording, truth = content
+        start = time.perf_counter()
+        said = diagnose(model, [recording]).as_data()
+    except Exception:  # the table counts it, and the run goes on
+        return {'name': case.name, 'row': case.row, 'failed': traceback.format_exc()}
+    seconds = time.perf_counter() - start
+    said = {**said, 'candidates': said.get('candidates', [])[:CANDIDATES]}
+    outcome = {'name': case.name, 'row': case.row, 'truth': truth, 'said': said,
+               'seconds': seconds}
+    return {**outcome, 'judged': judge(outcome)}
+
+
+def run(todo: Iterable[Case], diagnose: Diagnose, file: Path, jobs: int = 1,
+        recordings: Path | None = None) -> None:
+    """Diagnose cases that are not in a file of outcomes yet; append and print theirs."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if file.exists() and not file.read_text().endswith('\n'):
+        with file.open('a') as stream:
+            stream.write('\n')  # after a line that was cut short
+    done = {outcome['name'] for outcome in outcomes(file)}
+    left = [case for case in todo if case.name not in done]
+    # One seed's cases share their motion, which takes longer to prepare than they do.
+    groups = [list(group) for _, group in itertools.groupby(left, lambda case: case.seed)]
+    work = partial(_run_group, diagnose=diagnose, file=file, recordings=recordings)
+    if jobs == 1:
+        for group in groups:
+            work(group)
+        return
+    with get_context('fork').Pool(jobs) as pool:
+        for _ in pool.imap_unordered(work, groups):
+            pass
+
+
+def outcomes(file: Path) -> list[dict[str, Any]]:
+    """Return the outcomes in a file; of a line that was cut short, none."""
+    found = []
+    for line in file.read_text().splitlines() if file.exists() else ():
+        try:
+            found.append(json.loads(line))
+        except json.JSONDecodeError:
+            continue
+    return found
+
+
+def one_line(outcome: dict[str, Any]) -> str:
+    """Return a case's outcome for people."""
+    if 'failed' in outcome:
+        return f'FAILED {outcome["name"]}: {outcome["failed"].strip().splitlines()[-1]}'
+    truth, said, judged = outcome['truth'], outcome['said'], outcome['judged']
+    case = truth['case']
+    hidden = '; '.join(_described(effect) for effect in truth['effects']) or 'nothing'
+    named = '; '.join(_described(effect) for effect in said['effects']) or '-'
+    sets = ' '.join('{' + ' '.join(names) + '}' for names in said['indistinguishable'])
+    depends = ', '.join(f'{d["drive"]} {d["variable"]}' for d in said['depends_on'][:2])
+    suspects = ', '.join(suspect['name'] for suspect in said['suspects'])
+    parts = [f'{"ok " if judged["good"] else "BAD"} [{case["row"]} {case["seed"]} '
+             f'snr {case["snr"]:g} noise {case["noise"]}] {hidden}', f'-> {said["verdict"]}: '
+             f'{named}', sets, f'on {depends}' if depends else '',
+             f'suspects {suspects}' if suspects else '', f'{outcome["seconds"]:.1f} s']
+    return '  '.join(part for part in parts if part)
+
+
+def _described(effect: dict[str, Any]) -> str:
+    drives = effect.get('drives')
+    return effect['name'] + (f'({",".join(drives)})' if drives else '')
+
+
+def _run_group(group: Iterable[Case], diagnose: Diagnose, file: Path,
+               recordings: Path | None) -> None:
+    for case in group:
+        outcome = diagnose_case(case, diagnose, recordings)
+        with file.open('a') as stream:
+            fcntl.flock(stream, fcntl.LOCK_EX)
+            stream.write(json.dumps(outcome) + '\n')
+        print(one_line(outcome), flush=True)
+
+
+def _sets(seed: int) -> Iterator[tuple[str, ...]]:
+    """Yield pairs and triples of effects, drawn at random."""
+    rng = np.random.default_rng((seed, zlib.crc32(b'sets')))
+    for size in (2, 3):
+        for _ in range(SETS_PER_SEED):
+            yield tuple(str(name) for name in rng.choice(sorted(IN_CATALOGUE), size, replace=False))
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--quick', action='store_true',
+                        help='one seed of every effect at SNR 1 and a few of nothing, afresh')
+    parser.add_argument('--development', action='store_true',
+                        help='three seeds at SNR 1 and 3, and 12 of nothing, afresh')
+    parser.add_argument('--seeds', type=int, default=20, help='per effect and level (default 20)')
+    parser.add_argument('--nothing', type=int, default=200,
+                        help='recordings per row with nothing missing (default 200)')
+    parser.add_argument('--snr', type=float, nargs='+', default=SNRS)
+    parser.add_argument('--only', choices=ROWS, nargs='+', default=ROWS)
+    parser.add_argument('--effect', action='append', help='only cases with this one')
+    parser.add_argument('--jobs', type=int, default=1)
+    parser.add_argument('--file', type=Path, default=OUTPUT / 'score.jsonl')
+    parser.add_argument('--recordings', type=Path,
+                        help='folder that keeps the recordings (default: of --quick and '
+                        '--development output/recordings, else none)')
+    parser.add_argument('--generate', action='store_true', help='make the recordings only')
+    parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Run the cases that are asked for, and print or write their table."""
+    options = _arguments()
+    small = options.quick or options.development
+    todo = (quick_cases() if options.quick else development_cases() if options.development
+            else cases(options.only, options.seeds, options.nothing, options.snr))
+    if options.effect:
+        todo = [case for case in todo if set(case.effects) & set(options.effect)]
+    recordings = options.recordings or (OUTPUT / 'recordings' if small else None)
+    if options.generate:
+        for case in todo:
+            save_case(recordings or OUTPUT / 'recordings', case)
+        return 0
+    try:
+        from pprs_dynamics.diagnosis.diagnose import diagnose
+    except ImportError as error:
+        print(f'score: there is no diagnosis to judge: {error}', file=sys.stderr)
+        return 2
+    file = options.file
+    if small:
+        # Of a diagnosis that changes from run to run, old outcomes are worth nothing.
+        file = OUTPUT / ('quick.jsonl' if options.quick else 'development.jsonl')
+        file.unlink(missing_ok=True)
+    run(todo, diagnose, file, options.jobs, recordings)
+    table = make_table(outcomes(file))
+    if options.table:
+        options.table.write_text(table)
+    else:
+        print(table)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,274 @@
+"""Which physical effect a model lacks: the whole way from recordings to an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.adoption import (
+    Calibration,
+    Estimate,
+    calibrations,
+    estimate_all,
+    fitted_model,
+)
+from pprs_dynamics.diagnosis.cautions import find_cautions
+from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.diagnosis.selection import Judged, Selection, Selector
+from pprs_dynamics.diagnosis.unexplained import Unexplained, find_unexplained
+from pprs_dynamics.diagnosis.wording import Statement
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.drive_model import DriveModel
+
+# Shares of the work, for the progress bar.
+DESIGN, SELECTION = 0.4, 0.3
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that the recordings call for.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drives : tuple of str or None
+        On which it sits; None for the structure.
+    parameters : dict of str to Estimate
+    evidence : float
+        Twice the gain in log-likelihood, less penalty and margin.
+    error_before, error_after, held_out_before, held_out_after : float
+        [N], with the effects before it, and with it as well.
+    force : (M, D) array
+        What it contributes [N].
+    at_bound : tuple of str
+        Parameters that stand at a bound.
+    """
+
+    effect: type[CatalogueEffect]
+    drives: tuple[str, ...] | None
+    parameters: dict[str, Estimate]
+    evidence: float
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    force: Array
+    at_bound: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'name': self.name, 'drives': _listed(self.drives),
+                'parameters': {key: one.as_data() for key, one in self.parameters.items()},
+                'evidence': self.evidence,
+                'error_before': self.error_before, 'error_after': self.error_after,
+                'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
+
+
+@dataclass(frozen=True)
+class RankedEffect:
+    """A candidate for the first place, or a suspect."""
+
+    name: str
+    drives: tuple[str, ...] | None
+    evidence: float
+    error_after: float
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'name': self.name, 'drives': _listed(self.drives), 'evidence': self.evidence,
+                'error_after': self.error_after}
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer.
+
+    Parameters
+    ----------
+    verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
+    effects : tuple of FoundEffect
+        In the order of adoption.
+    indistinguishable : tuple of tuple of str
+        Each an adopted effect and its rivals.
+    candidates, suspects : tuple of RankedEffect
+    depends_on : tuple of Statement
+        What no effect explains.
+    of_form : tuple of Statement
+        Remainders that are the form of an adopted effect.
+    calibrated : tuple of Calibration
+        Numbers that moved within their tolerances.
+    warnings, notes : tuple of str
+    model : DriveModel
+        As given.
+    adopted : DriveModel
+        With the effects.
+    residuals : Residuals
+        Of the model as given.
+    remaining : (M, D) array
+        What is left with the effects [N].
+    noise_floor : float
+        Root of the mean square of the noise, over drives [N].
+    held_out_on : {'blocks', 'validation'}
+    """
+
+    verdict: str
+    effects: tuple[FoundEffect, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    candidates: tuple[RankedEffect, ...]
+    suspects: tuple[RankedEffect, ...]
+    depends_on: tuple[Statement, ...]
+    of_form: tuple[Statement, ...]
+    calibrated: tuple[Calibration, ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    model: DriveModel
+    adopted: DriveModel
+    residuals: Residuals
+    remaining: Array
+    noise_floor: float
+    held_out_on: str = 'blocks'
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the JSON of the interface, and what the README adds to it."""
+        return {
+            'verdict': self.verdict,
+            'effects': [one.as_data() for one in self.effects],
+            'indistinguishable': [list(names) for names in self.indistinguishable],
+            'candidates': [one.as_data() for one in self.candidates],
+            'depends_on': [
+                {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
+                 'range': None if s.range is None else list(s.range), 'text': s.text}
+                for s in self.depends_on],
+            'suspects': [{'name': s.name, 'drives': _listed(s.drives), 'evidence': s.evidence}
+                         for s in self.suspects],
+            'calibrated': [{'key': c.label, 'before': c.before, 'after': c.after, 'std': c.std,
+                            'unit': c.unit} for c in self.calibrated],
+            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
+            'warnings': list(self.warnings)}
+
+
+def diagnose(
+    model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Diagnosis:
+    """Return which physical effect a model lacks, as far as recordings can tell.
+
+    Parameters
+    ----------
+    model : DriveModel
+    recordings : sequence of Recording
+        To fit to.
+    validate : sequence of Recording, optional
+        Never fitted: held-out errors are taken on them, instead of on blocks.
+    progress : callable, optional
+        Called with the share of the work that is done.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    design = Design.of(model, recordings, lambda share: report(DESIGN * share))
+    regression = Regression(design)
+    selector = Selector(regression, lambda share: report(DESIGN + SELECTION * share))
+    selection = selector.select()
+    unexplained = find_unexplained(selector, selection)
+    report(0.9)
+    return _answer(design, regression, selector, selection, unexplained, validate)
+
+
+def _answer(
+    design: Design, regression: Regression, selector: Selector, selection: Selection,
+    unexplained: Unexplained, validate: Sequence[Recording],
+) -> Diagnosis:
+    drives = design.drives
+    steps = [_fit_of_first(regression, selection, k) for k in range(len(selection.adopted) + 1)]
+    models = [fitted_model(regression, fit) for fit in steps]
+    errors = [regression.error((), np.zeros(len(design.base))),
+              *(regression.error(fit.active, fit.coefficients) for fit in steps[1:])]
+    if validate:
+        held_out = [_error_on(one, validate) for one in (design.model, *models[1:])]
+    else:
+        held_out = [regression.held_out_error(fit.active, fit.noises) for fit in steps]
+    estimates = estimate_all(regression, selection.fit)
+    effects, first, place = [], 0, len(design.base)
+    for k, one in enumerate(selection.adopted):
+        count = len(one.candidate.active)
+        mine = estimates[first:first + count]
+        width = sum(active.size for active in one.candidate.active)
+        effects.append(FoundEffect(
+            one.candidate.effect, _names(one, drives),
+            {key: value for found in mine for key, value in found.parameters.items()},
+            one.evidence, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
+            _force(design, one.candidate.active, selection.fit.coefficients[place:place + width]),
+            tuple(key for found in mine for key in found.at_bound)))
+        first, place = first + count, place + width
+    sets = tuple((name, *rivals) for name, rivals in selection.rivals.items() if rivals)
+    verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
+               else 'effect' if effects else 'adequate')
+    moved = [one for one in calibrations(regression, selection.fit)
+             if abs(one.after - one.before) > 2 * one.std]
+    noise = np.concatenate([rest[regression.series[d].known]
+                            for d, rest in selection.fit.rest.items()])
+    return Diagnosis(
+        verdict, tuple(effects), sets,
+        tuple(_ranked(one, drives, regression) for one in selection.candidates),
+        tuple(_ranked(one, drives, regression) for one in selection.suspects),
+        unexplained.statements, unexplained.of_form, tuple(moved),
+        find_cautions(design, regression, selector, selection, effects), design.notes,
+        design.model, models[-1], design.residuals, unexplained.remaining,
+        float(np.sqrt(np.mean(noise ** 2))), 'validation' if validate else 'blocks')
+
+
+def _fit_of_first(regression: Regression, selection: Selection, count: int) -> JointFit:
+    """Return the fit of the first adopted effects."""
+    if count == len(selection.adopted):
+        return selection.fit
+    active: tuple[Active, ...] = tuple(
+        a for one in selection.adopted[:count] for a in one.candidate.active)
+    return regression.fit(active, selection.fit.noises, iterations=1)
+
+
+def _error_on(model: DriveModel, recordings: Sequence[Recording]) -> float:
+    residuals, _ = measure_residuals(model, recordings)
+    return float(np.sqrt(np.nanmean(residuals.error ** 2)))
+
+
+def _force(design: Design, active: Sequence[Active], coefficients: Array) -> Array:
+    """Return what active terms contribute, (M, D) [N]."""
+    force, place = np.zeros(design.residuals.measured.shape), 0
+    for one in active:
+        for d in one.term.rows:
+            rows = one.on(d)
+            assert rows is not None
+            force[:, d] += rows[0] if one.fixed else coefficients[place:place + one.size] @ rows
+        place += one.size
+    return force
+
+
+def _ranked(one: Judged, drives: tuple[str, ...], regression: Regression) -> RankedEffect:
+    return RankedEffect(one.candidate.name, _names(one, drives), one.evidence,
+                        regression.error(one.fit.active, one.fit.coefficients))
+
+
+def _names(one: Judged, drives: tuple[str, ...]) -> tuple[str, ...] | None:
+    found = one.candidate.drives
+    return None if found is None else tuple(drives[d] for d in sorted(found))
+
+
+def _listed(drives: tuple[str, ...] | None) -> list[str] | None:
+    return None if drives is None else list(drives)

@@ -1,0 +1,127 @@
+"""What no effect of the catalogue explains: where it lies, and whether it makes effects needless.
+
+The search of `localisation` goes over what the adopted effects leave. A catalogue effect is an
+idealisation, so a small remainder on the same drive is its form; and what a free curve along one
+variable explains far better than the effect adopted for it, was never that effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
+from pprs_dynamics.diagnosis.localisation import Localisation, localise
+from pprs_dynamics.diagnosis.regression import orthonormal
+from pprs_dynamics.diagnosis.selection import MARGIN, Judged, Selection, Selector
+from pprs_dynamics.diagnosis.wording import Statement
+from pprs_dynamics.mechanism.robot import Array
+
+# Of the mean square that adopted effects explain on a drive: less is their form.
+FORM_SHARE = 0.06
+# A free curve explains this much more than an effect: then it is not that effect.
+BETTER = 1.3
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What remains beside adopted effects.
+
+    Parameters
+    ----------
+    statements : tuple of Statement
+        Ranked by evidence.
+    of_form : tuple of Statement
+        Remainders that are small against an adopted effect on the same drive.
+    where : Localisation
+        The search that found them.
+    remaining : (M, D) array
+        What all fits leave [N]; NaN where not measured.
+    """
+
+    statements: tuple[Statement, ...]
+    of_form: tuple[Statement, ...]
+    where: Localisation
+    remaining: Array
+
+
+def find_unexplained(selector: Selector, selection: Selection) -> Unexplained:
+    """Return what remains, after dropping effects that a remainder explains better."""
+    regression = selector.regression
+    for _ in range(2):
+        found = _search(regression, selection)
+        dropped = [one for one in selection.adopted if found.statements
+                   and _is_needless(one, selector, selection, found)]
+        if not dropped:
+            break
+        selection.adopted = [one for one in selection.adopted if one not in dropped]
+        active = tuple(a for one in selection.adopted for a in one.candidate.active)
+        selection.fit = regression.fit(active, selection.fit.noises)
+        for one in dropped:
+            selection.rivals.pop(one.candidate.name, None)
+    return found
+
+
+def _search(regression: Regression, selection: Selection) -> Unexplained:
+    residuals = regression.design.residuals
+    remaining = np.full(residuals.measured.shape, np.nan)
+    for d, series in regression.series.items():
+        remaining[series.index, d] = np.where(series.known, selection.fit.rest[d], np.nan)
+    where = localise(replace(residuals, measured=residuals.model + remaining, parts={}))
+    explained = _explained(regression, selection)
+    statements: list[Statement] = []
+    of_form: list[Statement] = []
+    for statement in where.statements:
+        d = residuals.drives.index(statement.drive)
+        left = float(np.nanmean(remaining[:, d] ** 2)) * statement.share_of_error
+        (of_form if left < FORM_SHARE * explained[d] else statements).append(statement)
+    return Unexplained(tuple(statements), tuple(of_form), where, remaining)
+
+
+def _explained(regression: Regression, selection: Selection) -> Array:
+    """Return the mean square of what adopted effects explain on each drive [N^2]."""
+    squares = np.zeros(len(regression.design.drives))
+    place = len(regression.design.base)
+    for one in selection.fit.active:
+        for d in regression.series:
+            rows = regression.rows(one, d)
+            if rows is not None:
+                force = rows[0] if one.fixed else (
+                    selection.fit.coefficients[place:place + one.size] @ rows)
+                squares[d] += float(np.mean((force - force.mean()) ** 2))
+        place += one.size
+    return squares
+
+
+def _is_needless(one: Judged, selector: Selector, selection: Selection,
+                 found: Unexplained) -> bool:
+    """Return whether free curves on the drives of an effect explain much more than it does."""
+    regression = selector.regression
+    drives = one.candidate.drives or tuple(regression.series)
+    stated = {statement.drive for statement in found.statements}
+    curves = []
+    for d in drives:
+        name = regression.design.drives[d]
+        if name in stated:
+            findings = found.where.drives[name]
+            rows = np.zeros((len(findings.columns), len(regression.design.residuals)))
+            if findings.columns.shape[1] == len(findings.index) and (
+                    findings.index.max(initial=0) < rows.shape[1]):
+                rows[:, findings.index] = findings.columns
+                curves.append(Columns({d: orthonormal(rows)}))
+    if not curves:
+        return False
+    others: tuple[Active, ...] = tuple(
+        a for other in selection.adopted if other is not one for a in other.candidate.active)
+    noises = selection.fit.noises
+    without = regression.fit(others, noises)
+    with_curves = regression.fit((*others, *curves), noises)
+    by_effect = without.deviance - selection.fit.deviance
+    price = float(np.log(regression.samples)) * sum(curve.size for curve in curves)
+    by_curves = without.deviance - with_curves.deviance - price
+    if by_curves > BETTER * by_effect:
+        return True
+    both = regression.fit((*others, *one.candidate.active, *curves), noises)
+    return with_curves.deviance - both.deviance < one.candidate.penalty + MARGIN and (
+        by_curves > by_effect)
