@@ -11,7 +11,7 @@ import numpy as np
 from pprs_dynamics.diagnosis.design import SHAPE_STEP, BaseColumn, Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, JointFit, Regression
 from pprs_dynamics.effects.drive_effect import DriveEffect
-from pprs_dynamics.effects.effect import Parameter
+from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import DriveModel
@@ -214,6 +214,28 @@ def fitted_model(regression: Regression, fit: JointFit, calibrate: bool = True) 
         values['effects.active'] = names
     model = build_model(values)
     return replace(model, source=design.model.source)
+
+
+def estimate_present(regression: Regression, fit: JointFit, name: str) -> Estimates:
+    """Return what a fit says about an effect that its model has already.
+
+    Only for effects whose parameters are their coefficients.
+    """
+    values = dict(regression.design.model.values)
+    _update_present(values, regression.design, fit)
+    effect = next(e for e in regression.design.model.effects if e.name == name)
+    assert isinstance(effect, CatalogueEffect)
+    units = {p.name: p.unit for p in effect.parameters}
+    steps = {p.name: p.scale for p in effect.parameters}
+    found = {}
+    for k, column in enumerate(regression.design.base):
+        if column.kind == 'present' and column.label.startswith(f'{name}.'):
+            _, drive, parameter = column.label.split('.')
+            key = f'{drive}.{parameter}' if drive else parameter
+            std = float(np.sqrt(fit.covariance[k, k])) * (
+                1e-3 if parameter == 'delay' else steps[parameter])
+            found[key] = Estimate(values[f'effects.{name}.{key}'], std, units[parameter])
+    return Estimates(found, ())
 
 
 def _update_present(values: dict[str, Any], design: Design, fit: JointFit) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pprs_dynamics.diagnosis.adoption import (
     Estimate,
     calibrations,
     estimate_all,
+    estimate_present,
     fitted_model,
 )
 from pprs_dynamics.diagnosis.cautions import find_cautions
@@ -30,6 +31,9 @@ from pprs_dynamics.model.drive_model import DriveModel
 
 # Shares of the work, for the progress bar.
 DESIGN, SELECTION = 0.4, 0.3
+# Effects that change how all others show, or that their columns describe only nearby.
+NOT_LINEAR = frozenset({'time_delay', 'homing_error', 'effort_gain', 'payload_offset',
+                        'base_tilt'})
 
 
 @dataclass(frozen=True)
@@ -182,65 +186,127 @@ def diagnose(
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    design = Design.of(model, recordings, lambda share: report(DESIGN * share))
-    regression = Regression(design)
-    selector = Selector(regression, lambda share: report(DESIGN + SELECTION * share))
-    selection = selector.select()
-    unexplained = find_unexplained(selector, selection)
-    report(0.9)
-    return _answer(design, regression, selector, selection, unexplained, validate)
+    stage = _Stage.of(model, recordings, report)
+    first = stage
+    bent = [one for one in stage.selection.adopted if one.candidate.name in NOT_LINEAR]
+    if bent:
+        # All other columns hold only around a model that has these: it starts again from there.
+        model_with = _model_with(stage, bent)
+        stage = _Stage.of(model_with, recordings, lambda share: report(0.5 + 0.4 * share), bent)
+    early = _effects_of(first, bent, validate) if bent else []
+    explained = sum((np.var(one.force, axis=0) for one in early),
+                    np.zeros(len(first.design.drives)))
+    unexplained = find_unexplained(stage.selector, stage.selection, explained)
+    report(0.95)
+    return _answer(first, bent, early, stage, unexplained, validate)
 
 
-def _answer(
-    design: Design, regression: Regression, selector: Selector, selection: Selection,
-    unexplained: Unexplained, validate: Sequence[Recording],
-) -> Diagnosis:
-    drives = design.drives
-    steps = [_fit_of_first(regression, selection, k) for k in range(len(selection.adopted) + 1)]
-    models = [fitted_model(regression, fit) for fit in steps]
-    errors = [regression.error((), np.zeros(len(design.base))),
-              *(regression.error(fit.active, fit.coefficients) for fit in steps[1:])]
+@dataclass(frozen=True)
+class _Stage:
+    """A selection from one model."""
+
+    design: Design
+    regression: Regression
+    selector: Selector
+    selection: Selection
+
+    @classmethod
+    def of(cls, model: DriveModel, recordings: Sequence[Recording],
+           report: Callable[[float], None], earlier: Sequence[Judged] = ()) -> _Stage:
+        design = Design.of(model, recordings, lambda share: report(DESIGN * share))
+        regression = Regression(design)
+        selector = Selector(regression, lambda share: report(DESIGN + SELECTION * share),
+                            earlier)
+        return cls(design, regression, selector, selector.select())
+
+
+def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> DriveModel:
+    """Return the model with some of what a stage adopted, its own numbers as they were."""
+    fit = stage.selection.fit
+    kept = {id(active) for one in adopted for active in one.candidate.active}
+    active, places, place = [], list(range(len(stage.design.base))), len(stage.design.base)
+    for one in fit.active:
+        if id(one) in kept:
+            active.append(one)
+            places += range(place, place + one.size)
+        place += one.size
+    part = replace(fit, active=tuple(active), coefficients=fit.coefficients[places],
+                   covariance=fit.covariance[np.ix_(places, places)])
+    return fitted_model(stage.regression, part, calibrate=False)
+
+
+def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], stage: _Stage,
+            unexplained: Unexplained, validate: Sequence[Recording]) -> Diagnosis:
+    late = _effects_of(stage, stage.selection.adopted, validate)
+    for k, one in enumerate(early):
+        known = estimate_present(stage.regression, stage.selection.fit, one.name)
+        early[k] = replace(one, parameters=known.parameters)
+    if early and late:
+        late[0] = replace(late[0], error_before=early[-1].error_after,
+                          held_out_before=early[-1].held_out_after)
+    effects = [*early, *late]
+    rivals = {**{one.candidate.name: first.selection.rivals.get(one.candidate.name, [])
+                 for one in bent}, **stage.selection.rivals}
+    sets = tuple((name, *others) for name, others in rivals.items() if others)
+    verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
+               else 'effect' if effects else 'adequate')
+    regression, fit = stage.regression, stage.selection.fit
+    moved = [one for one in calibrations(regression, fit)
+             if abs(one.after - one.before) > 2 * one.std]
+    noise = np.concatenate([rest[regression.series[d].known] for d, rest in fit.rest.items()])
+    drives = first.design.drives
+    return Diagnosis(
+        verdict, tuple(effects), sets,
+        tuple(_ranked(one, drives, first.regression) for one in first.selection.candidates),
+        tuple(_ranked(one, drives, regression) for one in stage.selection.suspects),
+        unexplained.statements, unexplained.of_form, tuple(moved),
+        find_cautions(first.design, first.regression, first.selector, first.selection, effects),
+        first.design.notes, first.design.model, fitted_model(regression, fit),
+        first.design.residuals, unexplained.remaining, float(np.sqrt(np.mean(noise ** 2))),
+        'validation' if validate else 'blocks')
+
+
+def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Recording],
+                ) -> list[FoundEffect]:
+    """Return what a stage adopted, with the errors as one after the other is added."""
+    design, regression, fit = stage.design, stage.regression, stage.selection.fit
+    drives, base = design.drives, len(design.base)
+    steps = [_fit_of_first(stage, adopted, k) for k in range(len(adopted) + 1)]
+    errors = [regression.error((), np.zeros(base)),
+              *(regression.error(step.active, step.coefficients) for step in steps[1:])]
     if validate:
-        held_out = [_error_on(one, validate) for one in (design.model, *models[1:])]
+        models = [design.model, *(fitted_model(regression, step) for step in steps[1:])]
+        held_out = [_error_on(one, validate) for one in models]
     else:
-        held_out = [regression.held_out_error(fit.active, fit.noises) for fit in steps]
-    estimates = estimate_all(regression, selection.fit)
-    effects, first, place = [], 0, len(design.base)
-    for k, one in enumerate(selection.adopted):
-        count = len(one.candidate.active)
-        mine = estimates[first:first + count]
-        width = sum(active.size for active in one.candidate.active)
+        held_out = [regression.held_out_error(step.active, step.noises) for step in steps]
+    places: dict[int, tuple[int, int]] = {}
+    place = base
+    for number, active in enumerate(fit.active):
+        places[id(active)] = (place, number)
+        place += active.size
+    estimates = estimate_all(regression, fit)
+    effects = []
+    for k, one in enumerate(adopted):
+        mine = [estimates[places[id(active)][1]] for active in one.candidate.active]
+        own = np.concatenate([fit.coefficients[places[id(active)][0]:][:active.size]
+                              for active in one.candidate.active])
         effects.append(FoundEffect(
             one.candidate.effect, _names(one, drives),
             {key: value for found in mine for key, value in found.parameters.items()},
             one.evidence, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-            _force(design, one.candidate.active, selection.fit.coefficients[place:place + width]),
+            _force(design, one.candidate.active, own),
             tuple(key for found in mine for key in found.at_bound)))
-        first, place = first + count, place + width
-    sets = tuple((name, *rivals) for name, rivals in selection.rivals.items() if rivals)
-    verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
-               else 'effect' if effects else 'adequate')
-    moved = [one for one in calibrations(regression, selection.fit)
-             if abs(one.after - one.before) > 2 * one.std]
-    noise = np.concatenate([rest[regression.series[d].known]
-                            for d, rest in selection.fit.rest.items()])
-    return Diagnosis(
-        verdict, tuple(effects), sets,
-        tuple(_ranked(one, drives, regression) for one in selection.candidates),
-        tuple(_ranked(one, drives, regression) for one in selection.suspects),
-        unexplained.statements, unexplained.of_form, tuple(moved),
-        find_cautions(design, regression, selector, selection, effects), design.notes,
-        design.model, models[-1], design.residuals, unexplained.remaining,
-        float(np.sqrt(np.mean(noise ** 2))), 'validation' if validate else 'blocks')
+    return effects
 
 
-def _fit_of_first(regression: Regression, selection: Selection, count: int) -> JointFit:
+def _fit_of_first(stage: _Stage, adopted: Sequence[Judged], count: int) -> JointFit:
     """Return the fit of the first adopted effects."""
+    selection = stage.selection
     if count == len(selection.adopted):
         return selection.fit
     active: tuple[Active, ...] = tuple(
-        a for one in selection.adopted[:count] for a in one.candidate.active)
-    return regression.fit(active, selection.fit.noises, iterations=1)
+        a for one in adopted[:count] for a in one.candidate.active)
+    return stage.regression.fit(active, selection.fit.noises, iterations=1)
 
 
 def _error_on(model: DriveModel, recordings: Sequence[Recording]) -> float:

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import fft
@@ -33,6 +34,7 @@ COEFFICIENT_PENALTY = 4.0
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 10, 12)
 # Least reach of data per lag: with fewer samples a coefficient cannot be estimated.
 SAMPLES_PER_REACH = 8
+LEAST_FOR_FFT = 6  # coefficients, from which on transforms are faster than sums
 ROUNDING = 1e-6  # innovations are at least this share of the noise
 
 
@@ -110,11 +112,22 @@ class NoiseModel:
             stop = n if k + 1 == len(self.orders) else min(reaches[k + 1], n)
             if start >= stop:
                 continue
+            if len(c) >= LEAST_FOR_FFT and stop - start > 4 * start:
+                white[..., start:] = self._filtered(y)[..., start:]
+                continue
             ahead = y[..., start:stop].copy()
             for weight, (first, last) in zip(c, self.windows, strict=False):
                 ahead -= weight * _window_mean(y, total, start, stop, first, last)
             white[..., start:stop] = ahead / self.deviations[k]
         return white
+
+    def _filtered(self, y: Array) -> Array:
+        """Return the last model's whitened values by Fourier transforms; for many lags."""
+        size = fft.next_fast_len(y.shape[-1] + len(self.filter) - 1, real=True)
+        taps = (self.filter / self.innovation).astype(y.dtype)
+        response: Any = fft.rfft(taps, size)
+        filtered: Array = fft.irfft(fft.rfft(y, size) * response, size)[..., :y.shape[-1]]
+        return filtered
 
     def log_deviation(self, samples: int, stretches: Sequence[slice]) -> Array:
         """Return ln of the innovation's standard deviation at each sample, (N,)."""

@@ -21,6 +21,8 @@ from pprs_dynamics.mechanism.robot import Array
 # What the model and the adopted effects have taken already cannot be told apart from them: of
 # its square, at least this share of a column must be its own.
 OWN_SHARE = 1e-7
+HELD = 1e-3  # of a column's square may lie outside the span of another effect's
+DRIVE_MARGIN = 6.0
 SCANNED_SHARE = 1e-5  # the same in single precision
 LEAST_EIGENVALUE = 1e-5
 REFINEMENTS = 12  # evaluations of a shape parameter between its neighbours in the grid
@@ -303,12 +305,46 @@ class Scan:
         joined = []
         for found in effects.values():
             found.sort(key=lambda one: -one.score)
-            kept = [one for one in found if one.score > 0] or found[:1]
+            # A further drive has to be more than a share in what the others explain.
+            kept = [one for one in found if one.score > DRIVE_MARGIN] or found[:1]
+            if len(found[0].active[0].term.rows) > 1 and found[0].drives is not None:
+                kept = self._one_by_one(found)
             joined.append(Candidate(
                 tuple(active for one in kept for active in one.active),
                 sum(one.gain for one in kept),
                 sum(one.penalty for one in kept) + self.library.name_penalty))
         return sorted(joined, key=lambda one: -one.score)
+
+    def _one_by_one(self, found: list[Candidate]) -> list[Candidate]:
+        """Return drives whose terms reach all others, each for what it adds to those before."""
+        kept, left = [found[0]], [one for one in found[1:] if one.score > 0]
+        while left:
+            scan = Scan(self.library, (*self.active, *(a for one in kept for a in one.active)),
+                        self.noises)
+            left = sorted((Candidate(one.active, scan.gain(one.active[0]), one.penalty)
+                           for one in left), key=lambda one: -one.score)
+            if left[0].score <= DRIVE_MARGIN:
+                break
+            kept.append(left.pop(0))
+        return kept
+
+    def holds(self, larger: Candidate, smaller: Candidate) -> bool:
+        """Return whether an effect with more coefficients can be all that another one is."""
+        if sum(one.size for one in larger.active) <= sum(one.size for one in smaller.active):
+            return False
+        reached: dict[int | None, Active] = {one.term.drive: one for one in larger.active}
+        for one in smaller.active:
+            other = reached.get(one.term.drive)
+            if other is None:
+                return False
+            for d in one.term.rows:
+                theirs, mine = other.on(d), one.on(d)
+                if theirs is None or mine is None:
+                    return False
+                rest = mine - np.linalg.lstsq(theirs.T, mine.T, rcond=None)[0].T @ theirs
+                if np.sum(rest ** 2) > HELD * np.sum(mine ** 2):
+                    return False
+        return True
 
     def refined(self, candidate: Candidate) -> Candidate:
         """Return the candidate with its shape parameters between the grid's values."""

@@ -21,14 +21,16 @@ from pprs_dynamics.diagnosis.scan import Candidate, Library, Scan
 
 MOST_EFFECTS = 6
 MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
+FURTHER_MARGIN = 10.0  # more, for an effect that lives on what others have left
 PROPOSALS = 4  # of each scan
 # What an adopted effect leaves may be its form, which is an idealisation: a further effect on
 # the same drives has to gain this share of what it gained.
-FORM_SHARE = 0.03
+FORM_SHARE = 0.08
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0  # standard errors of the blocks' losses
-# A rival this near in score, or as near as one standard error of the blocks' losses, explains
-# as well.
-NEAR_SCORE = 10.0
+# A rival explains as well that is this near in score, or a little further and as near as one
+# standard error of the blocks' losses.
+NEAR_SCORE, FAR_SCORE = 10.0, 30.0
+MOST_RIVALS = 8  # looked at
 SWAP = 4.0  # in score, for which an adopted effect gives way to another
 
 
@@ -84,11 +86,14 @@ class Selector:
     regression : Regression
     progress : callable, optional
         Called with the share that is done.
+    earlier : sequence of Judged
+        What was adopted already and is in the design's model.
     """
 
     def __init__(self, regression: Regression,
-                 progress: Callable[[float], None] | None = None) -> None:
-        self.regression = regression
+                 progress: Callable[[float], None] | None = None,
+                 earlier: Sequence[Judged] = ()) -> None:
+        self.regression, self.earlier = regression, tuple(earlier)
         self._report = progress or (lambda share: None)
         self.library = Library(regression)
         self.rich = {d: self._rich_noise(d) for d in regression.series}
@@ -167,17 +172,18 @@ class Selector:
         return Judged(candidate, fit, gain - candidate.penalty - MARGIN)
 
     def _stands(self, one: Judged, selection: Selection) -> bool:
-        if one.evidence <= 0:
+        before_it = [*self.earlier, *selection.adopted]
+        if one.evidence <= (FURTHER_MARGIN if before_it else 0.0):
             return False
         active = self._actives(selection.adopted)
         before = self.regression.block_losses(active, one.fit.noises).losses
         after = self.regression.block_losses(one.fit.active, one.fit.noises).losses
         change = before - after
-        errors = FURTHER_ERRORS if selection.adopted else FIRST_ERRORS
+        errors = FURTHER_ERRORS if before_it else FIRST_ERRORS
         if change.mean() <= errors * change.std(ddof=1) / np.sqrt(len(change)):
             return False
         mine = one.candidate.drives
-        for other in selection.adopted:
+        for other in before_it:
             theirs = other.candidate.drives
             shared = mine is None or theirs is None or set(mine) & set(theirs)
             if shared and one.evidence < FORM_SHARE * other.evidence:
@@ -239,14 +245,20 @@ class Selector:
             mine = scan.refined(mine)
             losses = self.regression.block_losses((*active, *mine.active), noises).losses
             near = []
-            for candidate in found[:8]:
+            for candidate in found[:MOST_RIVALS]:
                 if candidate.name == mine.name or candidate.score < mine.score / 2:
                     continue
                 refined = scan.refined(candidate)
+                behind = mine.score - refined.score
+                if scan.holds(refined, mine):
+                    # It can do all that the adopted effect does: a rival only where it uses more.
+                    if behind < NEAR_SCORE / 2:
+                        near.append(refined.name)
+                    continue
                 change = self.regression.block_losses(
                     (*active, *refined.active), noises).losses - losses
                 error = change.std(ddof=1) / np.sqrt(len(change))
-                if refined.score > mine.score - NEAR_SCORE or change.mean() <= error:
+                if behind < NEAR_SCORE or (behind < FAR_SCORE and change.mean() <= error):
                     near.append(refined.name)
             if near:
                 rivals[one.candidate.name] = near

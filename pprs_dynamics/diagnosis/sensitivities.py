@@ -28,6 +28,7 @@ from pprs_dynamics.model.model_file import build_model
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
+DEVIATIONS = 2.5
 HOMING_STEP = 1e-5  # [m]
 # Friction that turns over in another width than the model's is no effect: multiples of the
 # width whose differences span what is between 0.2 and 5 times the model's.
@@ -67,7 +68,7 @@ class Number:
 def known_numbers(model: DriveModel) -> tuple[Number, ...]:
     """Return the model's numbers that its `tolerances` leave open.
 
-    Anything within the tolerance is as likely as anything else: a deviation of a third root.
+    A tolerance is a limit: 2.5 standard deviations.
     """
     from pprs_dynamics.model.keys import KEYS
 
@@ -78,7 +79,7 @@ def known_numbers(model: DriveModel) -> tuple[Number, ...]:
             continue
         value = model.values[key]
         elements = enumerate(value) if isinstance(value, tuple) else [(None, value)]
-        found += [Number(key, element, one, abs(one) * tolerance / 3 ** 0.5, KEYS[key].unit)
+        found += [Number(key, element, one, abs(one) * tolerance / DEVIATIONS, KEYS[key].unit)
                   for element, one in elements if one]
     return tuple(found)
 

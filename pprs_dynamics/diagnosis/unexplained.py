@@ -46,11 +46,21 @@ class Unexplained:
     remaining: Array
 
 
-def find_unexplained(selector: Selector, selection: Selection) -> Unexplained:
-    """Return what remains, after dropping effects that a remainder explains better."""
+def find_unexplained(selector: Selector, selection: Selection, explained: Array,
+                     ) -> Unexplained:
+    """Return what remains, after dropping effects that a remainder explains better.
+
+    Parameters
+    ----------
+    selector : Selector
+    selection : Selection
+        From which effects are dropped.
+    explained : (D,) array
+        Mean square of what effects in the model explain on each drive already [N^2].
+    """
     regression = selector.regression
     for _ in range(2):
-        found = _search(regression, selection)
+        found = _search(regression, selection, explained)
         dropped = [one for one in selection.adopted if found.statements
                    and _is_needless(one, selector, selection, found)]
         if not dropped:
@@ -63,20 +73,29 @@ def find_unexplained(selector: Selector, selection: Selection) -> Unexplained:
     return found
 
 
-def _search(regression: Regression, selection: Selection) -> Unexplained:
+def _search(regression: Regression, selection: Selection, before: Array) -> Unexplained:
     residuals = regression.design.residuals
     remaining = np.full(residuals.measured.shape, np.nan)
     for d, series in regression.series.items():
         remaining[series.index, d] = np.where(series.known, selection.fit.rest[d], np.nan)
     where = localise(replace(residuals, measured=residuals.model + remaining, parts={}))
-    explained = _explained(regression, selection)
+    explained = before + _explained(regression, selection)
     statements: list[Statement] = []
     of_form: list[Statement] = []
     for statement in where.statements:
         d = residuals.drives.index(statement.drive)
-        left = float(np.nanmean(remaining[:, d] ** 2)) * statement.share_of_error
+        left = _size(statement, float(np.nanmean(remaining[:, d] ** 2)))
         (of_form if left < FORM_SHARE * explained[d] else statements).append(statement)
     return Unexplained(tuple(statements), tuple(of_form), where, remaining)
+
+
+def _size(statement: Statement, mean_square: float) -> float:
+    """Return the mean square of the pattern of a statement [N^2]."""
+    if statement.kind == 'scatter':
+        return mean_square * max(statement.share_of_error - statement.share_of_time, 0.0)
+    if statement.range is None or statement.kind == 'line':
+        return mean_square * statement.share_of_error
+    return statement.amplitude ** 2 * statement.share_of_time
 
 
 def _explained(regression: Regression, selection: Selection) -> Array:

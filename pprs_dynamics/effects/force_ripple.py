@@ -17,6 +17,7 @@ from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.mechanism.robot import Array
 
 SHORTEST = 8e-4  # [m], pitch tried
+FEWEST = 3  # periods over the stroke; fewer are a spring's curve as well
 MOST = 120  # periods over the stroke, tried
 # Half a step puts a trial out of step with the truth by pi/4 at most at the ends of the stroke.
 STEP = 0.5  # periods over the stroke from trial to trial
@@ -90,7 +91,7 @@ class ForceRipple(DriveEffect):
         stroke = np.clip(covered.stroke, 1e-5, 10.0)
         most = np.clip(stroke / SHORTEST, 1, MOST)
         return [{'pitch': float(stroke / periods)}
-                for periods in np.arange(1, most + STEP / 2, STEP)]
+                for periods in np.arange(FEWEST, max(most, FEWEST) + STEP / 2, STEP)]
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

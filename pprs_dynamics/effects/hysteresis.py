@@ -2,8 +2,8 @@
 
 With the drive moving by dq, the Dahl state z in [-1, 1] follows dz = (s - z) / x_d |dq|,
 s = sgn(dq), solved by z = s + (z_r - s) exp(-|q - q_r| / x_d) from a reversal at q_r, z_r on.
-The effect adds F (z - sgn q_dot): what presliding takes away from the Coulomb friction F that
-the model already has. Motion that reverses within a sample goes unseen.
+The effect adds (F + mu N) (z - sgn q_dot): what presliding takes away from the Coulomb friction
+that the model already has, be it constant or in proportion to the guide's load N. Motion that reverses within a sample goes unseen.
 """
 
 from __future__ import annotations
@@ -22,12 +22,15 @@ class Hysteresis(DriveEffect):
     """Elastic give of the contacts before they slide: preloaded ball guides, seals, belts."""
 
     name: ClassVar[str] = 'hysteresis'
-    linear = (Parameter('force', 'F', 'N', 'friction force that builds up', -1e6, 1e6, scale=0.5),)
+    linear = (Parameter('force', 'F', 'N', 'friction force that builds up', -1e6, 1e6, 0.0, 0.5),
+              Parameter('coefficient', 'mu', '1', 'friction per guide load that builds up', -1e3,
+                        1e3, 0.0, 0.05))
+    variants = (('force',), ('coefficient',))
     shape = (Parameter('distance', 'x_d', 'm', 'distance over which it builds up', 1e-7, 0.1,
                        scale=1e-4),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
+    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0, 'coefficient': 0.0}
     card = Card(
-        'F (z - sgn q_dot), dz/dq = (1 - z sgn q_dot) / x_d',
+        '(F + mu N) (z - sgn q_dot), dz/dq = (1 - z sgn q_dot) / x_d',
         'a spike after each reversal, where the model already asks for full friction and the '
         'drive does not yet need it; it decays with the distance moved, not with time or speed, '
         'and over position the force draws loops',
@@ -42,8 +45,9 @@ class Hysteresis(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return (z - sgn q_dot,), and advance the memory to the last sample."""
-        return (presliding(drive.position, shape['distance'], drive.memory) - drive.direction,)
+        """Return z - sgn q_dot alone and times N, and advance the memory to the last sample."""
+        change = presliding(drive.position, shape['distance'], drive.memory) - drive.direction
+        return (change, drive.guide_load * change)
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
