@@ -17,6 +17,7 @@ from scipy.stats import norm, rankdata
 
 from pprs_dynamics.diagnosis.hypotheses import Pattern
 from pprs_dynamics.diagnosis.noise import NoiseModel, effective_samples
+from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import FINE, Candidate, DriveSearch
 from pprs_dynamics.diagnosis.wording import Statement, word_statement
@@ -112,21 +113,28 @@ def localise(
     thin = residuals.thinned(MOST_SAMPLES)
     rng = np.random.default_rng(seed)
     report = progress or (lambda share: None)
-    opened: dict[str, _Open | None] = {}
-    for drive, name in enumerate(thin.drives):
-        opened[name] = None
-        if np.isfinite(thin.measured[:, drive]).sum() >= LEAST_SAMPLES:
-            search = DriveSearch(thin, drive)
-            opened[name] = _open(search, rng) if _has_error(search) else None
-        report(0.4 * (drive + 1) / len(thin.drives))
-    threshold = _threshold([state.null for state in opened.values() if state], false_alarms)
-    drives = {}
-    for done, (name, state) in enumerate(opened.items()):
-        if state is None:
-            drives[name] = DriveFindings((), None, np.zeros(0), np.zeros(0, dtype=int))
-        else:
-            drives[name] = _search(name, state, threshold)
-        report(0.4 + 0.6 * (done + 1) / len(opened))
+    seeds = rng.spawn(len(thin.drives))
+
+    def open_drive(drive: int) -> _Open | None:
+        if np.isfinite(thin.measured[:, drive]).sum() < LEAST_SAMPLES:
+            return None
+        search = DriveSearch(thin, drive)
+        return _open(search, seeds[drive]) if _has_error(search) else None
+
+    opened = each(open_drive, range(len(thin.drives)))
+    report(0.4)
+    threshold = _threshold([state.null for state in opened if state], false_alarms)
+    done: list[str] = []
+
+    def search_drive(drive: int) -> DriveFindings:
+        name, state = thin.drives[drive], opened[drive]
+        found = (DriveFindings((), None, np.zeros(0), np.zeros(0, dtype=int)) if state is None
+                 else _search(name, state, threshold))
+        done.append(name)
+        report(0.4 + 0.6 * len(done) / len(thin.drives))
+        return found
+
+    drives = dict(zip(thin.drives, each(search_drive, range(len(thin.drives))), strict=True))
     ranked = sorted((statement for findings in drives.values()
                      for statement in findings.statements), key=lambda s: -s.evidence)
     return Localisation(tuple(ranked), drives, threshold)
@@ -284,16 +292,19 @@ def _scatter(
     for family in search.families:
         if family.paired or family.variable in stated or len(family.columns) == 1:
             continue
-        for at, pattern in enumerate(family.patterns):
-            if pattern.kind not in ('range', 'fast'):
+        # Bins do not overlap, so that sums over patterns are sums over their bins.
+        members = family.columns[:, known] > 0.5
+        inside, totals = family.weights @ members.sum(axis=1), family.weights @ (
+            members @ scores[known])
+        gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - family.penalty
+        for at in np.argsort(-gains):
+            pattern, gain = family.patterns[at], float(gains[at])
+            if gain <= max(needed, best.score if best else 0.0):
+                break
+            if pattern.kind not in ('range', 'fast') or totals[at] <= 0:
                 continue
-            column = family.pattern_columns(at)[0]
+            column = family.pattern_columns(int(at))[0]
             held = column[known] > 0.5
-            inside = int(held.sum())
-            total = float(scores[known][held].sum())
-            gain = total ** 2 / max(inside * (1 - inside / n), 1e-9) - family.penalty
-            if total <= 0 or gain <= max(needed, best.score if best else 0.0):
-                continue
             ratio = (np.mean(innovations[known][held] ** 2)
                      / max(float(np.mean(innovations[known][~held] ** 2)), 1e-300))
             if ratio >= LEAST_SCATTER:

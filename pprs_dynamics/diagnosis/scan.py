@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize_scalar
 
-from pprs_dynamics.diagnosis.design import Term
-from pprs_dynamics.diagnosis.joint_fit import Active, Regression
+from pprs_dynamics.diagnosis.joint_fit import Active
+from pprs_dynamics.diagnosis.library import LEAST_EIGENVALUE, Candidate, Library
 from pprs_dynamics.diagnosis.noise import NoiseModel
-from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.effects.drive_effect import DriveEffect
-from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.mechanism.robot import Array
 
 # What the model and the adopted effects have taken already cannot be told apart from them: of
@@ -23,183 +20,7 @@ from pprs_dynamics.mechanism.robot import Array
 OWN_SHARE = 1e-7
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 DRIVE_MARGIN = 6.0
-SCANNED_SHARE = 1e-5  # the same in single precision
-LEAST_EIGENVALUE = 1e-5
 REFINEMENTS = 12  # evaluations of a shape parameter between its neighbours in the grid
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect on some drives, or in the structure, with what it gains.
-
-    Parameters
-    ----------
-    active : tuple of Active
-        One per drive, or one.
-    gain : float
-        Twice the log-likelihood ratio under the given noise.
-    penalty : float
-    """
-
-    active: tuple[Active, ...]
-    gain: float
-    penalty: float
-
-    @property
-    def effect(self) -> type[CatalogueEffect]:
-        """The effect."""
-        return self.active[0].term.effect
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return self.effect.name
-
-    @property
-    def drives(self) -> tuple[int, ...] | None:
-        """Drives on which it sits; None for the structure."""
-        drives = [one.term.drive for one in self.active]
-        return None if drives[0] is None else tuple(d for d in drives if d is not None)
-
-    @property
-    def score(self) -> float:
-        """Gain less penalty."""
-        return self.gain - self.penalty
-
-
-@dataclass(frozen=True)
-class Group:
-    """Terms on one drive with equally many rows.
-
-    Parameters
-    ----------
-    active : list of n Active
-    rows : (n, k) int array
-        Places in the drive's stacked rows.
-    penalties : (n,) array
-    effects : dict of str to slice
-        Of the n, by effect.
-    fixed : bool
-    """
-
-    active: list[Active]
-    rows: np.typing.NDArray[np.int_]
-    penalties: Array
-    effects: dict[str, slice]
-    fixed: bool
-
-    @classmethod
-    def of(cls, active: list[Active], rows: list[list[int]], penalties: list[float],
-           fixed: bool) -> Group:
-        """Return the group, its effects each in one run."""
-        order = sorted(range(len(active)), key=lambda k: active[k].term.effect.name)
-        names = [active[k].term.effect.name for k in order]
-        effects = {name: slice(names.index(name), names.index(name) + names.count(name))
-                   for name in dict.fromkeys(names)}
-        return cls([active[k] for k in order], np.array([rows[k] for k in order]),
-                   np.array([penalties[k] for k in order]), effects, fixed)
-
-    def gains(self, white: Array, gone: Array, sides: Array) -> Array:
-        """Return twice the log-likelihood gain of each, (n,)."""
-        own = white[self.rows]
-        gram = (own @ own.transpose(0, 2, 1)).astype(float)
-        taken = gone.T[self.rows]
-        S = gram - taken @ taken.transpose(0, 2, 1)
-        b = sides[self.rows]
-        size = np.einsum('nkk->nk', S)
-        if self.fixed:
-            gains: Array = 2 * b[:, 0] - size[:, 0]
-            return gains
-        possible = np.all(size > SCANNED_SHARE * np.einsum('nkk->nk', gram), axis=1)
-        scale = 1 / np.sqrt(np.where(possible[:, None], size, 1.0))
-        b = b * scale
-        if self.rows.shape[1] == 1:
-            return np.where(possible, b[:, 0] ** 2, 0.0)
-        values, axes = np.linalg.eigh(S * scale[:, :, None] * scale[:, None, :])
-        along = np.einsum('nkj,nk->nj', axes, b)
-        kept = values > LEAST_EIGENVALUE
-        gains = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
-        return np.where(possible, gains, 0.0)
-
-
-class Library:
-    """All terms that the catalogue offers for a design.
-
-    Parameters
-    ----------
-    regression : Regression
-    """
-
-    def __init__(self, regression: Regression) -> None:
-        self.regression = regression
-        design = regression.design
-        self.names = len(catalogue())
-        present = {(effect.name, drive) for effect in design.model.effects
-                   if isinstance(effect, DriveEffect) for drive in effect.drives}
-        self.structure = design.structure
-        self.trials: dict[tuple[str, int], int] = {}
-        self.local: dict[int, list[Term]] = {d: [] for d in regression.series}
-        self.spanning = [term for term in design.homing
-                         if (HomingError.name, design.drives[term.drive or 0]) not in present]
-        for effect in catalogue().values():
-            if not issubclass(effect, DriveEffect) or effect is HomingError:
-                continue
-            for d in regression.series:
-                if (effect.name, design.drives[d]) in present:
-                    continue
-                shapes = effect.trials(design.covered[d])
-                self.trials[effect.name, d] = len(shapes)
-                self.local[d] += design.trial_terms(effect, d, shapes)
-        self._groups: dict[int, list[Group]] = {}
-        self._rows: dict[int, Array] = {}
-        self._white: dict[int, list[tuple[NoiseModel, Array]]] = {d: [] for d in self.local}
-
-    def groups(self, d: int) -> list[Group]:
-        """Return all local terms in all variants, grouped by their number of rows."""
-        if d not in self._groups:
-            sizes: dict[tuple[int, bool], list[tuple[Active, list[int]]]] = {}
-            first = 0
-            for term in self.local[d]:
-                for variant in scanned_variants(term.effect):
-                    active = Active(term, variant)
-                    rows = [0] if term.fixed else active.chosen
-                    sizes.setdefault((len(rows), term.fixed), []).append(
-                        (active, [first + row for row in rows]))
-                first += len(term.rows[d])
-            self._groups[d] = [
-                Group.of([active for active, _ in found], [rows for _, rows in found],
-                         [self.penalty(active) for active, _ in found], fixed)
-                for (_, fixed), found in sizes.items()]
-        return self._groups[d]
-
-    def whitened(self, d: int, noise: NoiseModel) -> Array:
-        """Return all local rows of a drive, whitened, (n, N), in single precision."""
-        for known, white in self._white[d]:
-            if known is noise:
-                return white
-        series = self.regression.series[d]
-        if d not in self._rows:
-            self._rows[d] = np.concatenate(
-                [term.rows[d][:, series.index] for term in self.local[d]]).astype(np.float32)
-        white = series.whiten(noise, self._rows[d])
-        self._white[d] = [*self._white[d][-1:], (noise, white)]
-        return white
-
-    def penalty(self, active: Active) -> float:
-        """Return the price of one term: its coefficients, shapes, variants and place."""
-        term, logarithm = active.term, float(np.log(self.regression.samples))
-        price = active.size * logarithm + 2 * float(np.log(len(term.effect.variants)))
-        if term.shape:
-            tried = self.trials.get((term.effect.name, term.drive or 0), 1)
-            price += max(len(term.shape) * logarithm, 2 * float(np.log(tried)))
-        if term.drive is not None:
-            price += 2 * float(np.log(len(self.regression.series)))
-        return price
-
-    @property
-    def name_penalty(self) -> float:
-        """Price of the choice among effects."""
-        return 2 * float(np.log(self.names))
 
 
 class Scan:
@@ -231,6 +52,11 @@ class Scan:
 
     def projected(self, rows: dict[int, Array]) -> tuple[Array, Array, Array]:
         """Return own Gram matrix, own right-hand side, and full squares of rows, (k, k), (k,)."""
+        gram, side, taken = self._products(rows)
+        return gram - taken.T @ taken, side, np.diag(gram).copy()
+
+    def _products(self, rows: dict[int, Array]) -> tuple[Array, Array, Array]:
+        """Return the Gram matrix, the own right-hand side, and what the active ones take."""
         k = len(next(iter(rows.values())))
         gram, side = np.zeros((k, k)), np.zeros(k)
         cross = np.zeros((len(self._scale), k))
@@ -243,12 +69,8 @@ class Scan:
             cross[index] += known @ white.T
             gram += white @ white.T
             side += white @ y
-        return self._without(gram, side, cross)
-
-    def _without(self, gram: Array, side: Array, cross: Array) -> tuple[Array, Array, Array]:
         taken = solve_triangular(self._root, self._scale[:, None] * cross, lower=True)
-        whole = np.diag(gram).copy()
-        return gram - taken.T @ taken, side - taken.T @ self._b, whole
+        return gram, side - taken.T @ self._b, taken
 
     def gain(self, active: Active) -> float:
         """Return twice the log-likelihood gain of one more term."""
@@ -270,24 +92,26 @@ class Scan:
     def local_bests(self) -> Iterator[Candidate]:
         """Yield the best shape and variant of every effect on every drive."""
         taken = {(one.term.effect.name, one.term.drive) for one in self.active}
-        for d in self.library.local:
-            index, known, y = self._parts[d]
-            white = self.library.whitened(d, self.noises[d])
-            cross = np.zeros((len(self._scale), len(white)))
-            cross[index] = known.astype(np.float32) @ white.T
-            gone = solve_triangular(self._root, self._scale[:, None] * cross, lower=True)
-            sides = (white @ y.astype(np.float32)).astype(float) - gone.T @ self._b
-            best: dict[str, Candidate] = {}
-            for group in self.library.groups(d):
-                gains = group.gains(white, gone, sides)
-                scores = gains - group.penalties
-                for name, part in group.effects.items():
-                    at = part.start + int(np.argmax(scores[part]))
-                    if (name, d) not in taken and (
-                            name not in best or scores[at] > best[name].score):
-                        best[name] = Candidate((group.active[at],), float(gains[at]),
-                                               float(group.penalties[at]))
-            yield from best.values()
+        for best in each(self._local_bests, self.library.local):
+            yield from (one for one in best if (one.name, one.active[0].term.drive) not in taken)
+
+    def _local_bests(self, d: int) -> list[Candidate]:
+        index, known, y = self._parts[d]
+        white = self.library.whitened(d, self.noises[d])
+        cross = np.zeros((len(self._scale), len(white)))
+        cross[index] = known.astype(np.float32) @ white.T
+        gone = solve_triangular(self._root, self._scale[:, None] * cross, lower=True)
+        sides = (white @ y.astype(np.float32)).astype(float) - gone.T @ self._b
+        best: dict[str, Candidate] = {}
+        for group in self.library.groups(d):
+            gains = group.gains(white, gone, sides)
+            scores = gains - group.penalties
+            for name, part in group.effects.items():
+                at = part.start + int(np.argmax(scores[part]))
+                if name not in best or scores[at] > best[name].score:
+                    best[name] = Candidate((group.active[at],), float(gains[at]),
+                                           float(group.penalties[at]))
+        return list(best.values())
 
     def candidates(self) -> list[Candidate]:
         """Return every effect on the drives where it pays, the best first."""
@@ -307,26 +131,49 @@ class Scan:
             found.sort(key=lambda one: -one.score)
             # A further drive has to be more than a share in what the others explain.
             kept = [one for one in found if one.score > DRIVE_MARGIN] or found[:1]
-            if len(found[0].active[0].term.rows) > 1 and found[0].drives is not None:
-                kept = self._one_by_one(found)
             joined.append(Candidate(
                 tuple(active for one in kept for active in one.active),
                 sum(one.gain for one in kept),
                 sum(one.penalty for one in kept) + self.library.name_penalty))
         return sorted(joined, key=lambda one: -one.score)
 
-    def _one_by_one(self, found: list[Candidate]) -> list[Candidate]:
-        """Return drives whose terms reach all others, each for what it adds to those before."""
-        kept, left = [found[0]], [one for one in found[1:] if one.score > 0]
-        while left:
-            scan = Scan(self.library, (*self.active, *(a for one in kept for a in one.active)),
-                        self.noises)
-            left = sorted((Candidate(one.active, scan.gain(one.active[0]), one.penalty)
-                           for one in left), key=lambda one: -one.score)
-            if left[0].score <= DRIVE_MARGIN:
+    def _together(self, found: Sequence[Active]) -> Candidate:
+        """Return the drives, of those proposed, on which an effect pays beside the others.
+
+        What one drive's error does to the model's own numbers shows on all drives, so that a
+        drive may seem to have the effect as long as it is missing on another one.
+        """
+        products = []
+        for one in found:
+            gram, side, taken = self._products(one.term.rows)
+            rows = [0] if one.fixed else one.chosen
+            products.append((gram[np.ix_(rows, rows)], side[rows], taken[:, rows]))
+        prices = [self.library.penalty(one) for one in found]
+        ends = np.cumsum([0, *(len(side) for _, side, _ in products)])
+        taken = np.concatenate([part for _, _, part in products], axis=1)
+        S, b = -taken.T @ taken, np.concatenate([side for _, side, _ in products])
+        whole = np.zeros(len(b))
+        for k, (gram, _, _) in enumerate(products):
+            S[ends[k]:ends[k + 1], ends[k]:ends[k + 1]] += gram
+            whole[ends[k]:ends[k + 1]] = np.diag(gram)
+
+        def gain_of(chosen: list[int]) -> float:
+            at = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in chosen])
+            if found[0].fixed:
+                return float(2 * b[at].sum() - S[np.ix_(at, at)].sum())
+            return _joint_gain(S[np.ix_(at, at)], b[at], whole[at])
+
+        chosen: list[int] = []
+        gain = -np.inf
+        while len(chosen) < len(found):
+            trials = {k: gain_of([*chosen, k]) for k in range(len(found)) if k not in chosen}
+            best = max(trials, key=lambda k: trials[k] - prices[k])
+            if chosen and trials[best] - gain - prices[best] <= DRIVE_MARGIN:
                 break
-            kept.append(left.pop(0))
-        return kept
+            chosen.append(best)
+            gain = trials[best]
+        return Candidate(tuple(found[k] for k in chosen), gain,
+                         sum(prices[k] for k in chosen) + self.library.name_penalty)
 
     def holds(self, larger: Candidate, smaller: Candidate) -> bool:
         """Return whether an effect with more coefficients can be all that another one is."""
@@ -348,16 +195,14 @@ class Scan:
 
     def refined(self, candidate: Candidate) -> Candidate:
         """Return the candidate with its shape parameters between the grid's values."""
-        active, gain, penalty = [], 0.0, self.library.name_penalty
+        found = []
         for one in candidate.active:
             if one.term.shape and one.term.drive is not None:
                 better = self._refined(one)
                 trials = [Active(better.term, variant) for variant in one.term.effect.variants]
                 one = max(trials, key=lambda a: self.gain(a) - self.library.penalty(a))
-            active.append(one)
-            gain += self.gain(one)
-            penalty += self.library.penalty(one)
-        return Candidate(tuple(active), gain, penalty)
+            found.append(one)
+        return self._together(found)
 
     def _refined(self, active: Active) -> Active:
         term, d = active.term, active.term.drive
@@ -389,11 +234,6 @@ class Scan:
         return Active(design.term(effect, d, shape), active.variant)
 
 
-def scanned_variants(effect: type[CatalogueEffect]) -> list[tuple[str, ...]]:
-    """Return the variants that the rows of a scan suffice for."""
-    return [variant for variant in effect.variants if set(variant) <= set(effect.scanned)]
-
-
 def _best_between(low: float, high: float, gain: Callable[[float], float],
                   ) -> tuple[float, float]:
     """Return where a gain is largest between two values, in their logarithm where both are > 0."""
@@ -411,7 +251,10 @@ def _gain(S: Array, b: Array, whole: Array, active: Active) -> float:
     if active.term.fixed:
         return float(2 * b[0] - S[0, 0])
     chosen = active.chosen
-    S, b, whole = S[np.ix_(chosen, chosen)], b[chosen], whole[chosen]
+    return _joint_gain(S[np.ix_(chosen, chosen)], b[chosen], whole[chosen])
+
+
+def _joint_gain(S: Array, b: Array, whole: Array) -> float:
     if np.any(np.diag(S) <= OWN_SHARE * whole):
         return 0.0
     scale = 1 / np.sqrt(np.diag(S))

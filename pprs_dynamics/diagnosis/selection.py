@@ -15,9 +15,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.diagnosis.library import Candidate, Library
 from pprs_dynamics.diagnosis.noise import NoiseModel
+from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.diagnosis.regression import solve
-from pprs_dynamics.diagnosis.scan import Candidate, Library, Scan
+from pprs_dynamics.diagnosis.scan import Scan
 
 MOST_EFFECTS = 6
 MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
@@ -96,7 +98,8 @@ class Selector:
         self.regression, self.earlier = regression, tuple(earlier)
         self._report = progress or (lambda share: None)
         self.library = Library(regression)
-        self.rich = {d: self._rich_noise(d) for d in regression.series}
+        self.rich = dict(zip(regression.series, each(self._rich_noise, regression.series),
+                             strict=True))
 
     def select(self) -> Selection:
         """Return the effects that the errors call for."""
