@@ -88,7 +88,10 @@ class SensorFaults:
         zero, gain, delay = (
             np.sum([effect.values[name] for effect in faults if name in effect.values]
                    or [np.zeros(6)], axis=0) for name in ('zero', 'gain', 'delay'))
-        return cls(zero, gain, np.maximum(delay, 0), np.maximum(-delay, 0))
+        # No sensor looks ahead: an effort that comes early is one whose encoders, all of them,
+        # come late.
+        late = max(0.0, -float(delay.min()))
+        return cls(zero, gain, delay + late, np.full(6, late))
 
 
 class EffortNoise:
