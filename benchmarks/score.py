@@ -29,6 +29,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
 from hidden_recordings import PINK, Case, load_case, make_case, save_case
+from oracle import consult
 from score_table import judge, make_table
 
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
@@ -86,13 +87,15 @@ def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> di
         content = load_case(save_case(recordings, case)) if recordings else make_case(case)
         model, recording, truth = content
         start = time.perf_counter()
-        said = diagnose(model, [recording]).as_data()
+        diagnosis = diagnose(model, [recording])
+        seconds = time.perf_counter() - start
+        said = diagnosis.as_data()
+        oracle = consult(diagnosis.selector, truth) if diagnosis.selector else {}
     except Exception:  # the table counts it, and the run goes on
         return {'name': case.name, 'row': case.row, 'failed': traceback.format_exc()}
-    seconds = time.perf_counter() - start
     said = {**said, 'candidates': said.get('candidates', [])[:CANDIDATES]}
     outcome = {'name': case.name, 'row': case.row, 'truth': truth, 'said': said,
-               'seconds': seconds}
+               'seconds': seconds, 'oracle': oracle}
     return {**outcome, 'judged': judge(outcome)}
 
 

@@ -66,20 +66,14 @@ def judge(outcome: Outcome) -> dict[str, Any]:
 
 
 def separable(outcome: Outcome) -> bool:
-    """Return whether an oracle that knows the noise could tell the effect from every rival.
-
-    To be filled: the best fits of the true effect's catalogue form and of each rival compared
-    under the true covariance. Until then every case counts, which makes the figure harder.
-    """
-    return True
+    """Return whether an oracle that knows effect, drives and noise can tell it from every rival."""
+    return bool(outcome.get('oracle', {}).get('separable', True))
 
 
 def best_fit_error(outcome: Outcome) -> float | None:
-    """Return the error [N] of the best fit of the catalogue's form of the true effect, if known.
-
-    To be filled.
-    """
-    return None
+    """Return the error [N] of the best fit of the catalogue's form of the true effect, if known."""
+    error = outcome.get('oracle', {}).get('best_error')
+    return None if error is None else float(error)
 
 
 def make_table(outcomes: Sequence[Outcome]) -> str:

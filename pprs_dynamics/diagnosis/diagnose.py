@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -126,6 +126,8 @@ class Diagnosis:
     noise_floor : float
         Root of the mean square of the noise, over drives [N].
     held_out_on : {'blocks', 'validation'}
+    selector : Selector, optional
+        The columns and fits of the first search, for looking closer.
     """
 
     verdict: str
@@ -144,6 +146,7 @@ class Diagnosis:
     remaining: Array
     noise_floor: float
     held_out_on: str = 'blocks'
+    selector: Selector | None = field(default=None, repr=False, compare=False)
 
     def as_data(self) -> dict[str, Any]:
         """Return the JSON of the interface, and what the README adds to it."""
@@ -263,7 +266,7 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
         find_cautions(first.design, first.regression, first.selector, first.selection, effects),
         first.design.notes, first.design.model, fitted_model(regression, fit),
         first.design.residuals, unexplained.remaining, float(np.sqrt(np.mean(noise ** 2))),
-        'validation' if validate else 'blocks')
+        'validation' if validate else 'blocks', first.selector)
 
 
 def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Recording],

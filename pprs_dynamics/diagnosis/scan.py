@@ -20,7 +20,7 @@ from pprs_dynamics.mechanism.robot import Array
 OWN_SHARE = 1e-7
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 DRIVE_MARGIN = 6.0
-REFINEMENTS = 12  # evaluations of a shape parameter between its neighbours in the grid
+REFINEMENTS = 24  # evaluations of a shape parameter between its neighbours in the grid
 
 
 class Scan:
@@ -130,7 +130,9 @@ class Scan:
         for found in effects.values():
             found.sort(key=lambda one: -one.score)
             # A further drive has to be more than a share in what the others explain.
-            kept = [one for one in found if one.score > DRIVE_MARGIN] or found[:1]
+            reaches_all = len(found[0].active[0].term.rows) > 1
+            kept = found if reaches_all else [
+                one for one in found if one.score > DRIVE_MARGIN] or found[:1]
             joined.append(Candidate(
                 tuple(active for one in kept for active in one.active),
                 sum(one.gain for one in kept),
@@ -143,19 +145,17 @@ class Scan:
         What one drive's error does to the model's own numbers shows on all drives, so that a
         drive may seem to have the effect as long as it is missing on another one.
         """
-        products = []
-        for one in found:
-            gram, side, taken = self._products(one.term.rows)
-            rows = [0] if one.fixed else one.chosen
-            products.append((gram[np.ix_(rows, rows)], side[rows], taken[:, rows]))
         prices = [self.library.penalty(one) for one in found]
-        ends = np.cumsum([0, *(len(side) for _, side, _ in products)])
-        taken = np.concatenate([part for _, _, part in products], axis=1)
-        S, b = -taken.T @ taken, np.concatenate([side for _, side, _ in products])
-        whole = np.zeros(len(b))
-        for k, (gram, _, _) in enumerate(products):
-            S[ends[k]:ends[k + 1], ends[k]:ends[k + 1]] += gram
-            whole[ends[k]:ends[k + 1]] = np.diag(gram)
+        sizes = [1 if one.fixed else one.size for one in found]
+        ends = np.cumsum([0, *sizes])
+        stacked: dict[int, Array] = {}
+        for k, one in enumerate(found):
+            for d in one.term.rows:
+                rows = one.on(d)
+                assert rows is not None
+                stacked.setdefault(d, np.zeros((int(ends[-1]), rows.shape[1])))
+                stacked[d][ends[k]:ends[k + 1]] = rows
+        S, b, whole = self.projected(stacked)
 
         def gain_of(chosen: list[int]) -> float:
             at = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in chosen])
@@ -204,6 +204,22 @@ class Scan:
             found.append(one)
         return self._together(found)
 
+    def alternatives(self, candidate: Candidate) -> list[Candidate]:
+        """Return the candidate in the shapes that its own is easily taken for, refined."""
+        found = []
+        shapes = [one.term.effect.alternatives(one.term.shape) if issubclass(
+            one.term.effect, DriveEffect) else () for one in candidate.active]
+        for number in range(min(map(len, shapes))):
+            active = []
+            for one, others in zip(candidate.active, shapes, strict=True):
+                assert one.term.drive is not None
+                assert issubclass(one.term.effect, DriveEffect)
+                term = self.regression.design.term(one.term.effect, one.term.drive,
+                                                   others[number])
+                active.append(Active(term, one.variant))
+            found.append(self.refined(Candidate(tuple(active), 0.0, 0.0)))
+        return found
+
     def _refined(self, active: Active) -> Active:
         term, d = active.term, active.term.drive
         assert d is not None
@@ -240,10 +256,10 @@ def _best_between(low: float, high: float, gain: Callable[[float], float],
     if low > 0:
         found = minimize_scalar(lambda x: -gain(float(np.exp(x))), method='bounded',
                                 bounds=(np.log(low), np.log(high)),
-                                options={'maxiter': REFINEMENTS, 'xatol': 1e-4})
+                                options={'maxiter': REFINEMENTS, 'xatol': 1e-5})
         return float(np.exp(found.x)), -float(found.fun)
     found = minimize_scalar(lambda x: -gain(float(x)), method='bounded', bounds=(low, high),
-                            options={'maxiter': REFINEMENTS, 'xatol': 1e-6})
+                            options={'maxiter': REFINEMENTS, 'xatol': 1e-7})
     return float(found.x), -float(found.fun)
 
 

@@ -114,8 +114,7 @@ class Selector:
             if winner is None:
                 selection.suspects = [one for one in judged if self._is_suspect(one, selection)]
                 break
-            selection.adopted.append(winner)
-            selection.fit = winner.fit
+            _add(selection, winner)
             self._prune(selection)
         self._swap(selection)
         selection.rivals = self._find_rivals(selection)
@@ -148,13 +147,14 @@ class Selector:
     def _judge_proposals(self, selection: Selection) -> list[Judged]:
         """Return proposals of two scans, each judged, best first."""
         active = self._actives(selection.adopted)
-        chosen: dict[tuple[str, tuple[int, ...] | None], Candidate] = {}
+        chosen: dict[tuple[str, tuple[int, ...] | None, int], Candidate] = {}
         for noises in (selection.fit.noises, self.rich):
             scan = Scan(self.library, active, noises)
             for candidate in scan.candidates()[:PROPOSALS]:
                 if candidate.score > -MARGIN:
                     refined = scan.refined(candidate)
-                    chosen.setdefault((refined.name, refined.drives), refined)
+                    for number, shaped in enumerate([refined, *scan.alternatives(refined)]):
+                        chosen.setdefault((shaped.name, shaped.drives, number), shaped)
         judged = [self.judge(candidate, selection.fit, active) for candidate in chosen.values()]
         best: dict[str, Judged] = {}
         for one in sorted(judged, key=lambda one: -one.evidence):
@@ -266,3 +266,18 @@ class Selector:
             if near:
                 rivals[one.candidate.name] = near
         return rivals
+
+
+def _add(selection: Selection, winner: Judged) -> None:
+    """Adopt a winner; on further drives it is the same effect, in the place that it has."""
+    fit = winner.fit
+    for k, one in enumerate(selection.adopted):
+        if one.candidate.name == winner.candidate.name:
+            old, new = one.candidate, winner.candidate
+            joined = Candidate((*old.active, *new.active), old.gain + new.gain,
+                               old.penalty + new.penalty)
+            selection.adopted[k] = Judged(joined, fit, one.evidence + winner.evidence)
+            break
+    else:
+        selection.adopted.append(winner)
+    selection.fit = fit
