@@ -40,13 +40,20 @@ def trajectory(points: int) -> bytes:
 
 def main() -> int:
     """Measure and print."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 5.0
+    found = run(float(sys.argv[1]) if len(sys.argv) > 1 else 5.0)
+    print('\n'.join(rows(found)))
+    print(json.dumps(found))
+    return 0
+
+
+def run(seconds: float) -> dict[str, Any]:
+    """Stream for that long at each rate and return what was measured."""
     echo = [sys.executable, str(Path(__file__).with_name('echo_node.py'))]
-    one, found = trajectory(1), {}
+    one, found = trajectory(1), dict[str, Any]()
     with served(echo, '/echo', has_status=False) as (floor, _):
         domain = int(os.environ['ROS_DOMAIN_ID'])
         found['start_s'] = [start_time(one, domain) for _ in range(3)]
-        with served(feedforward(), domain=domain) as (node, _):
+        with served(feedforward('command_timeout:=0.0'), domain=domain) as (node, _):
             for rate in RATES:
                 times: dict[str, list[np.ndarray]] = {'echo': [], 'feedforward': []}
                 for _ in range(ROUNDS):
@@ -57,9 +64,7 @@ def main() -> int:
                                          for name, each in times.items()}
             found['sustained'] = {'echo': ceiling(floor, one), 'feedforward': ceiling(node, one)}
             found['long_ms'] = long_trajectory(node)
-    report(found)
-    print(json.dumps(found))
-    return 0
+    return found
 
 
 def start_time(data: bytes, domain: int) -> float:
@@ -108,18 +113,22 @@ def _percentiles(times: np.ndarray) -> dict[str, float]:
             'max_ms': float(times.max() * 1e3)}
 
 
-def report(found: dict[str, Any]) -> None:
-    """Print what was found beside what is wanted."""
+def rows(found: dict[str, Any]) -> list[str]:
+    """Return the rows of a table: what, echo, feedforward, ratio, goal."""
+    table = ['| | echo | feedforward | ratio | goal |', '|---|---|---|---|---|']
     for rate in RATES:
         echo, node = (found[f'{rate:g} Hz'][name] for name in ('echo', 'feedforward'))
         for key, limit in (('p50_ms', 1.10), ('p99_ms', 1.25)):
-            print(f'{rate:5g} Hz {key[:3]}: echo {echo[key]:6.3f} ms, feedforward '
-                  f'{node[key]:6.3f} ms, ratio {node[key] / echo[key]:5.2f} (goal {limit:.2f})')
-    sustained = found['sustained']
-    print(f'sustained: echo {sustained["echo"]:g} Hz, feedforward {sustained["feedforward"]:g} Hz, '
-          f'ratio {sustained["feedforward"] / max(sustained["echo"], 1):.2f} (goal 0.90)')
-    print(f'{LONG} points there and back: {found["long_ms"]:.1f} ms (goal 8 in the node alone)')
-    print(f'start to first command: {min(found["start_s"]):.2f} s (goal 1.5)')
+            table.append(f'| round trip at {rate:g} Hz, {key[:3]} | {echo[key]:.2f} ms | '
+                         f'{node[key]:.2f} ms | {node[key] / echo[key]:.2f} | {limit:.2f} |')
+    echo, node = (found['sustained'][name] for name in ('echo', 'feedforward'))
+    table.append(f'| sustained without loss | {echo:g} Hz | {node:g} Hz | '
+                 f'{node / max(echo, 1):.2f} | 0.90 |')
+    table.append(f'| {LONG} points, there and back | | {found["long_ms"]:.1f} ms | | '
+                 '8 ms in the node |')
+    table.append(f'| process start to first command, warm | | {min(found["start_s"]):.2f} s | | '
+                 '1.5 s |')
+    return table
 
 
 if __name__ == '__main__':

@@ -4,83 +4,32 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from node_bench import Bench, bench
+from feedforward_bench import (
+    EQUAL,
+    FeedforwardBench,
+    feedforward_bench,
+    message_of,
+    random_motion,
+)
 from rclpy.parameter import Parameter
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.nodes import conversions
-from pprs_dynamics.nodes.feedforward import FeedforwardNode
 from pprs_dynamics.nodes.rejection import CODES
-
-# Message fields are doubles and the model is deterministic: what remains is the rounding of
-# time_from_start, which the memoryless model does not use.
-EQUAL = 1e-12
-
-
-class FeedforwardBench:
-    """The node, its topics and a publisher."""
-
-    def __init__(self, bench: Bench, **options: Any) -> None:
-        self.bench = bench
-        self.node = bench.add(FeedforwardNode, **options)
-        self.commands = bench.listen(Float64MultiArray, '/feedforward/commands')
-        self.joint_command = bench.listen(JointState, '/feedforward/joint_command')
-        self.joint_trajectory = bench.listen(JointTrajectory, '/feedforward/joint_trajectory')
-        bench.follow_status('/feedforward/status')
-        self.publisher = bench.probe.create_publisher(
-            MultiDOFJointTrajectory, '/feedforward/trajectory', 100)
-        assert bench.spin_until(self._connected)
-
-    def _connected(self) -> bool:
-        counts = [self.bench.probe.count_publishers(f'/feedforward/{name}')
-                  for name in ('commands', 'joint_command', 'joint_trajectory', 'status')]
-        listeners = [self.node.count_subscribers(f'/feedforward/{name}')
-                     for name in ('commands', 'joint_command', 'joint_trajectory')]
-        return bool(self.publisher.get_subscription_count() and self.bench.status
-                    and all(counts) and all(listeners))
-
-    def send(self, message: MultiDOFJointTrajectory) -> None:
-        """Publish and wait until the node has dealt with the message."""
-        before = self.node._counters['received']
-        self.publisher.publish(message)
-        assert self.bench.spin_until(lambda: self.node._counters['received'] > before)
-
-    def answer(self, message: MultiDOFJointTrajectory) -> list[float]:
-        """Publish a valid message and return the forces that come out."""
-        before = len(self.commands)
-        self.send(message)
-        assert self.bench.spin_until(lambda: len(self.commands) > before)
-        return list(self.commands[-1].data)
 
 
 @pytest.fixture
 def feedforward() -> Iterator[FeedforwardBench]:
-    with bench() as running:
-        yield FeedforwardBench(running)
-
-
-def random_motion(rng: np.random.Generator, points: int) -> PlatformMotion:
-    return PlatformMotion(
-        np.array([0.0, 0.0, 0.5]) + rng.uniform(-0.08, 0.08, (points, 3)),
-        Rotation.from_rotvec(rng.uniform(-0.15, 0.15, (points, 3))).as_quat(),
-        *(rng.normal(scale=0.5, size=(points, 3)) for _ in range(4)),
-        np.arange(points) * 0.01)
-
-
-def message_of(motion: PlatformMotion, stamp: Time | None = None) -> MultiDOFJointTrajectory:
-    offsets = [k * 10_000_000 for k in range(len(motion))]
-    return conversions.write_trajectory(motion, stamp or Time(), offsets)
+    with feedforward_bench() as running:
+        yield running
 
 
 def test_forces_equal_the_python_api(feedforward: FeedforwardBench) -> None:
@@ -255,11 +204,9 @@ def test_damaged_messages_are_counted_explained_silent_and_survived(
 
 
 def test_independent_chains_refuse_near_a_right_angle_and_never_publish_its_force() -> None:
-    override = [Parameter('friction.approach', value='independent_chains')]
     upright = np.array([[0.05, 0.0, 0.5]])  # cos u_1 = (0.15 - 0.05 - 0.1) / 0.3 = 0
     twist = np.array([[0.1, 0.2, 0.3]])
-    with bench() as running:
-        node = FeedforwardBench(running, parameter_overrides=override)
+    with feedforward_bench(friction__approach='independent_chains') as node:
         motion = PlatformMotion(upright, [[0, 0, 0, 1.0]], twist, twist, twist, twist)
         node.send(message_of(motion))
         assert node.node._counters['SINGULAR'] == 1
@@ -269,8 +216,7 @@ def test_independent_chains_refuse_near_a_right_angle_and_never_publish_its_forc
 
 
 def test_old_messages_are_rejected_where_max_age_says_so() -> None:
-    with bench() as running:
-        node = FeedforwardBench(running, parameter_overrides=[Parameter('max_age', value=0.5)])
+    with feedforward_bench(max_age=0.5) as node:
         motion = random_motion(np.random.default_rng(4), 1)
         now = node.node.get_clock().now().nanoseconds
         node.send(message_of(motion, conversions.time(now - 2_000_000_000)))
@@ -319,14 +265,12 @@ def test_an_effect_added_while_running_appears_in_the_command_and_on_its_own_top
 
 
 def test_memory_advances_with_first_points_only() -> None:
-    overrides = [Parameter('effects.active', value=['hysteresis']),
-                 Parameter('effects.hysteresis.slide_1.force', value=2.0),
-                 Parameter('effects.hysteresis.slide_1.distance', value=0.01)]
-    with bench() as running:
-        node = FeedforwardBench(running, parameter_overrides=overrides)
+    effect = {'effects__active': ['hysteresis'], 'effects__hysteresis__slide_1__force': 2.0,
+              'effects__hysteresis__slide_1__distance': 0.01}
+    with feedforward_bench(**effect) as node:
         rng = np.random.default_rng(8)
         motions = [random_motion(rng, points) for points in (5, 3, 1, 4)]
-        model, state = node.node._model, node.node._model.initial_state()
+        model, state = node.node._settings.model, node.node._settings.model.initial_state()
         for motion in motions:
             found = node.answer(message_of(motion))
             expected = model.drive_forces(motion[:1], state).total[0]

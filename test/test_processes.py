@@ -19,7 +19,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.pose_files import read_poses, write_poses
 from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
-from pprs_dynamics.nodes.conversions import read_trajectory
+from pprs_dynamics.nodes.trajectory_request import read_trajectory
 
 PAPER = Path(__file__).parents[1] / 'config' / 'paper.yaml'
 EQUAL = 1e-12
@@ -42,7 +42,9 @@ def test_the_papers_path_goes_in_and_its_forces_come_out(
 ) -> None:
     commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
     stamped = running.listen(JointState, '/feedforward/joint_command', 1000)
-    server = [executable('feedforward'), '--ros-args', '--params-file', str(PAPER)]
+    # No timeout: a player that stalls on a busy machine must not add a command.
+    server = [executable('feedforward'), '--ros-args', '--params-file', str(PAPER),
+              '-p', 'command_timeout:=0.0', '-p', 'timeout_action:=silent']
     player = [executable('play_trajectory'), '--ros-args', '-p', 'rate:=100.0']
     times = np.arange(0.0, HelicalPath.duration + 0.01, 0.01)
     with node_process(server, ros_domain, tmp_path / 'server.log') as feedforward:
@@ -103,6 +105,9 @@ MISTAKES = {
     'play_trajectory repeat:=0': 'repeat is 0',
     'play_trajectory ratee:=5.0': 'ratee is 5.0',
     'feedforward geometry.base_radius:=0.2': 'equations is missing, but it must',
+    'feedforward timeout_action:=brake': "timeout_action is 'brake'",
+    'feedforward effort_limits:=[1.0,2.0]': 'effort_limits is [1.0, 2.0]',
+    'feedforward feedforward_scale:=2.0': 'feedforward_scale is 2.0, but it must be a number',
     'play_trajectory points:=0': 'points is 0',
 }
 

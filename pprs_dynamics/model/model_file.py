@@ -78,11 +78,18 @@ def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
         For a list that mixes whole and decimal numbers, which ROS 2 refuses.
     """
     try:
-        content = yaml.load(Path(path).read_text(encoding='utf-8'), Loader=_StrictLoader)
+        text = Path(path).read_text(encoding='utf-8')
     except OSError as error:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     except UnicodeDecodeError:
         raise UnreadableFileError(path, 'not a text file in UTF-8') from None
+    return parse_parameters(text, path)
+
+
+def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any]:
+    """Return the same of a file's text; `path` is named in errors."""
+    try:
+        content = yaml.load(text, Loader=_StrictLoader)
     except (yaml.YAMLError, ValueError) as error:
         raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
     flat: dict[str, Any] = {}
@@ -98,6 +105,14 @@ def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
             raise ModelError(key, value, 'hold elements of one type, as ROS 2 demands '
                              '(write 0.0, not 0, among decimal numbers)', str(path))
     return flat
+
+
+def other_nodes(text: str) -> dict[str, Any]:
+    """Return the blocks of a parameter file's text that are for single nodes, not the model."""
+    content = yaml.load(text, Loader=_StrictLoader)
+    chosen = _parameters_block('', content)
+    return {node: block for node, block in content.items()
+            if block['ros__parameters'] is not chosen}
 
 
 def build_model(parameters: Mapping[str, Any], source: str = '') -> DriveModel:

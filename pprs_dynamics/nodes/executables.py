@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 
 from pprs_dynamics.threads import use_one_thread
@@ -30,6 +31,8 @@ def simulated_robot() -> int:
 
 def _run(module: str, node: str) -> int:
     use_one_thread()
+    # From here on a signal waits until the node can end properly, also while libraries load.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         import rclpy  # noqa: F401
     except ImportError:

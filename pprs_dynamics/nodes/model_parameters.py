@@ -11,13 +11,32 @@ from rclpy.parameter import Parameter
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import KEYS
+from pprs_dynamics.model.keys import KEYS, NODE_PREFIXES
 from pprs_dynamics.nodes.parameters import (
     NodeParameter,
+    added_descriptor,
     current_values,
     declare_model,
     model_from,
 )
+
+
+class ExplainsRefusals(Node):
+    """A node that refuses parameters in the words of the model's files.
+
+    rclpy compares with the range in a descriptor first, and says less.
+    """
+
+    _settings: ModelParameters
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """Set parameters one after the other; each is taken or refused by itself."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set all parameters or none."""
+        result = self._settings.check(parameter_list)
+        return super().set_parameters_atomically(parameter_list) if result.successful else result
 
 
 class ModelParameters:
@@ -59,7 +78,8 @@ class ModelParameters:
                 'no geometry is given: this is the paper\'s robot'
                 + (f', but for {len(KEYS) - len(taken_from_paper)} parameters'
                    if len(taken_from_paper) < len(KEYS) else ''))
-        node.add_on_set_parameters_callback(self._check)
+        self._checked = self.model, self.own
+        node.add_on_set_parameters_callback(self.check)
         node.add_post_set_parameters_callback(self._apply)
 
     def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[DriveModel, dict[str, Any]]:
@@ -67,13 +87,32 @@ class ModelParameters:
         own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
         return model_from(values), own
 
-    def _check(self, changes: list[Parameter]) -> SetParametersResult:
+    def check(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return whether the parameters would be valid with some of them changed, and why not."""
+        if _of_topics(changes):
+            return SetParametersResult(successful=True)
         try:
-            self._validated(changes)
+            self._checked = self._validated(changes)
         except PprsError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _apply(self, _: list[Parameter]) -> None:
-        self.model, self.own = self._validated()
+    def _apply(self, changes: list[Parameter]) -> None:
+        if _of_topics(changes):
+            return
+        # What was checked, and nothing else, comes into force.
+        self.model, self.own = self._checked
+        for change in changes:
+            if change.name not in KEYS and change.name.startswith('effects.') and (
+                    self._node.has_parameter(change.name)):
+                self._describe(change.name)
         self._changed()
+
+    def _describe(self, name: str) -> None:
+        if not self._node.describe_parameter(name).description:
+            self._node.set_descriptor(name, added_descriptor(name))
+
+
+def _of_topics(changes: list[Parameter]) -> bool:
+    """Return whether these are the QoS of topics, which rclpy declares as topics appear."""
+    return all(change.name.startswith(NODE_PREFIXES) for change in changes)

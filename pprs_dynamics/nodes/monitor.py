@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.diagnosis.live import Compared, LiveComparison
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.nodes import conversions
-from pprs_dynamics.nodes.model_parameters import ModelParameters
+from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
@@ -27,7 +26,7 @@ PARAMETERS = (
 )
 
 
-class MonitorNode(Node):
+class MonitorNode(ExplainsRefusals):
     """Publishes what the model says at every measured stamp, and how wrong it is."""
 
     def __init__(self, **options: Any) -> None:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import KEYS
+from pprs_dynamics.model.keys import KEYS, LARGEST, Key
 from pprs_dynamics.model.model_file import build_model, default_parameters, is_known
+
+ACTIVE = 'effects.active'
+LARGEST_INTEGER = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,8 @@ class NodeParameter:
         Bounds of a number, both allowed.
     choices : tuple of str
         Words that are allowed; () for any.
+    size : int
+        Of a list of numbers that may also be empty; its default is ().
     """
 
     name: str
@@ -40,12 +47,15 @@ class NodeParameter:
     lower: float = -math.inf
     upper: float = math.inf
     choices: tuple[str, ...] = ()
+    size: int = 0
 
     @property
     def rule(self) -> str:
         """What a value must be, completing "it must ..."."""
         if self.choices:
             return f'be one of {", ".join(self.choices)} ({self.description})'
+        if self.size:
+            return f'be empty, or {self._list.rule}'
         kinds = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a word',
                  list: 'a list of words'}
         bounds = [f'at {side} {bound:g}' for side, bound in (
@@ -56,6 +66,12 @@ class NodeParameter:
     def check(self, value: Any) -> Any:
         """Return the value in the default's type, or raise ModelError."""
         kind = type(self.default)
+        if self.size:
+            empty = value is None or (hasattr(value, '__len__') and not len(value))
+            try:
+                return () if empty else self._list.check(value)
+            except ModelError:
+                raise ModelError(self.name, value, self.rule) from None
         if kind is list:
             # ROS 2 tells an empty list as a parameter that is not set.
             words = [] if value is None else value
@@ -70,6 +86,15 @@ class NodeParameter:
             raise ModelError(self.name, value, self.rule)
         return value
 
+    @property
+    def descriptor(self) -> ParameterDescriptor:
+        """How the parameter is declared."""
+        return _descriptor(self.description, self.rule, type(self.default), self.lower, self.upper)
+
+    @property
+    def _list(self) -> Key:
+        return Key(self.name, self.description, size=self.size, positive=True)
+
 
 def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
     """Declare parameters of the node's own and return their checked values.
@@ -79,11 +104,13 @@ def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, An
     ModelError
         For a value that breaks its rule.
     """
-    values = {}
+    values, given = {}, overrides(node)
     for parameter in parameters:
-        node.declare_parameter(parameter.name, parameter.default, ParameterDescriptor(
-            description=parameter.description, additional_constraints=f'must {parameter.rule}',
-            dynamic_typing=True))
+        if parameter.name in given:
+            # Before ROS 2 looks at the range, whose sentence says less.
+            parameter.check(given[parameter.name])
+        default = None if parameter.size else parameter.default
+        node.declare_parameter(parameter.name, default, parameter.descriptor)
         values[parameter.name] = parameter.check(node.get_parameter(parameter.name).value)
     return values
 
@@ -105,16 +132,16 @@ def declare_model(node: Node) -> list[str]:
             if name not in given and key.default is None:
                 raise ModelError(name, MISSING, key.rule)
     for name, key in KEYS.items():
-        descriptor = ParameterDescriptor(
-            description=key.description, additional_constraints=f'must {key.rule}',
-            # `0` for `0.0` is right in a file and must not be a type error here.
-            dynamic_typing=True)
+        if name in given:
+            key.check(_plain(given[name]))
         default = defaults.get(name, key.default)
         node.declare_parameter(
-            name, list(default) if isinstance(default, tuple) else default, descriptor)
+            name, list(default) if isinstance(default, tuple) else default, _of_key(key))
     for name, value in given.items():
         if not node.has_parameter(name) and value is not None:
-            node.declare_parameter(name, value, ParameterDescriptor(dynamic_typing=True))
+            node.declare_parameter(name, value, added_descriptor(name))
+    if not node.has_parameter(ACTIVE):
+        node.declare_parameter(ACTIVE, [], added_descriptor(ACTIVE))
     return [name for name, key in KEYS.items() if name not in given and name in defaults]
 
 
@@ -134,8 +161,56 @@ def overrides(node: Node) -> dict[str, Any]:
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:
     """Return all declared parameters with some of them changed, flat; those not set left out."""
     merged = {**node.get_parameters_by_prefix(''), **{change.name: change for change in changes}}
-    return {name: parameter.value for name, parameter in merged.items()
+    return {name: _plain(parameter.value) for name, parameter in merged.items()
             if parameter.type_ != Parameter.Type.NOT_SET}
+
+
+def added_descriptor(name: str) -> ParameterDescriptor:
+    """Return how a parameter is declared that is not in the table of keys, as of an effect."""
+    if name == ACTIVE:
+        return _descriptor('effects beside the paper\'s friction, in force',
+                           'be a list of names of effects', list)
+    block, _, rest = name.partition('.')
+    effect, _, place = rest.partition('.')
+    if block == 'effects' and effect in CATALOGUE:
+        for parameter in CATALOGUE[effect].parameters:
+            if place.rpartition('.')[2] == parameter.name:
+                unit = f' [{parameter.unit}]' if parameter.unit else ''
+                return _descriptor(
+                    f'{effect}: {parameter.description}{unit}',
+                    f'lie in [{parameter.lower:g}, {parameter.upper:g}]{unit}',
+                    float, parameter.lower, parameter.upper)
+    return ParameterDescriptor(dynamic_typing=True)
+
+
+def _of_key(key: Key) -> ParameterDescriptor:
+    unit = f' [{key.unit}]' if key.unit else ''
+    kind = str if key.choices else float if key.size is None else list
+    return _descriptor(f'{key.description}{unit}', key.rule, kind, key.lower if not key.positive
+                       else max(key.lower, 0.0), key.upper)
+
+
+def _descriptor(
+    description: str, rule: str, kind: type, lower: float = -math.inf, upper: float = math.inf,
+) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        description=description, additional_constraints=f'must {rule}',
+        # `0` for `0.0` is right in a file and must not be a type error here.
+        dynamic_typing=True)
+    if kind is float and (math.isfinite(lower) or math.isfinite(upper)):
+        descriptor.floating_point_range = [FloatingPointRange(
+            # Message fields of that type turn whole numbers into nonsense without a word.
+            from_value=float(max(lower, -LARGEST)), to_value=float(min(upper, LARGEST)))]
+    if kind is int and (math.isfinite(lower) or math.isfinite(upper)):
+        descriptor.integer_range = [IntegerRange(
+            from_value=round(max(lower, -LARGEST_INTEGER)),
+            to_value=round(min(upper, LARGEST_INTEGER)), step=0)]
+    return descriptor
+
+
+def _plain(value: Any) -> Any:
+    """Return a list for the arrays that rclpy keeps."""
+    return value.tolist() if isinstance(value, array) else value
 
 
 def model_from(values: Mapping[str, Any]) -> DriveModel:

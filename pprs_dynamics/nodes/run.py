@@ -8,10 +8,12 @@ from collections.abc import Callable
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.nodes.executor import PromptExecutor, StopSignals
 
 
 class Finished(Exception):
@@ -21,19 +23,24 @@ class Finished(Exception):
 def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
     """Spin one node until SIGINT, SIGTERM or `Finished`.
 
+    A node with a method `finish` gets it called while it can still publish.
+
     Returns
     -------
     int
         Exit status: 0, or 2 for bad parameters.
     """
+    stop = _Stop()
+    StopSignals(stop)
     try:
-        rclpy.init(args=args)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RCLError as error:
         # An unreadable parameter file, or arguments that are none.
         return _complain(' '.join(str(error).split()))
     node = None
     # Two threads answered 44 of 5 000 messages at 1 kHz; one answers all.
-    executor = SingleThreadedExecutor()
+    executor = PromptExecutor()
+    stop.attach(executor)
     try:
         node = factory()
         executor.add_node(node)
@@ -46,16 +53,32 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
         return _complain(str(error))
     except (KeyboardInterrupt, ExternalShutdownException, Finished):
         pass
-    except RCLError:
-        # A signal may end the context while something publishes; anything else is a bug.
-        if rclpy.ok():
-            raise
     finally:
+        if node is not None and rclpy.ok():
+            getattr(node, 'finish', lambda: None)()
         executor.shutdown()
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+class _Stop:
+    """What a stop signal does: nothing but leave a note until there is something to stop."""
+
+    def __init__(self) -> None:
+        self._executor: PromptExecutor | None = None
+        self._wanted = False
+
+    def __call__(self) -> None:
+        self._wanted = True
+        if self._executor is not None:
+            self._executor.stop()
+
+    def attach(self, executor: PromptExecutor) -> None:
+        self._executor = executor
+        if self._wanted:
+            executor.stop()
 
 
 def _complain(sentence: str) -> int:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from pprs_dynamics.nodes.qos import LATCHED
+from pprs_dynamics.nodes.qos import LATCHED, publisher
 
 try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -28,17 +29,28 @@ class StatusReporter:
         Constant entries of the JSON, e.g. the model's file.
     counters : dict of int
         Shared with the node, which counts up in place.
+    refresh : callable, optional
+        Called once a second before the status goes out, to bring `facts` up to date.
     """
 
-    def __init__(self, node: Node, facts: dict[str, Any], counters: dict[str, int]) -> None:
+    def __init__(
+        self, node: Node, facts: dict[str, Any], counters: dict[str, int],
+        refresh: Callable[[], None] | None = None,
+    ) -> None:
         self._node, self.facts, self._counters = node, facts, counters
-        self._publisher = node.create_publisher(String, '~/status', LATCHED)
+        self._refresh = refresh
+        self._publisher = publisher(node, String, '~/status', LATCHED)
         self._diagnostics = None
         if DiagnosticArray is not None:
             self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._current = ('OK', 'OK', 'waiting for the first message')
-        node.create_timer(1.0, self._publish)
+        node.create_timer(1.0, self._tick)
         self._publish()
+
+    @property
+    def code(self) -> str:
+        """Code of the present condition."""
+        return self._current[1]
 
     def report(self, level: str, code: str, message: str) -> None:
         """Take over a new condition; it goes out at once where the code changed."""
@@ -46,6 +58,11 @@ class StatusReporter:
         self._current = (level, code, message)
         if changed:
             self._publish()
+
+    def _tick(self) -> None:
+        if self._refresh is not None:
+            self._refresh()
+        self._publish()
 
     def _publish(self) -> None:
         level, code, message = self._current
@@ -57,7 +74,8 @@ class StatusReporter:
                 level=bytes([LEVELS.index(level)]), name=self._node.get_fully_qualified_name(),
                 message=f'{code}: {message}',
                 values=[KeyValue(key=key, value=str(value))
-                        for key, value in self._counters.items()])
+                        for key, value in {**self._counters, **self.facts}.items()
+                        if isinstance(value, (int, float, str))])
             array = DiagnosticArray(status=[status])
             array.header.stamp = self._node.get_clock().now().to_msg()
             self._diagnostics.publish(array)

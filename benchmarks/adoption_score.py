@@ -1,0 +1,227 @@
+"""How good a model gets when what `pprs` finds is added to it, from files to files.
+
+    python benchmarks/adoption_score.py 24
+
+Each case hides a random effect in the simulated robot and records two motions. `pprs diagnose
+--adopt-all` sees the first recording; the error of the model it writes is taken on the second,
+beside that of the best fit of the hidden effect's own form. Then `pprs adopt` is offered an
+effect that is not there, which it must refuse. Outcomes are appended to FILE as they come, and
+cases that are there are not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+import hidden_recordings
+import numpy as np
+from hidden_recordings import LEAD, Case, Scene, noise_settings
+from hidden_strength import Whitening
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.measurement.recording import Recording, write_recording
+from pprs_dynamics.measurement.treatment import Treatment
+from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.prescribed import PrescribedPlant
+from pprs_dynamics.simulation.sensors import EffortNoise
+
+OUTPUT = Path(__file__).resolve().parents[1] / 'output'
+OTHER_MOTION = 1000  # between the seeds of the two motions
+GOOD = 1.1  # error over that of the best fit of the effect's own form
+WANTED = 0.95  # of the cases
+TOLERANCE_SPREAD = 3 ** -0.5  # standard deviation of what is uniform within a tolerance
+
+
+class Robot:
+    """One robot with a hidden effect, on two motions.
+
+    Parameters
+    ----------
+    case : Case
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.place = hidden_recordings.scene(case.seed, case.width)
+        drawn = [hidden_recordings._draw(case, self.place, name) for name in case.effects]
+        self.effects: list[HiddenEffect] = [one.effect for one in drawn]
+        self.noise = min([one.noise for one in drawn], default=hidden_recordings.NOISE)
+        self.other = _on_motion(self.place, case.seed + OTHER_MOTION)
+
+    @property
+    def model(self) -> DriveModel:
+        """What is known of it."""
+        return self.place.model
+
+    def recordings(self) -> tuple[Recording, Recording]:
+        """Return what its sensors say on both motions."""
+        return self._recording(self.place, 'first'), self._recording(self.other, 'second')
+
+    def _recording(self, place: Scene, name: str) -> Recording:
+        read = place.plant.readings(self.effects)
+        settings = noise_settings(self.case.noise, self.noise)
+        time = place.motion.time[LEAD:]
+        rng = self.case.rng(f'noise {name} {self.case.name}')
+        noise = EffortNoise(settings, rng).samples(len(time))
+        return Recording.from_arrays(name, time, settings.quantised(read.position[LEAD:]), None,
+                                     read.effort[LEAD:] + noise)
+
+    def best_error(self, first: Recording, second: Recording) -> float:
+        """Return the error on the second motion of the effect's own form, fitted on the first.
+
+        The scale of the true effect's forces and the robot's numbers, within their tolerances,
+        are fitted by least squares under the true noise.
+        """
+        sides = []
+        for place, recording in ((self.place, first), (self.other, second)):
+            error = measure_residuals(self.model, [recording])[0].error
+            columns = np.concatenate((
+                [place.contribution(effect) for effect in self.effects], place._columns))
+            sides.append((error, columns[:, :len(error)]))
+        (error, columns), (other, others) = sides
+        error, columns = error[:columns.shape[1]], columns[:, :len(error)]
+        settings = noise_settings(self.case.noise, self.noise)
+        white = Whitening(settings, self.place.block)
+        y = white(error).ravel()
+        rows = np.stack([white(column).ravel() for column in columns])
+        prior = np.full(len(rows), TOLERANCE_SPREAD ** -2)
+        prior[:len(self.effects)] = 0.0
+        found = np.linalg.solve(rows @ rows.T + np.diag(prior), rows @ y)
+        left = other[:others.shape[1]] - np.einsum('k,knd->nd', found, others)
+        return float(np.sqrt(np.nanmean(left ** 2)))
+
+
+def _on_motion(place: Scene, seed: int) -> Scene:
+    """Return the same robot on another motion."""
+    other = copy.copy(place)
+    for cached in ('plain', '_columns'):
+        vars(other).pop(cached, None)
+    other._refits = {}
+    other.path, other.motion = hidden_recordings._motion(seed)
+    other.platform = other.path.motion(other.motion.time)
+    other.plant = PrescribedPlant({**place.model.values, **place.robot}, other.motion,
+                                  place.settings)
+    kept = len(other.motion) - LEAD
+    other.treat = Treatment(np.arange(0, kept, place.block), kept)
+    return other
+
+
+def pprs(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command-line tool."""
+    program = Path(sys.executable).parent / 'pprs'
+    return subprocess.run([str(program), *arguments], capture_output=True, text=True)
+
+
+def run_case(case: Case, wrong: str) -> dict[str, Any]:
+    """Return the outcome of one case."""
+    robot = Robot(case)
+    first, second = robot.recordings()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_model(folder / 'model.yaml', robot.model.values)
+        write_recording(folder / 'first.csv', first)
+        write_recording(folder / 'second.csv', second)
+        common = (str(folder / 'first.csv'), '--model', str(folder / 'model.yaml'))
+        walk = pprs('diagnose', *common, '--adopt-all', '--output', str(folder / 'new.yaml'),
+                    '--json', str(folder / 'walk.json'))
+        written = (folder / 'new.yaml').exists()
+        errors = [_error(folder / file, second) if (folder / file).exists() else float('nan')
+                  for file in ('model.yaml', 'new.yaml')]
+        said = json.loads((folder / 'walk.json').read_text()) if (
+            folder / 'walk.json').exists() else {}
+        offered = pprs('adopt', wrong, *common, '--output', str(folder / 'wrong.yaml'),
+                       '--json', str(folder / 'wrong.json'))
+        reason = json.loads((folder / 'wrong.json').read_text())['reason'] if (
+            folder / 'wrong.json').exists() else offered.stderr.strip()
+    best = robot.best_error(first, second)
+    adoption = said.get('adoption', {})
+    return {'name': case.name, 'seed': case.seed, 'hidden': list(case.effects),
+            'adopted': [step['effect'] for step in adoption.get('steps', [])
+                        if step['adopted']],
+            'ended': adoption.get('ended', walk.stderr.strip()), 'status': walk.returncode,
+            'given': errors[0], 'error': errors[1] if written else errors[0], 'best': best,
+            'wrong': wrong, 'wrong_status': offered.returncode, 'wrong_reason': reason}
+
+
+def _error(model: Path, recording: Recording) -> float:
+    error = measure_residuals(DriveModel.load(model), [recording])[0].error
+    return float(np.sqrt(np.nanmean(error ** 2)))
+
+
+def draw_cases(count: int, first: int, snr: float) -> list[tuple[Case, str]]:
+    """Return cases, each with a wrong effect: every effect in turn, then again."""
+    found = []
+    names = sorted(IN_CATALOGUE)
+    order = np.random.default_rng(first).permutation(len(names))
+    for number in range(count):
+        hidden = names[order[number % len(names)]]
+        case = Case('effects', (hidden,), first + number, snr)
+        others = sorted(set(catalogue()) - {hidden})
+        found.append((case, str(case.rng('wrong').choice(others))))
+    return found
+
+
+def one_line(outcome: dict[str, Any]) -> str:
+    """Return an outcome for people."""
+    ratio = outcome['error'] / outcome['best']
+    refused = 'refused' if outcome['wrong_status'] == 1 else f'STATUS {outcome["wrong_status"]}'
+    return (f'{"ok " if ratio <= GOOD else "BAD"} {outcome["seed"]} {outcome["hidden"][0]}: '
+            f'{" ".join(outcome["adopted"]) or "-"} ({outcome["ended"]}), error '
+            f'{outcome["given"]:.4f} -> {outcome["error"]:.4f} N, best {outcome["best"]:.4f}, '
+            f'ratio {ratio:.3f}; {outcome["wrong"]} {refused}')
+
+
+def summary(outcomes: Sequence[dict[str, Any]]) -> str:
+    """Return the shares that count."""
+    count = len(outcomes)
+    ratios = np.array([one['error'] / one['best'] for one in outcomes])
+    good = int(np.sum(ratios <= GOOD))
+    refused = sum(one['wrong_status'] == 1 for one in outcomes)
+    return (f'{good} of {count} ({good / count:.0%}, wanted {WANTED:.0%}) within {GOOD} of the '
+            f'best fit of the own form; ratio median {np.median(ratios):.3f}, largest '
+            f'{ratios.max():.3f}\n{refused} of {count} ({refused / count:.0%}, wanted '
+            f'{WANTED:.0%}) wrong effects refused')
+
+
+def main() -> int:
+    """Run cases that are not in the file yet, and print the shares."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('cases', type=int, nargs='?', default=24)
+    parser.add_argument('--first', type=int, default=500, help='first seed')
+    parser.add_argument('--snr', type=float, default=1.0)
+    parser.add_argument('--duration', type=float, default=40.0, help='of recordings [s]')
+    parser.add_argument('--file', type=Path, default=OUTPUT / 'adoption.jsonl')
+    options = parser.parse_args()
+    hidden_recordings.DURATION = options.duration
+    options.file.parent.mkdir(parents=True, exist_ok=True)
+    lines = options.file.read_text().splitlines() if options.file.exists() else []
+    outcomes = [json.loads(line) for line in lines]
+    done = {outcome['name'] for outcome in outcomes}
+    for case, wrong in draw_cases(options.cases, options.first, options.snr):
+        if case.name not in done:
+            outcomes.append(run_case(case, wrong))
+            with options.file.open('a') as stream:
+                stream.write(json.dumps(outcomes[-1]) + '\n')
+            print(one_line(outcomes[-1]), flush=True)
+    print(summary(outcomes))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,132 @@
+"""A running feedforward node under messages of every kind of damage.
+
+    python benchmarks/fuzz.py [MESSAGES] [SEED]
+
+Valid messages are mixed with NaN, infinities, 1e308, denormals, bad quaternions, wrong counts,
+10 000 points, names in any script, and truncated bytes. Afterwards the node must live, must have
+counted each rejection under its right code, and no number that is not finite, nor any force over
+its limit, may have left it on any topic.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from stream import feedforward, resident_memory, served
+from trajectory_damage import VALID, damaged, valid_motion
+from trajectory_msgs.msg import JointTrajectory
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.nodes.conversions import write_trajectory
+
+BATCH = 20  # messages between two looks at the node: fewer than its queue holds
+PARTS = ('rigid_body', 'active_friction', 'passive_friction')
+EQUAL = 1e-12
+
+
+class Watch:
+    """Looks at every number that leaves the node."""
+
+    def __init__(self, limits: np.ndarray) -> None:
+        self.limits, self.numbers, self.bad = limits, 0, 0
+
+    def efforts(self, values: Any, limited: bool = True) -> None:
+        """Look at forces (..., 6)."""
+        array = np.asarray(values, dtype=float)
+        self.numbers += array.size
+        good = np.isfinite(array)
+        if limited:
+            good &= np.abs(array) <= self.limits
+        self.bad += int((~good).sum())
+
+    def others(self, *values: Any) -> None:
+        """Look at positions, velocities, accelerations."""
+        for each in values:
+            array = np.asarray(each, dtype=float)
+            self.numbers += array.size
+            self.bad += int((~np.isfinite(array)).sum())
+
+    def state(self, data: bytes, limited: bool) -> None:
+        """Look at a JointState."""
+        message = deserialize_message(data, JointState)
+        self.efforts(message.effort, limited)
+        self.others(message.position, message.velocity)
+
+    def command(self, data: bytes) -> None:
+        """Look at a command."""
+        self.efforts(deserialize_message(data, Float64MultiArray).data)
+
+    def trajectory(self, data: bytes) -> None:
+        """Look at a trajectory of the drives."""
+        for point in deserialize_message(data, JointTrajectory).points:
+            self.efforts(point.effort)
+            self.others(point.positions, point.velocities, point.accelerations)
+
+
+def run(messages: int, seed: int = 0, domain: int | None = None) -> dict[str, Any]:
+    """Send that many messages and return what came of it."""
+    rng, model = np.random.default_rng(seed), DriveModel.load()
+    watch, expected = Watch(model.limits.efforts), Counter[str]()
+    sentinel = valid_motion(rng, 1)
+    answer = model.drive_forces(sentinel).total[0]
+    sentinel_bytes = bytes(serialize_message(write_trajectory(sentinel, Time(), [0])))
+    with served(feedforward('command_timeout:=0.0'), domain=domain) as (stream, process):
+        stream.listen(Float64MultiArray, 'commands', watch.command)
+        stream.listen(JointState, 'joint_command', lambda data: watch.state(data, True))
+        stream.listen(JointTrajectory, 'joint_trajectory', watch.trajectory)
+        for part in PARTS:
+            stream.listen(JointState, f'effort/{part}', lambda data: watch.state(data, False))
+        stream.connect()
+        memory, began, wrong = resident_memory(process), time.monotonic(), 0
+        for start in range(0, messages, BATCH):
+            for _ in range(min(BATCH, messages - start)):
+                code, data = damaged(rng)
+                expected[code] += 1
+                stream.publish(data)
+            expected[VALID] += 1
+            stream.publish(sentinel_bytes)
+            stream.wait_until(lambda: stream.commands >= expected[VALID], 'the next answer', 60)
+            found = deserialize_message(stream.last_command, Float64MultiArray).data
+            wrong += not np.allclose(found, answer, rtol=0, atol=EQUAL)
+        sent = sum(expected.values())
+        stream.wait_until(lambda: stream.status['counters']['received'] == sent, 'the counters')
+        counters = stream.status['counters']
+        took, grown = time.monotonic() - began, resident_memory(process) - memory
+        alive = process.poll() is None
+    codes = {code for code in counters if code.isupper()} | set(expected) - {VALID}
+    miscounted = {code: (counters.get(code, 0), expected[code]) for code in sorted(codes)
+                  if counters.get(code, 0) != expected[code]}
+    return {
+        'messages': sent, 'alive': alive, 'numbers_seen': watch.numbers, 'bad_numbers': watch.bad,
+        'wrong_answers_after_damage': wrong, 'accepted': counters['accepted'],
+        'accepted_expected': expected[VALID], 'miscounted': miscounted,
+        'rejected': {code: counters[code] for code in sorted(codes) if code in counters},
+        'seconds': round(took, 1), 'memory_growth_mb': round(grown, 2)}
+
+
+def passed(found: dict[str, Any]) -> bool:
+    """Return whether nothing is wrong with what `run` found."""
+    return bool(found['alive'] and not found['bad_numbers'] and not found['miscounted']
+                and not found['wrong_answers_after_damage']
+                and found['accepted'] == found['accepted_expected'])
+
+
+def main() -> int:
+    """Run and print."""
+    found = run(*(int(word) for word in sys.argv[1:3] or ('100000',)))
+    for key, value in found.items():
+        print(f'{key}: {value}')
+    print('passed' if passed(found) else 'FAILED')
+    return 0 if passed(found) else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,70 @@
+"""A feedforward node that is killed with SIGKILL in mid-stream and started again.
+
+    python benchmarks/restart.py [TIMES]
+
+A new node must answer every message that reaches it, from the first one on.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from latency import trajectory
+from stream import Stream, environment, feedforward, node_process, reserve_domain
+
+RATE = 100.0  # [Hz]
+ENOUGH = 50  # answers before the next kill
+
+
+def run(times: int, domain: int | None = None) -> dict[str, Any]:
+    """Kill that often and return what came of it."""
+    holder = None
+    if domain is None:
+        domain, holder = reserve_domain()
+        os.environ.update({key: value for key, value in environment(domain).items()
+                           if key.startswith('ROS_')})
+    data, starts, unanswered = trajectory(1), [], 0
+    with tempfile.TemporaryDirectory() as folder:
+        stream = Stream()
+        for _ in range(times):
+            stream.commands, stream.status = 0, {}
+            began = due = time.monotonic()
+            with node_process(feedforward(), domain, Path(folder) / 'log') as process:
+                first = None
+                while stream.commands < ENOUGH or not stream.status.get('rate'):
+                    if time.monotonic() > began + 30:
+                        raise TimeoutError(f'no answers: {stream.status}')
+                    if time.monotonic() >= due:
+                        stream.publish(data)
+                        due += 1 / RATE
+                    stream.spin(max(due - time.monotonic(), 1e-4))
+                    if first is None and stream.commands:
+                        first = time.monotonic() - began
+                        starts.append(first)
+                counters = stream.status['counters']
+                unanswered += counters['received'] - counters['accepted']
+                process.kill()
+                process.wait()
+            while stream.spin(0.1):
+                pass
+        stream.close()
+    if holder is not None:
+        holder.close()
+    return {'kills': times, 'unanswered': unanswered,
+            'start_to_first_command_s': [round(each, 2) for each in starts]}
+
+
+def main() -> int:
+    """Run and print."""
+    found = run(*(int(word) for word in sys.argv[1:2] or ('10',)))
+    print(found)
+    return 1 if found['unanswered'] else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

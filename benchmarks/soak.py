@@ -1,0 +1,70 @@
+"""A feedforward node under a steady stream: its memory, and whether anything is lost.
+
+    python benchmarks/soak.py [MINUTES] [RATE]
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from latency import trajectory
+from stream import feedforward, resident_memory, served
+
+SETTLING = 60.0  # [s] that memory may grow in
+BEHIND = 0.05  # [s] that this client makes up for
+SILENCE = 5.0  # [s]
+LOOK = 5.0  # [s] between two looks at the memory
+
+
+def run(
+    minutes: float, rate: float = 500.0, domain: int | None = None,
+) -> dict[str, Any]:
+    """Stream for that long and return what came of it."""
+    data, memory = trajectory(1), []
+    with served(feedforward(), domain=domain) as (stream, process):
+        began = due = time.monotonic()
+        sent, looked = 0, 0.0
+        while (elapsed := (now := time.monotonic()) - began) < minutes * 60:
+            if now >= due:
+                stream.publish(data)
+                sent += 1
+                # Held up by the machine, go on from now: a burst would be no steady stream.
+                due = max(due, now - BEHIND) + 1 / rate
+            else:
+                stream.spin(due - now)
+            if elapsed - looked > LOOK:
+                looked = elapsed
+                memory.append((elapsed, resident_memory(process)))
+        # What has not come after so long a silence is lost.
+        while stream.commands < sent and time.perf_counter() < stream.answered_at[-1] + SILENCE:
+            stream.spin(0.1)
+        settled_at = time.monotonic() + 2
+        while time.monotonic() < settled_at:
+            stream.spin(0.1)
+        status, answered = stream.status, stream.commands
+    settled = [size for elapsed, size in memory if elapsed >= min(SETTLING, minutes * 30)]
+    return {
+        'minutes': minutes, 'rate': rate, 'sent': sent,
+        # Commands of a stale stream come on top, where the machine stalled for so long.
+        'answered': answered - status['counters']['stale'],
+        'stale': status['counters']['stale'],
+        'memory_mb': round(settled[0], 2) if settled else None,
+        'growth_mb': round(float(np.max(settled) - settled[0]), 2) if settled else None,
+        'lag': status['lag'], 'compute_time': status['compute_time']}
+
+
+def main() -> int:
+    """Run and print."""
+    found = run(*(float(word) for word in sys.argv[1:3] or ('20',)))
+    print(json.dumps(found, indent=2))
+    good = found['answered'] == found['sent'] and (found['growth_mb'] or 0) < 2
+    print('passed' if good else 'FAILED')
+    return 0 if good else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

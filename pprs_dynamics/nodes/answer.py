@@ -1,0 +1,147 @@
+"""From a request to the forces that may go out: the model, its memory, scale and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.errors import LimitError
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.drive_model import RIGID_BODY, DriveForces, DriveModel
+from pprs_dynamics.model.limits import Limits
+from pprs_dynamics.nodes.conversions import NANOSECONDS
+from pprs_dynamics.nodes.feedforward_settings import CLAMP
+from pprs_dynamics.nodes.rejection import Rejection
+from pprs_dynamics.nodes.trajectory_request import TrajectoryRequest
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What goes out for a request.
+
+    Parameters
+    ----------
+    request : TrajectoryRequest
+    forces : DriveForces
+        As the model gave them.
+    effort : (N, 6) array
+        What goes out [N]: scaled and within the limits.
+    clamp_reason : str
+        Which force was clamped; empty where none was.
+    """
+
+    request: TrajectoryRequest
+    forces: DriveForces
+    effort: Array
+    clamp_reason: str = ''
+
+    @property
+    def clamped(self) -> bool:
+        """Whether a force was over its limit."""
+        return bool(self.clamp_reason)
+
+
+class Feedforward:
+    """The model in force, what its effects remember, and what may go out.
+
+    Parameters
+    ----------
+    model : DriveModel
+    own : mapping
+        The node's parameters, see `feedforward_settings`.
+    """
+
+    def __init__(self, model: DriveModel, own: Mapping[str, Any]) -> None:
+        self._model, self._memory = model, model.initial_state()
+        self._epoch: int | None = None
+        self._last: TrajectoryRequest | None = None
+        self.use(model, own)
+
+    def use(self, model: DriveModel, own: Mapping[str, Any]) -> None:
+        """Go on with another model; effects that both have keep their memory."""
+        self._memory = model.continued_state(self._model, self._memory)
+        self._model, self._scale = model, own['feedforward_scale']
+        self._remembers = self._memory.has_memory
+        self._clamps = own['limit_policy'] == CLAMP
+        self._limits: Limits = model.limits
+        if own['effort_limits']:
+            self._limits = model.limits.with_efforts(own['effort_limits'])
+
+    @property
+    def parts(self) -> list[str]:
+        """Names of the force parts of the model in force."""
+        return [RIGID_BODY, *(e.name for e in self._model.effects if not e.is_measurement)]
+
+    def part(self, answer: Answer, name: str) -> Array:
+        """Return one part of the first forces, scaled as they are, (6,)."""
+        return self._scale * answer.forces.parts[name][0]
+
+    def answer(self, request: TrajectoryRequest) -> Answer:
+        """Return what goes out for a request.
+
+        Raises
+        ------
+        Rejection, WorkspaceError, SingularityError, LimitError
+            Where nothing may; the memory is then what it was.
+        """
+        if not self._remembers:
+            forces = self._model.drive_forces(request.motion, self._memory)
+            answer = self._checked(request, forces)
+        else:
+            # Memory advances with what is executed, the first point, once that is accepted.
+            motion, ahead = self._timed(request), self._memory.copy()
+            answer = self._checked(request, self._model.drive_forces(motion, ahead))
+            if len(motion) > 1:
+                ahead = self._memory
+                self._model.drive_forces(motion[:1], ahead)
+            self._memory = ahead
+        self._last = request
+        return answer
+
+    def hold(self, gravity: bool) -> Answer:
+        """Return what goes out to hold the last accepted pose at rest, or zeros.
+
+        Raises
+        ------
+        Rejection, PprsError
+            Where there is no such force, e.g. as the model has changed since.
+        """
+        if self._last is None:
+            raise Rejection('EMPTY', 'no trajectory has been accepted')
+        last = self._last.motion
+        # The forces at rest, not those of the way there: no memory of it.
+        motion = PlatformMotion.at_rest(last.position[-1:], last.orientation[-1:]).with_time([0.0])
+        forces = self._model.drive_forces(motion)
+        effort = self._limits.clamped(self._scale * forces.total) if gravity else (
+            np.zeros_like(forces.total))
+        if not np.all(np.isfinite(effort)):
+            raise Rejection('OUTPUT', 'the model gave a force that is not finite')
+        return Answer(self._last, forces, effort)
+
+    def _checked(self, request: TrajectoryRequest, forces: DriveForces) -> Answer:
+        mechanism, effort = forces.mechanism, forces.total
+        for name, quantity in (('force', effort), ('drive velocity', mechanism.velocity),
+                               ('drive acceleration', mechanism.acceleration)):
+            if not np.isfinite(quantity).all():
+                raise Rejection('OUTPUT', f'the model gave a {name} that is not finite')
+        self._limits.check_strokes(mechanism.position)
+        if self._scale != 1:
+            effort = self._scale * effort
+        try:
+            self._limits.check_efforts(effort)
+        except LimitError as error:
+            if not self._clamps:
+                raise
+            return Answer(request, forces, self._limits.clamped(effort), str(error))
+        return Answer(request, forces, effort)
+
+    def _timed(self, request: TrajectoryRequest) -> PlatformMotion:
+        """Return the motion on one time scale for all messages, which memories go by."""
+        if self._epoch is None:
+            self._epoch = request.start
+        return request.motion.with_time(
+            (request.start - self._epoch + request.offsets) / NANOSECONDS)

@@ -1,0 +1,36 @@
+"""Which model a node runs, so that a recording of its status tells it too."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.model_file import DEFAULT_MODEL, find_file
+
+OPTION = '--params-file'
+
+
+def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
+    """Return path and SHA-256 of the parameter files on a command line, in order.
+
+    Without any it is the package's own model that a node runs.
+    """
+    paths = [Path(value) for option, value in pairwise(arguments)
+             if option == OPTION] or [find_file(DEFAULT_MODEL)]
+    return [{'file': str(path.resolve()), 'sha256': _digest(path.read_bytes())}
+            for path in paths if path.is_file()]
+
+
+def fingerprint(model: DriveModel) -> str:
+    """Return the SHA-256 of the values in force, which changes with every parameter."""
+    values: dict[str, Any] = dict(model.values)
+    return _digest(json.dumps(values, sort_keys=True, default=str).encode())
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,172 @@
+"""A trajectory message as the model needs it, or the rule that it breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rclpy._rclpy_pybind11 import RMWError
+from rclpy.serialization import deserialize_message
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from pprs_dynamics.measurement.samples import Indices, Mask
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.nodes.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
+from pprs_dynamics.nodes.rejection import Rejection
+from pprs_dynamics.nodes.trajectory_cdr import is_whole, read_points
+
+REJECT, SPLINE = 'reject', 'spline'
+VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)
+
+
+@dataclass(frozen=True)
+class TrajectoryRequest:
+    """What a trajectory message asks for.
+
+    Parameters
+    ----------
+    motion : PlatformMotion
+        All points; its time is in seconds after `start`.
+    start : int
+        Header stamp, or the time of arrival where it is 0 [ns].
+    offsets : (N,) array of int
+        time_from_start of every point [ns], exact.
+    """
+
+    motion: PlatformMotion
+    start: int
+    offsets: Indices
+
+    @property
+    def first_stamp(self) -> int:
+        """When the first point is due [ns]."""
+        return self.start + int(self.offsets[0])
+
+    @property
+    def end(self) -> int:
+        """When the last point is due [ns]."""
+        return self.start + int(self.offsets[-1])
+
+
+def read_serialised(
+    data: bytes, now: int, max_age: float = 0.0, missing: str = REJECT,
+) -> TrajectoryRequest:
+    """Return what the bytes of a message ask for; see `read_trajectory`."""
+    points = read_points(data)
+    if points is not None:
+        stamp, numbers, offsets = points
+        return _request(_start(stamp, now, max_age), numbers, offsets)
+    try:
+        message = deserialize_message(data, MultiDOFJointTrajectory) if is_whole(data) else None
+    except (RMWError, UnicodeDecodeError):
+        message = None
+    if message is None:
+        raise Rejection('SIZE', f'{len(data)} bytes arrived that are no '
+                        'whole trajectory_msgs/MultiDOFJointTrajectory')
+    return read_trajectory(message, now, max_age, missing)
+
+
+def read_trajectory(
+    message: MultiDOFJointTrajectory, now: int, max_age: float = 0.0, missing: str = REJECT,
+) -> TrajectoryRequest:
+    """Return the platform motion that a message asks for.
+
+    Parameters
+    ----------
+    message : trajectory_msgs/MultiDOFJointTrajectory
+    now : int
+        Time of arrival [ns].
+    max_age : float
+        Oldest header stamp that is accepted [s]; 0 for any.
+    missing : {'reject', 'spline'}
+        What to do where points have no velocities or no accelerations: 'spline' takes those
+        that are missing from a spline through the poses.
+
+    Raises
+    ------
+    Rejection, MotionError
+        For a message that breaks a rule.
+    """
+    points = message.points
+    if not points:
+        raise Rejection('EMPTY', 'points: the trajectory has none, but it must have at least 1')
+    if list(message.joint_names) != [PLATFORM]:
+        raise Rejection('NAMES', f'joint_names is {list(message.joint_names)!r:.100}, '
+                        f'but it must be [{PLATFORM!r}]')
+    if message.header.frame_id not in BASE_FRAMES:
+        raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
+                        "but it must be 'base' or empty")
+    lacking = _check_counts(points, missing)
+    start = _start(nanoseconds(message.header.stamp), now, max_age)
+    offsets = np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
+    numbers = np.array([_row(point) for point in points])
+    if lacking.any():
+        _fill(numbers, offsets, lacking)
+    return _request(start, numbers, offsets)
+
+
+def _request(start: int, numbers: Array, offsets: Indices) -> TrajectoryRequest:
+    if offsets[0] < 0:
+        raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s, '
+                        'but it must not be negative')
+    motion = PlatformMotion(
+        numbers[:, :3], numbers[:, 3:7], numbers[:, 7:10], numbers[:, 10:13], numbers[:, 13:16],
+        numbers[:, 16:], offsets / NANOSECONDS)
+    return TrajectoryRequest(motion, start, offsets)
+
+
+def _start(stamp: int, now: int, max_age: float) -> int:
+    start = stamp if stamp else now
+    age = (now - start) / NANOSECONDS
+    if max_age and age > max_age:
+        raise Rejection('TIME', f'header.stamp is {age:.3f} s old, max_age allows {max_age:g} s')
+    return start
+
+
+def _check_counts(points: Sequence[Any], missing: str) -> Mask:
+    """Return which points lack a velocity and an acceleration, (N, 2), where that is allowed."""
+    lacking = np.zeros((len(points), 2), dtype=bool)
+    for index, point in enumerate(points):
+        for column, field in enumerate(('velocities', 'accelerations', 'transforms')):
+            count = len(getattr(point, field))
+            if count == 1:
+                continue
+            may_lack = count == 0 and field != 'transforms' and missing == SPLINE
+            if may_lack and len(points) >= FEWEST_POSES:
+                lacking[index, column] = True
+                continue
+            hint = (f': a spline needs at least {FEWEST_POSES} points, and the trajectory has '
+                    f'{len(points)}' if may_lack else '')
+            raise Rejection(
+                'SIZE', f'point {index} has {count} {field}, but it must have 1{hint}')
+    return lacking
+
+
+def _fill(numbers: Array, offsets: Indices, lacking: Mask) -> None:
+    """Put the derivatives of a spline through the poses where points lack their own."""
+    derivatives = spline_derivatives(
+        (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7])
+    for place, values, rows in zip((VELOCITY, ACCELERATION), derivatives, lacking.T, strict=True):
+        if not np.isfinite(values).all():
+            raise Rejection('OUTPUT', 'the spline through the poses has derivatives that are not '
+                            'finite')
+        numbers[rows, place] = values[rows]
+
+
+def _row(point: MultiDOFJointTrajectoryPoint) -> tuple[float, ...]:
+    """Return the numbers of a point, zero where it has none."""
+    pose = point.transforms[0]
+    p, q = pose.translation, pose.rotation
+    return (p.x, p.y, p.z, q.x, q.y, q.z, q.w,
+            *_twist(point.velocities), *_twist(point.accelerations))
+
+
+def _twist(twists: Sequence[Any]) -> tuple[float, ...]:
+    if not twists:
+        return (0.0,) * 6
+    linear, angular = twists[0].linear, twists[0].angular
+    return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z
