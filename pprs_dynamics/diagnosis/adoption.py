@@ -10,6 +10,7 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.design import SHAPE_STEP, BaseColumn, Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, JointFit, Regression
+from pprs_dynamics.diagnosis.reversal_widths import KEY, estimate_widths
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.time_delay import TimeDelay
@@ -180,6 +181,11 @@ def calibrations(regression: Regression, fit: JointFit) -> list[Calibration]:
             number.key, number.element, number.value,
             float(f'{number.value + np.sign(number.value) * share * number.deviation:.{DIGITS}g}'),
             std, number.unit))
+    common = np.broadcast_to(regression.design.model.reversal.velocity,
+                             len(regression.design.drives))
+    # Widths are told without an uncertainty: the fits allow for all of them anyway.
+    found += [Calibration(KEY, d, float(common[d]), float(f'{width:.{DIGITS}g}'), 0.0, 'm/s')
+              for d, width in estimate_widths(regression, fit).items()]
     return found
 
 

@@ -21,6 +21,7 @@ from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.selection import Judged, Selection, Selector
 from pprs_dynamics.diagnosis.unexplained import Unexplained, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
@@ -220,7 +221,9 @@ class _Stage:
         regression = Regression(design)
         selector = Selector(regression, lambda share: report(DESIGN + SELECTION * share),
                             earlier)
-        return cls(design, regression, selector, selector.select())
+        selection = selector.select()
+        regression.tell_widths(list(estimate_widths(regression, selection.fit)))
+        return cls(design, regression, selector, selection)
 
 
 def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> DriveModel:

@@ -121,6 +121,7 @@ class Regression:
             self.base_rows[d] = (np.stack(rows) if rows else np.zeros((0, len(series.index))))
         self.nuisance = np.array([k for k, column in enumerate(design.base)
                                   if column.kind == 'width'], dtype=int)
+        self.widths: dict[int, tuple[JointFit, dict[int, float]]] = {}
         self.precision = np.array([column.precision for column in design.base])
         self._white: dict[tuple[int, int], tuple[NoiseModel, Array, Array]] = {}
 
@@ -128,6 +129,12 @@ class Regression:
     def samples(self) -> int:
         """Measured samples of the drive that has most."""
         return max(int(series.known.sum()) for series in self.series.values())
+
+    def tell_widths(self, drives: Sequence[int]) -> None:
+        """Count other widths of reversal on these drives as part of the model from now on."""
+        told = tuple(f'{self.design.drives[d]} ' for d in drives)
+        self.nuisance = np.array([k for k in self.nuisance if not (
+            told and self.design.base[k].label.startswith(told))], dtype=int)
 
     def whitened_base(self, d: int, noise: NoiseModel) -> tuple[Array, Array]:
         """Return whitened base rows and error of a drive; kept for the next time."""

@@ -210,7 +210,7 @@ class ChunkSensitivities:
         """Return what other widths of turning over would change in each drive, (W, N, 6)."""
         friction = next(e for e in self.model.effects if isinstance(e, ActiveFriction))
         dry = np.asarray(friction.coulomb) * self.state.guide_load
-        width = self.model.reversal.velocity
+        width = np.asarray(self.model.reversal.velocity)
         return np.stack([self.sensed(dry * (
             smooth_sign(self.state.velocity, factor * width) - self.state.direction))
             for factor in DRIVE_WIDTHS])

@@ -20,18 +20,18 @@ class Reversal:
 
     Parameters
     ----------
-    velocity : float
-        Of the drives [m/s].
+    velocity : float or sequence of 6 floats
+        Of all drives, or of each [m/s].
     rate : float
         Of the passive joints [rad/s].
     """
 
-    velocity: float = 0.001
+    velocity: float | tuple[float, ...] = 0.001
     rate: float = 0.001
 
 
-def smooth_sign(velocity: Array, reversal_velocity: float) -> Array:
-    """Return sgn(v) as tanh(v / v_rev)."""
+def smooth_sign(velocity: Array, reversal_velocity: float | Array) -> Array:
+    """Return sgn(v) as tanh(v / v_rev); a width per column of (N, D) velocities is allowed."""
     sign: Array = np.tanh(velocity / reversal_velocity)
     return sign
 

@@ -98,7 +98,7 @@ class MechanismState:
     @cached_property
     def direction(self) -> Array:
         """sgn of the drive velocities, turning over within the reversal velocity."""
-        return smooth_sign(self.velocity, self.reversal.velocity)
+        return smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
 
     def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
         """Return the same motion with other bodies, and with a load more.

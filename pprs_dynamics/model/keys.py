@@ -119,6 +119,8 @@ KEYS: dict[str, Key] = {key.name: key for key in (
     Key('friction.approach', 'how passive friction reaches the drives', choices=APPROACHES),
     Key('friction.reversal_velocity', 'width in which sgn turns over in drives', 'm/s',
         positive=True),
+    Key('friction.reversal_velocities', 'the same drive by drive; 0: friction.reversal_velocity',
+        'm/s', size=6, lower=0, default=(0.0,) * 6),
     Key('friction.reversal_rate', 'width in which sgn turns over in passive joints', 'rad/s',
         positive=True),
     Key('friction.drives.viscous', 'c_i, viscous friction of the drives', 'N s/m', size=6,

@@ -179,8 +179,15 @@ def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
             values[name] = value
     return DriveModel(
         robot, effects, limits,
-        Reversal(values['friction.reversal_velocity'], values['friction.reversal_rate']),
+        Reversal(_reversal_velocity(values), values['friction.reversal_rate']),
         values['equations'], values, source)
+
+
+def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
+    """Return the width that all drives share, or one for each."""
+    common: float = values['friction.reversal_velocity']
+    own: tuple[float, ...] = values['friction.reversal_velocities']
+    return tuple(one or common for one in own) if any(own) else common
 
 
 def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:

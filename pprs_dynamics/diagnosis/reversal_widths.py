@@ -1,0 +1,84 @@
+"""The velocity within which each drive's friction turns over, from what a fit leaves.
+
+Friction that turns over in another width than the model's is no effect that is missing, but it
+leaves an error at every reversal. In the fits it is carried by columns that span all widths; here
+it becomes one number per drive.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.effects.active_friction import ActiveFriction
+from pprs_dynamics.mechanism.reversal import smooth_sign
+from pprs_dynamics.mechanism.robot import Array
+
+NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
+TRIALS = 13
+LEAST_GAIN = 15.0  # twice the log-likelihood, for which a width is told
+KEY = 'friction.reversal_velocities'
+
+
+def estimate_widths(regression: Regression, fit: JointFit) -> dict[int, float]:
+    """Return the widths [m/s] of the drives on which they differ from the model's for certain."""
+    known = regression.widths.get(id(fit))
+    if known is None or known[0] is not fit:
+        # Kept with the fit, so that its id stays its own.
+        known = regression.widths[id(fit)] = (fit, _estimate(regression, fit))
+    return known[1]
+
+
+def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
+    design = regression.design
+    friction = next((e for e in design.model.effects if isinstance(e, ActiveFriction)), None)
+    if friction is None:
+        return {}
+    found = {}
+    for d, series in regression.series.items():
+        columns = [(k, row) for k, row in zip(regression.base_index[d], regression.base_rows[d],
+                                              strict=True) if design.base[k].kind == 'width'
+                   and design.base[k].label.startswith(design.drives[d])]
+        if not columns:
+            continue
+        width = float(np.broadcast_to(design.model.reversal.velocity, len(design.drives))[d])
+        constant = _constant_friction(regression, fit, d)
+        rest = fit.rest[d] + sum(fit.coefficients[k] * row for k, row in columns)
+        white = series.whiten(fit.noises[d], rest)
+
+        def gain(logarithm: float, d: int = d, width: float = width, white: Array = white,
+                 mu: float = friction.coulomb[d], constant: float = constant) -> float:
+            column = _column(regression, d, mu, constant, width * float(np.exp(logarithm)))
+            own = regression.series[d].whiten(fit.noises[d], column)
+            return float(2 * own @ white - own @ own)
+
+        grid = np.linspace(np.log(NARROWEST), np.log(WIDEST), TRIALS)
+        best = int(np.argmax([gain(trial) for trial in grid]))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, TRIALS - 1)]
+        refined = minimize_scalar(lambda x, gain=gain: -gain(x), bounds=(low, high),
+                                  method='bounded', options={'maxiter': 15})
+        if -float(refined.fun) > LEAST_GAIN:
+            found[d] = width * float(np.exp(refined.x))
+    return found
+
+
+def _constant_friction(regression: Regression, fit: JointFit, d: int) -> float:
+    """Return the constant dry friction that the fit adds on a drive [N]."""
+    place, force = len(regression.design.base), 0.0
+    for one in fit.active:
+        if isinstance(one, Active) and one.term.drive == d and (
+                one.term.effect.name == 'coulomb_friction'):
+            force += float(fit.coefficients[place])
+        place += one.size
+    return force
+
+
+def _column(regression: Regression, d: int, mu: float, constant: float, width: float) -> Array:
+    parts = []
+    for one in regression.design.recordings:
+        turned = smooth_sign(one.velocity[:, d], width) - one.direction[:, d]
+        dry = mu * one.guide_load[:, d] + constant
+        parts.append(one.treat((dry * turned)[:, None])[:, 0])
+    column: Array = np.concatenate(parts)[regression.series[d].index]
+    return column
