@@ -7,7 +7,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
 	&& echo $$p && break; done)
 
-.PHONY: help demo test reproduce feedforward localisation lint clean
+.PHONY: help demo demo-feedforward test reproduce feedforward localisation score benchmark reliability experiments lint clean
 
 help:
 	@echo 'make demo       install into $(VENV), run the nodes, show forces and a picture'
@@ -15,6 +15,10 @@ help:
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
 	@echo 'make feedforward   the table and picture of docs/feedforward.md (4 minutes)'
 	@echo 'make localisation  how often compare is right about where the model fails (long)'
+	@echo 'make score      how often diagnose is right about hidden effects (hours; it can be stopped)'
+	@echo 'make benchmark  speed against Pinocchio and MuJoCo, latency against an echo node'
+	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
+	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
 demo: $(VENV)/.demo
@@ -35,6 +39,19 @@ feedforward: $(VENV)/.demo
 
 localisation: $(VENV)/.demo
 	$(BIN)/python benchmarks/localisation.py 100
+
+score: $(VENV)/.test
+	$(BIN)/python benchmarks/score.py --jobs 2 --table docs/diagnosis_table.md
+
+benchmark: $(VENV)/.test
+	$(BIN)/python benchmarks/speed.py
+	$(BIN)/python benchmarks/latency.py 10
+
+reliability: $(VENV)/.test
+	$(BIN)/python benchmarks/reliability.py
+
+experiments: $(VENV)/.test
+	$(BIN)/python benchmarks/experiments_score.py
 
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python

@@ -23,7 +23,8 @@ setup(
     extras_require={
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
-                'ros-sensor-msgs==5.5.1', 'ros-trajectory-msgs==5.5.1'],
+                'ros-sensor-msgs==5.5.1', 'ros-trajectory-msgs==5.5.1',
+                'ros-diagnostic-msgs==5.5.1'],
         'report': ['rich>=13', 'matplotlib>=3.8', 'plotly>=5.20'],
         'sim': ['mujoco>=4.0'],
         'bags': ['rosbags>=0.11'],
