@@ -20,7 +20,9 @@ from pprs_dynamics.mechanism.robot import Array
 OWN_SHARE = 1e-7
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 DRIVE_MARGIN = 6.0
-REFINEMENTS = 24  # evaluations of a shape parameter between its neighbours in the grid
+# Evaluations of a shape parameter between its neighbours in the grid: of a proposal, and of what
+# is adopted.
+COARSE, FINE = 9, 24
 
 
 class Scan:
@@ -193,12 +195,12 @@ class Scan:
                     return False
         return True
 
-    def refined(self, candidate: Candidate) -> Candidate:
+    def refined(self, candidate: Candidate, evaluations: int = COARSE) -> Candidate:
         """Return the candidate with its shape parameters between the grid's values."""
         found = []
         for one in candidate.active:
             if one.term.shape and one.term.drive is not None:
-                better = self._refined(one)
+                better = self._refined(one, evaluations)
                 trials = [Active(better.term, variant) for variant in one.term.effect.variants]
                 one = max(trials, key=lambda a: self.gain(a) - self.library.penalty(a))
             found.append(one)
@@ -220,7 +222,7 @@ class Scan:
             found.append(self.refined(Candidate(tuple(active), 0.0, 0.0)))
         return found
 
-    def _refined(self, active: Active) -> Active:
+    def _refined(self, active: Active, evaluations: int) -> Active:
         term, d = active.term, active.term.drive
         assert d is not None
         assert issubclass(term.effect, DriveEffect)
@@ -244,22 +246,22 @@ class Scan:
             def gain_of(value: float, name: str = name) -> float:
                 return gain_at({**shape, name: value})
 
-            trial, gain = _best_between(low, high, gain_of)
+            trial, gain = _best_between(low, high, gain_of, evaluations)
             if gain > best_gain:
                 shape[name], best_gain = trial, gain
         return Active(design.term(effect, d, shape), active.variant)
 
 
-def _best_between(low: float, high: float, gain: Callable[[float], float],
+def _best_between(low: float, high: float, gain: Callable[[float], float], evaluations: int,
                   ) -> tuple[float, float]:
     """Return where a gain is largest between two values, in their logarithm where both are > 0."""
     if low > 0:
         found = minimize_scalar(lambda x: -gain(float(np.exp(x))), method='bounded',
                                 bounds=(np.log(low), np.log(high)),
-                                options={'maxiter': REFINEMENTS, 'xatol': 1e-5})
+                                options={'maxiter': evaluations, 'xatol': 1e-5})
         return float(np.exp(found.x)), -float(found.fun)
     found = minimize_scalar(lambda x: -gain(float(x)), method='bounded', bounds=(low, high),
-                            options={'maxiter': REFINEMENTS, 'xatol': 1e-7})
+                            options={'maxiter': evaluations, 'xatol': 1e-7})
     return float(found.x), -float(found.fun)
 
 

@@ -19,7 +19,7 @@ from pprs_dynamics.diagnosis.library import Candidate, Library
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.diagnosis.regression import solve
-from pprs_dynamics.diagnosis.scan import Scan
+from pprs_dynamics.diagnosis.scan import FINE, Scan
 
 MOST_EFFECTS = 6
 MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
@@ -114,7 +114,7 @@ class Selector:
             if winner is None:
                 selection.suspects = [one for one in judged if self._is_suspect(one, selection)]
                 break
-            _add(selection, winner)
+            _add(selection, self._polished(winner, selection))
             self._prune(selection)
         self._swap(selection)
         selection.rivals = self._find_rivals(selection)
@@ -173,6 +173,15 @@ class Selector:
         if gain > candidate.penalty:
             gain = min(gain, self.regression.guarded_gain(fit, active))
         return Judged(candidate, fit, gain - candidate.penalty - MARGIN)
+
+    def _polished(self, winner: Judged, selection: Selection) -> Judged:
+        """Return a winner with its shapes as exact as they can be had, if that is better."""
+        if not any(one.term.shape for one in winner.candidate.active):
+            return winner
+        active = self._actives(selection.adopted)
+        scan = Scan(self.library, active, winner.fit.noises)
+        exact = self.judge(scan.refined(winner.candidate, FINE), selection.fit, active)
+        return exact if exact.evidence > winner.evidence else winner
 
     def _stands(self, one: Judged, selection: Selection) -> bool:
         before_it = [*self.earlier, *selection.adopted]
