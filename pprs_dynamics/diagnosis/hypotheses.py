@@ -29,6 +29,9 @@ REVERSAL_WIDTHS = (0.0003, 0.001, 0.003)
 # model can know that noise from the same record.
 SLOW_NOISE_MARGIN = 10.0
 RIPPLE_PERIODS = (2, 32)  # periods of a force ripple within the drive's travel
+# Widths of smooth bumps, as parts of the stroke, and their standard deviation in widths.
+BUMP_PARTS = (4, 8, 16, 32)
+BUMP_DEVIATION = 0.4
 OWN = ('position', 'acceleration', 'load', 'rod_angle')
 PLATFORM = ('platform_x', 'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
 # Variables along which a force that opposes or follows the motion may change.
@@ -42,8 +45,8 @@ class Pattern:
     Parameters
     ----------
     kind : str
-        'offset', 'range', 'directed_range', 'growth', 'directed_growth', 'one_way', 'friction',
-        'fading', 'fast', 'scatter', 'ripple' or 'line'.
+        'offset', 'range', 'bump', 'directed_range', 'growth', 'directed_growth', 'one_way',
+        'friction', 'fading', 'fast', 'scatter', 'ripple' or 'line'.
     limits : (float, float) or None
         Of the variable, where the pattern is confined to them.
     scale : float
@@ -195,8 +198,30 @@ def _scalar(name: str, values: Array, sign: Array | None, rivals: int) -> Family
         weights += [_runs(len(bins)), np.eye(len(lines))]
         patterns += _run_patterns('directed_range', edges)
         patterns += [Pattern('directed_growth')] * len(lines)
+    if name == 'position':
+        bumps, where = _bumps(values)
+        columns.append(bumps)
+        weights.append(np.eye(len(bumps)))
+        patterns += where
     return Family(name, np.concatenate(columns), _diagonal(weights), tuple(patterns), rivals,
                   edges=edges)
+
+
+def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
+    """Return smooth bumps at many places and of several widths, and where they are.
+
+    A smooth force is no range: at the limits of a range the difference would be a jump, which
+    whitening makes larger than what the range explains.
+    """
+    low, span = float(values.min()), float(np.ptp(values))
+    columns, patterns = [], []
+    for parts in BUMP_PARTS:
+        width = span / parts
+        for centre in low + width * np.arange(0.5, parts, 0.5):
+            columns.append(np.exp(-0.5 * ((values - centre) / (BUMP_DEVIATION * width)) ** 2))
+            patterns.append(Pattern('bump', (max(centre - width / 2, low),
+                                             min(centre + width / 2, low + span))))
+    return np.stack(columns), patterns
 
 
 def _velocity(name: str, values: Array, sign: Array | None, rivals: int) -> Family:

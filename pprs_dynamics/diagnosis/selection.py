@@ -24,6 +24,7 @@ from pprs_dynamics.diagnosis.scan import FINE, Scan
 MOST_EFFECTS = 6
 MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
 FURTHER_MARGIN = 10.0  # more, for an effect that lives on what others have left
+LEAST_SUSPECT = -20.0  # evidence; further below, slow noise is the better explanation by far
 PROPOSALS = 4  # of each scan
 # What an adopted effect leaves may be its form, which is an idealisation: a further effect on
 # the same drives has to gain this share of what it gained.
@@ -204,7 +205,7 @@ class Selector:
 
     def _is_suspect(self, one: Judged, selection: Selection) -> bool:
         """Return whether an effect would stand if the noise were as a rich regression says."""
-        if one.evidence > 0:
+        if not LEAST_SUSPECT < one.evidence <= 0:
             return False
         scan = Scan(self.library, self._actives(selection.adopted), self.rich)
         gain = sum(scan.gain(active) for active in one.candidate.active)

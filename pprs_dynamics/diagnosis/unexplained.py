@@ -22,6 +22,7 @@ from pprs_dynamics.mechanism.robot import Array
 FORM_SHARE = 0.06
 # A free curve explains this much more than an effect: then it is not that effect.
 BETTER = 1.3
+MOST_LEFT = 0.4  # of a drive's mean square, beside an effect that explains poorly
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,10 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
     regression = selector.regression
     for _ in range(2):
         found = _search(regression, selection, explained)
-        dropped = [one for one in selection.adopted if found.statements
-                   and _is_needless(one, selector, selection, found)]
+        dropped = [one for one in selection.adopted if (
+            found.statements and _is_needless(one, selector, selection, found.statements,
+                                              found.where))
+            or _is_stopgap(one, selector, selection)]
         if not dropped:
             break
         selection.adopted = [one for one in selection.adopted if one not in dropped]
@@ -113,17 +116,41 @@ def _explained(regression: Regression, selection: Selection) -> Array:
     return squares
 
 
+def _is_stopgap(one: Judged, selector: Selector, selection: Selection) -> bool:
+    """Return whether an effect leaves most of its drives' error, and a free curve would not.
+
+    The noise beside a poor explanation swallows the rest of the error. So the search goes over the
+    error as it was before the effect.
+    """
+    regression, residuals = selector.regression, selector.regression.design.residuals
+    others = tuple(a for other in selection.adopted if other is not one
+                   for a in other.candidate.active)
+    before = regression.at(others, selection.start.noises)
+    poor = [d for d in one.candidate.drives or () if float(np.mean(
+        selection.fit.rest[d] ** 2)) > MOST_LEFT * float(np.mean(before.rest[d] ** 2))]
+    if not poor:
+        return False
+    measured = np.full(residuals.measured.shape, np.nan)
+    for d in poor:
+        series = regression.series[d]
+        measured[series.index, d] = residuals.model[series.index, d] + np.where(
+            series.known, before.rest[d], np.nan)
+    where = localise(replace(residuals, measured=measured, parts={}))
+    return bool(where.statements) and _is_needless(
+        one, selector, selection, where.statements, where)
+
+
 def _is_needless(one: Judged, selector: Selector, selection: Selection,
-                 found: Unexplained) -> bool:
+                 statements: tuple[Statement, ...], where: Localisation) -> bool:
     """Return whether free curves on the drives of an effect explain much more than it does."""
     regression = selector.regression
     drives = one.candidate.drives or tuple(regression.series)
-    stated = {statement.drive for statement in found.statements}
+    stated = {statement.drive for statement in statements}
     curves = []
     for d in drives:
         name = regression.design.drives[d]
         if name in stated:
-            findings = found.where.drives[name]
+            findings = where.drives[name]
             rows = np.zeros((len(findings.columns), len(regression.design.residuals)))
             if findings.columns.shape[1] == len(findings.index) and (
                     findings.index.max(initial=0) < rows.shape[1]):

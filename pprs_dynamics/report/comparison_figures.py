@@ -56,7 +56,7 @@ def over_time(residuals: Residuals, drive: int, worst: list[tuple[float, float]]
     curves = (('measured', residuals.measured, MEASURED, 1), ('model', residuals.model, MODEL, 1),
               ('measured minus model', residuals.error, ERROR, 2))
     for name, values, colour, row in curves:
-        time, shown = _with_gaps(residuals, values[:, drive])
+        time, shown = curve(residuals, values[:, drive])
         figure.add_trace(go.Scatter(x=time, y=shown, name=name, mode='lines',
                                     line={'color': colour, 'width': 1.3}), row=row, col=1)
     for start, end in worst:
@@ -177,8 +177,8 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
     return figure
 
 
-def _with_gaps(residuals: Residuals, values: Array) -> tuple[Array, Array]:
-    """Return thinned curves of all segments, with a break between them."""
+def curve(residuals: Residuals, values: Array) -> tuple[Array, Array]:
+    """Return a thinned curve of all segments, with a break between them."""
     segments = np.unique(residuals.segment)
     times, shown = [], []
     for segment in segments:

@@ -8,7 +8,7 @@ from pathlib import Path
 from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.report import comparison_figures as figures
 from pprs_dynamics.report.page import Page
 from pprs_dynamics.report.tables import comparison_rows
@@ -18,7 +18,7 @@ HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained',
 
 
 def comparison_page(
-    model: DriveModel, recordings: Sequence[Recording], residuals: Residuals,
+    model: ForceModel, recordings: Sequence[Recording], residuals: Residuals,
     comparison: Comparison, notes: Sequence[str],
 ) -> Page:
     """Return the page of one comparison, most important first."""

@@ -18,7 +18,8 @@ BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = (
     '#0072B2', '#E69F00', '#009E73', '#D55E00', '#CC79A7', '#56B4E9', '#666666')
 
 
-def _pyplot() -> Any:
+def pyplot_module() -> Any:
+    """Return matplotlib.pyplot, drawing into files, or raise MissingLibraryError."""
     try:
         import matplotlib
     except ImportError:
@@ -47,7 +48,7 @@ def draw_forces(
         `rigid_body`, `active_friction`, `passive_friction` [N].
     title : str
     """
-    pyplot = _pyplot()
+    pyplot = pyplot_module()
     figure, axes = pyplot.subplots(4, 3, figsize=(12, 8.5), sharex=True, layout='constrained',
                                    height_ratios=(2, 1, 2, 1))
     for drive, name in enumerate(DRIVES):
@@ -71,12 +72,12 @@ def draw_forces(
     handles = [*axes[0, 0].get_lines(), *axes[1, 0].get_lines()]
     figure.suptitle(title)
     figure.legend(handles=handles, loc='outside lower center', ncols=4, frameon=False)
-    return _save(pyplot, figure, path)
+    return save(pyplot, figure, path)
 
 
 def draw_figure_8(path: str | PathLike[str], result: Reproduction) -> Path:
     """Draw the paper's figure 8: the force of motor 1 without and with friction."""
-    pyplot = _pyplot()
+    pyplot = pyplot_module()
     figure, axis = pyplot.subplots(figsize=(10.5, 4.5), layout='constrained')
     rigid = result.rigid_body[:, 0]
     axis.plot(result.time, rigid, color=SKY, label='$Q_1$: without friction')
@@ -87,13 +88,13 @@ def draw_figure_8(path: str | PathLike[str], result: Reproduction) -> Path:
                   label=f'$Q_1^m$: with friction, {_words(approach)}')
     axis.set(xlabel='time [s]', ylabel='force of motor 1 [N]',
              title='Drive force of motor 1 on the helical path (the paper\'s figure 8)')
-    _finish(axis)
-    return _save(pyplot, figure, path)
+    finish(axis)
+    return save(pyplot, figure, path)
 
 
 def draw_figure_9(path: str | PathLike[str], result: Reproduction) -> Path:
     """Draw the paper's figure 9: the additional force of motor 1 and its two parts."""
-    pyplot = _pyplot()
+    pyplot = pyplot_module()
     figure, (upper, lower) = pyplot.subplots(
         2, 1, figsize=(10.5, 6.5), sharex=True, layout='constrained', height_ratios=(3, 2))
     active = result.active[:, 0]
@@ -112,21 +113,23 @@ def draw_figure_9(path: str | PathLike[str], result: Reproduction) -> Path:
     lower.set(xlabel='time [s]', ylabel='rod angle [degrees]',
               title='At 90 degrees the second approach is not defined: gaps in its curve')
     for axis in (upper, lower):
-        _finish(axis)
-    return _save(pyplot, figure, path)
+        finish(axis)
+    return save(pyplot, figure, path)
 
 
 def _words(approach: str) -> str:
     return {'whole_mechanism': 'first approach', 'independent_chains': 'second approach'}[approach]
 
 
-def _finish(axis: Any) -> None:
+def finish(axis: Any) -> None:
+    """Give an axis its grid and its legend at the side."""
     axis.grid(alpha=0.25)
     axis.spines[['top', 'right']].set_visible(False)
     axis.legend(frameon=False, fontsize=9, loc='upper left', bbox_to_anchor=(1.0, 1.0))
 
 
-def _save(pyplot: Any, figure: Any, path: str | PathLike[str]) -> Path:
+def save(pyplot: Any, figure: Any, path: str | PathLike[str]) -> Path:
+    """Write a picture and close it."""
     file = Path(path)
     figure.savefig(file, dpi=110)
     pyplot.close(figure)

@@ -8,7 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.model.atomic_file import write_text
 
 _STYLE = '''
 body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; margin: 0 auto; max-width: 1180px;
@@ -21,6 +22,11 @@ th, td { padding: .3rem .8rem; border-bottom: 1px solid #ddd; text-align: right;
 th:first-child, td:first-child, th:last-child { text-align: left; }
 th { border-bottom: 2px solid #888; font-weight: 600; }
 td.text { text-align: left; max-width: 34rem; } td.poor { background: #fbe3dc; }
+.card { border: 1px solid #ddd; border-left: 4px solid #0072B2; border-radius: 4px;
+        margin: 1rem 0; padding: .4rem 1rem; }
+.card h3 { font-size: 1.05rem; margin: .3rem 0; }
+dl { display: grid; grid-template-columns: 6.5rem 1fr; gap: .25rem .8rem; margin: .4rem 0; }
+dt { font-weight: 600; color: #555; } dd { margin: 0; max-width: 54rem; }
 td.fair { background: #fdf3d8; } td.good, td.noise { background: #e3f1e6; }
 '''
 
@@ -78,10 +84,22 @@ class Page:
 
     def figure(self, figure: Any) -> None:
         """Add a Plotly figure."""
+        self._body.append(self._drawn(figure))
+
+    def card(self, title: str, lines: Iterable[tuple[str, str]], figure: Any = None) -> None:
+        """Add a framed finding: labelled lines, and a Plotly figure below them."""
+        terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
+                        for label, text in lines)
+        picture = '' if figure is None else self._drawn(figure)
+        self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
+                          f'{picture}</section>')
+
+    def _drawn(self, figure: Any) -> str:
         self._figures += 1
-        self._body.append(figure.to_html(
+        drawn: str = figure.to_html(
             full_html=False, include_plotlyjs=False, div_id=f'figure-{self._figures}',
-            config={'displaylogo': False, 'responsive': True}))
+            config={'displaylogo': False, 'responsive': True})
+        return drawn
 
     def html(self) -> str:
         """Return the page."""
@@ -94,16 +112,12 @@ class Page:
                 '</body></html>\n')
 
     def write(self, path: str | PathLike[str]) -> Path:
-        """Write the page to a file.
+        """Write the page to a file, whole or not at all.
 
         Raises
         ------
         UnreadableFileError
             Where it cannot be written.
         """
-        file = Path(path)
-        try:
-            file.write_text(self.html(), encoding='utf-8')
-        except OSError as error:
-            raise UnreadableFileError(file, f'cannot be written: {error.strerror}') from None
-        return file
+        write_text(path, self.html())
+        return Path(path)

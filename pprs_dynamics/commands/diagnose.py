@@ -1,0 +1,77 @@
+"""pprs diagnose: which physical effect is missing in the model, and how sure that is."""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.markup import escape
+
+from pprs_dynamics.commands.adopt_all import adopt_what_was_found
+from pprs_dynamics.commands.ledger_entry import check_output
+from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.commands.recordings import (
+    add_recordings,
+    add_validation,
+    read_all,
+    read_validation,
+    show_findings,
+)
+from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.model.model_file import load_model
+from pprs_dynamics.report.diagnosis_page import diagnosis_page
+from pprs_dynamics.report.diagnosis_tables import diagnosis_view
+from pprs_dynamics.report.progress import progress_bar
+from pprs_dynamics.report.tables import console
+
+
+class OptionsError(PprsError, ValueError):
+    """Options that do not go together."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    add_recordings(parser)
+    add_validation(parser)
+    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+    parser.add_argument('--adopt-all', action='store_true',
+                        help='add what is found until nothing more can be told')
+    parser.add_argument('--output', metavar='FILE', help='model file that --adopt-all writes')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    _check(options)
+    screen = console()
+    model = load_model(options.model)
+    recordings = read_all(options, screen, model.drives)
+    validate = read_validation(options, screen, model.drives)
+    show_findings((*recordings, *validate), screen)
+    with progress_bar(screen, 'diagnosing') as progress:
+        diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
+    words = word_diagnosis(diagnosis)
+    screen.print(diagnosis_view(diagnosis, words))
+    if options.json:
+        write_json(options.json, diagnosis.as_data())
+    if options.report:
+        with progress_bar(screen, 'page') as progress:
+            after, _ = measure_residuals(diagnosis.adopted, recordings, progress)
+            page = diagnosis_page(diagnosis, words, after, [one.name for one in recordings],
+                                  [one.name for one in validate])
+        screen.print(f'page: {escape(str(page.write(options.report)))}')
+    if options.adopt_all:
+        return adopt_what_was_found(options, model, recordings, validate, diagnosis, screen)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    if options.adopt_all and not options.output:
+        raise OptionsError('--adopt-all: no --output FILE is given, but it must say where the new '
+                           'model file goes')
+    if options.output and not options.adopt_all:
+        raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '
+                           'it then; --json and --report write the answer')
+    if options.adopt_all:
+        check_output(options.output, options.model)

@@ -1,0 +1,77 @@
+"""The answer to an offered effect in the terminal, drawn with rich."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from rich import box
+from rich.console import Group
+from rich.markup import escape
+from rich.panel import Panel
+from rich.table import Table
+
+from pprs_dynamics.diagnosis.adopt import VALIDATION, Adoption
+
+
+def adoption_view(answer: Adoption) -> Group:
+    """Return what the terminal shows, most important first."""
+    return Group(*_parts(answer))
+
+
+def headline(answer: Adoption) -> str:
+    """Return the answer in a sentence."""
+    on = f' on {", ".join(answer.drives)}' if answer.drives else ''
+    if not answer.adopted:
+        return f'{answer.effect}{on} is refused: {answer.reason}.'
+    if answer.forced:
+        return f'{answer.effect}{on} is adopted by force, in spite of this: {answer.reason}.'
+    return f'{answer.effect}{on} is adopted: {answer.reason}.'
+
+
+def parameter_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
+    """Return name, value, two standard deviations and unit of each parameter that is not 0."""
+    return [(key, f'{one.value:.6g}', 'not known' if one.std != one.std else f'{2 * one.std:.2g}',
+             one.unit) for key, one in answer.parameters.items() if one.value != 0.0]
+
+
+def error_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
+    """Return what was measured on, errors before and after [N], and their change."""
+    held = ('validation recordings' if answer.held_out_on == VALIDATION
+            else 'held-out blocks of the recordings')
+    return [(label, f'{before:.4f}', f'{after:.4f}',
+             f'{after / before - 1:+.1%}' if before else '') for label, before, after in (
+                 ('recordings', answer.error_before, answer.error_after),
+                 (held, answer.held_out_before, answer.held_out_after))]
+
+
+def _parts(answer: Adoption) -> Iterator[Any]:
+    word, colour = (('refused', 'red') if not answer.adopted else
+                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
+    yield Panel(escape(headline(answer)), title=f'[bold {colour}]{word}[/]', border_style=colour,
+                title_align='left')
+    yield _table('Error, rms over samples and drives',
+                 ('on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
+                 f'noise leaves {answer.noise_floor:.4f} N')
+    rows = parameter_rows(answer)
+    if rows:
+        yield _table(f'{answer.effect}, ± two standard deviations',
+                     ('parameter', 'value', '±', 'unit'), rows)
+    if answer.adopted and answer.calibrated:
+        clear = [one for one in answer.calibrated if abs(one.after - one.before) > 2 * one.std]
+        told = f', clearly {", ".join(one.label for one in clear)}' if clear else ''
+        yield escape(f'{len(answer.calibrated)} numbers of the model move within their '
+                     f'tolerances{told}')
+    for remark in answer.remarks:
+        yield f'[yellow]![/] {escape(remark)}'
+
+
+def _table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]] | Any,
+           caption: str | None = None) -> Table:
+    table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD,
+                  caption=caption, caption_justify='left')
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify='left' if number == 0 else 'right')
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    return table

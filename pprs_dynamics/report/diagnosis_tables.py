@@ -1,0 +1,120 @@
+"""A diagnosis in the terminal, drawn with rich; readable from 80 columns on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rich import box
+from rich.console import Group
+from rich.markup import escape
+from rich.padding import Padding
+from rich.panel import Panel
+from rich.table import Table
+
+from pprs_dynamics.diagnosis.diagnose import Diagnosis, RankedEffect
+from pprs_dynamics.diagnosis.quantities import name_drives
+from pprs_dynamics.diagnosis.sentences import Finding, FittedValue, Sentences, fitted_values
+
+COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
+MOST_LISTED = 2  # places of effects whose parameters the sentences give
+EVERYWHERE = 'structure'  # where effects sit that are not on drives
+
+
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences) -> Group:
+    """Return all that the terminal shows, most important first."""
+    return Group(*_parts(diagnosis, words))
+
+
+def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    colour = COLOURS[diagnosis.verdict]
+    yield Panel(escape(words.headline), title=f'[bold {colour}]{diagnosis.verdict}[/]',
+                border_style=colour, title_align='left')
+    if diagnosis.effects:
+        yield _effects(diagnosis)
+    for number, finding in enumerate((*words.effects, *words.unexplained), start=1):
+        yield _finding(number, finding)
+    values = fitted_values(diagnosis)
+    if len({(one.effect, one.drive) for one in values}) > MOST_LISTED:
+        yield _table('Parameters, ± two standard deviations', ('effect', 'drive', 'values'),
+                     _joined(values))
+    if diagnosis.candidates:
+        yield _table('Candidates for the first place',
+                     ('effect', 'on', 'evidence', 'error after [N]'),
+                     [_ranked(one, diagnosis) for one in diagnosis.candidates], right=(2, 3))
+    yield from _list('Within their tolerance', words.calibrated, 'blue')
+    yield from _list('Suspects', words.suspects, 'yellow')
+    yield from _list('Its form', words.of_form, 'blue')
+    yield from _list('Warnings', words.warnings, 'yellow')
+    yield f'[bold]Next[/] {escape(words.following)}'
+
+
+def _effects(diagnosis: Diagnosis) -> Table:
+    held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
+            else 'blocks of the same recordings')
+    return _table(
+        f'In the order of adoption; held out: {held}',
+        ('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
+        [(one.name, sites(one.drives, diagnosis), _fall(one.error_before, one.error_after),
+          _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
+         for one in diagnosis.effects], right=(2, 3, 4))
+
+
+def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
+    """Return one row per effect and drive."""
+    rows: dict[tuple[str, str], list[str]] = {}
+    for one in values:
+        rows.setdefault((one.effect, one.drive), []).append(f'{one.parameter.symbol} {one.text}')
+    return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
+
+
+def _finding(number: int, finding: Finding) -> Padding:
+    grid = Table.grid(padding=(0, 1))
+    grid.add_column(style='bold', width=8)
+    grid.add_column(ratio=1)
+    for label, text in finding_lines(finding):
+        grid.add_row(label, escape(text))
+    title = f'[bold]{number}. {escape(finding.title)}[/]'
+    return Padding(Group(title, Padding(grid, (0, 0, 0, 3))), (0, 0, 1, 0))
+
+
+def finding_lines(finding: Finding) -> list[tuple[str, str]]:
+    """Return what a finding says, line by line, with labels."""
+    return [('missing', finding.what), ('why', finding.why), ('cause', finding.cause),
+            ('confirm', finding.confirm), *(('note', remark) for remark in finding.remarks)]
+
+
+def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis) -> str:
+    """Return where an effect sits, for a table."""
+    return EVERYWHERE if drives is None else name_drives(drives, diagnosis.residuals.drives)
+
+
+def _ranked(one: RankedEffect, diagnosis: Diagnosis) -> tuple[str, ...]:
+    return (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
+            f'{one.error_after:.4f}')
+
+
+def _fall(before: float, after: float) -> str:
+    colour = 'green' if after < before else 'red'
+    return f'{before:.3g} → [{colour}]{after:.3g}[/]'
+
+
+def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
+    if lines:
+        yield f'[bold {colour}]{title}[/]'
+        for line in lines:
+            grid = Table.grid(padding=(0, 1))
+            grid.add_row('-', escape(line))
+            yield grid
+        yield ''
+
+
+def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
+           right: Sequence[int] = ()) -> Table:
+    table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify='right' if number in right else 'left',
+                         no_wrap=number in right or number == 0)
+    for row in rows:
+        table.add_row(*row)
+    return table
