@@ -32,6 +32,7 @@ from hidden_strength import Whitening
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.measurement.reconstruction import reconstruct
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.model.model_writer import write_model
@@ -87,14 +88,9 @@ class Robot:
         The scale of the true effect's forces and the robot's numbers, within their tolerances,
         are fitted by least squares under the true noise.
         """
-        sides = []
-        for place, recording in ((self.place, first), (self.other, second)):
-            error = measure_residuals(self.model, [recording])[0].error
-            columns = np.concatenate((
-                [place.contribution(effect) for effect in self.effects], place._columns))
-            sides.append((error, columns[:, :len(error)]))
-        (error, columns), (other, others) = sides
-        error, columns = error[:columns.shape[1]], columns[:, :len(error)]
+        (error, columns), (other, others) = (
+            self._side(place, recording)
+            for place, recording in ((self.place, first), (self.other, second)))
         settings = noise_settings(self.case.noise, self.noise)
         white = Whitening(settings, self.place.block)
         y = white(error).ravel()
@@ -102,8 +98,19 @@ class Robot:
         prior = np.full(len(rows), TOLERANCE_SPREAD ** -2)
         prior[:len(self.effects)] = 0.0
         found = np.linalg.solve(rows @ rows.T + np.diag(prior), rows @ y)
-        left = other[:others.shape[1]] - np.einsum('k,knd->nd', found, others)
+        left = other - np.einsum('k,knd->nd', found, others)
         return float(np.sqrt(np.nanmean(left ** 2)))
+
+    def _side(self, place: Scene, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+        """Return the model's error, and what explains it, at the same samples."""
+        found = reconstruct(self.model, recording)
+        index = np.searchsorted(recording.time, found.time - 0.5 / hidden_recordings.RATE)
+        place = copy.copy(place)
+        vars(place).pop('_columns', None)
+        place.treat = lambda values: found.treat(values[index])
+        residuals, _ = measure_residuals(self.model, [recording])
+        return residuals.error, np.concatenate((
+            [place.contribution(effect) for effect in self.effects], place._columns))
 
 
 def _on_motion(place: Scene, seed: int) -> Scene:

@@ -2,6 +2,7 @@
 
 `play_trajectory` -> `feedforward` -> `simulated_robot`, as processes over DDS. This one listens to
 the commands and to joint_states, and says how far the platform was from where it should have been.
+The same commands can be executed once more in simulated time, in which none comes late.
 """
 
 from __future__ import annotations
@@ -10,22 +11,30 @@ import os
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.model_file import find_file
+from pprs_dynamics.nodes.setpoints import SetpointQueue
+from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
+from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.robot import SimulatedRobot
 
 LEAD_IN = 2.0  # [s] from the home pose to the path's start, not counted
 AHEAD = 0.05  # [s] that each pose is sent before its moment, as a trajectory controller is fed
 RATE = 200.0  # [Hz]
+STATE_RATE = 500.0  # of joint_states [Hz], as simulated_robot has it by default
+SEED = 0  # of the robot's noise and hidden effects
 SETTLE = 1.0  # [s] for discovery, which is one-sided
 PATIENCE = 30.0  # [s] beyond the path's own time
 
@@ -41,11 +50,14 @@ class Case:
         'none' is the gravity-compensated PD loop alone.
     hidden : tuple of str
         Effects in the robot that the model does not know of.
+    model : path
+        Model file of the feedforward; of the paper's robot by default.
     """
 
     name: str
     feedforward: str
     hidden: tuple[str, ...] = ()
+    model: Path = field(default_factory=lambda: find_file('config/paper.yaml'))
 
 
 CASES = (
@@ -69,12 +81,17 @@ class Tracking:
         [rad]
     late_share : float
         Share of the robot's cycles that were late.
+    commands, states : (K, 19), (L, 19) arrays
+        Time [s], then positions, velocities and efforts of the drives: commanded, and from
+        joint_states; the lead-in is among them.
     """
 
     time: np.ndarray
     position_error: np.ndarray
     angle_error: np.ndarray
     late_share: float
+    commands: np.ndarray
+    states: np.ndarray
 
     @property
     def position_rms(self) -> float:
@@ -85,6 +102,13 @@ class Tracking:
     def angle_rms(self) -> float:
         """Root of the mean squared angle [rad]."""
         return float(np.sqrt(np.mean(self.angle_error ** 2)))
+
+    def recording(self, name: str) -> Recording:
+        """Return joint_states of the run, from its first command to its last."""
+        inside = ((self.states[:, 0] >= self.commands[0, 0])
+                  & (self.states[:, 0] <= self.commands[-1, 0]))
+        time, position, velocity, effort = _columns(self.states[inside])
+        return Recording.from_arrays(name, time, position, velocity, effort)
 
 
 def run_case(
@@ -117,20 +141,50 @@ def run_case(
     return listener.tracking()
 
 
+def execute(case: Case, commands: np.ndarray) -> Tracking:
+    """Execute commands of a run once more, in simulated time, and return how they were followed.
+
+    Parameters
+    ----------
+    case : Case
+        Of which only what is in the robot counts, and whether it takes efforts.
+    commands : (K, 19) array
+        As in `Tracking`.
+    """
+    robot = SimulatedRobot(
+        DriveModel.load().values, draw_effects(case.hidden, np.random.default_rng(SEED)),
+        seed=SEED, rate=STATE_RATE,
+        control=ControlSettings(gravity_compensation=case.feedforward == 'none'))
+    queue = SetpointQueue(robot.control)
+    for time_s, position, velocity, effort in zip(*_columns(commands), strict=True):
+        wanted = (position, velocity) if case.feedforward == 'none' else (
+            position, velocity, effort)
+        queue.add(time_s - commands[0, 0], Setpoint(*wanted))
+    states = []
+    for tick in range(int((commands[-1, 0] - commands[0, 0]) * STATE_RATE)):
+        queue.advance(tick / STATE_RATE)
+        measured = robot.tick()
+        states.append([measured.time + commands[0, 0], *measured.position, *measured.velocity,
+                       *measured.effort])
+    return _tracking(commands, np.array(states), 0.0)
+
+
 def _robot(case: Case) -> list[str]:
     parameters = [f'use_effort:={"false" if case.feedforward == "none" else "true"}',
-                  'command_timeout:=0.2']
+                  f'seed:={SEED}', 'command_timeout:=0.2']
     if case.hidden:
         parameters.append(f'hidden_effects:=[{",".join(case.hidden)}]')
     return _command('simulated_robot', parameters)
 
 
 def _feedforward(case: Case) -> list[str]:
-    files = ['--params-file', str(find_file('config/paper.yaml'))]
+    files = ['--params-file', str(case.model)]
     if case.feedforward == 'rigid_body':
         files += ['--params-file', str(find_file('config/without_friction.yaml'))]
     remapped = ['-r', '~/joint_command:=/simulated_robot/joint_command']
-    return [executable('feedforward'), '--ros-args', *files, *remapped]
+    # No timeout: a player that stalls on a busy machine must not add a command.
+    return [executable('feedforward'), '--ros-args', *files, '-p', 'command_timeout:=0.0',
+            *remapped]
 
 
 def _command(name: str, parameters: Sequence[str]) -> list[str]:
@@ -162,11 +216,10 @@ class _Listener:
         self.subscriptions = [
             self.node.create_subscription(
                 JointState, '/simulated_robot/joint_command',
-                lambda message: self.commands.append(
-                    [_seconds(message), *message.position, *message.velocity]), 1000),
+                lambda message: self.commands.append(_row(message)), 1000),
             self.node.create_subscription(
                 JointState, '/joint_states',
-                lambda message: self.states.append([_seconds(message), *message.position]), 1000),
+                lambda message: self.states.append(_row(message)), 1000),
             self.node.create_subscription(String, '/simulated_robot/status', self._keep, LATCHED)]
         return self
 
@@ -175,8 +228,8 @@ class _Listener:
         self.node.destroy_node()
         self.context.try_shutdown()
 
-    def _keep(self, message: object) -> None:
-        self.status = message.data  # type: ignore[attr-defined]
+    def _keep(self, message: Any) -> None:
+        self.status = message.data
 
     def wait_for_nodes(self) -> None:
         """Spin until the robot speaks and its commander is seen.
@@ -206,21 +259,34 @@ class _Listener:
         """Return the platform's errors over the path, the lead-in left out."""
         import json
 
-        commands, states = np.array(self.commands), np.array(self.states)
-        inside = (states[:, 0] > commands[0, 0] + LEAD_IN) & (states[:, 0] < commands[-1, 0])
-        times, count = states[inside, 0], len(DRIVES)
-        wanted = CubicHermiteSpline(
-            commands[:, 0], commands[:, 1:1 + count], commands[:, 1 + count:])(times)
-        geometry = DriveModel.load().robot.geometry
-        goal = solve_forward_kinematics(geometry, wanted)
-        found = solve_forward_kinematics(geometry, states[inside, 1:])
-        turn = (Rotation.from_quat(goal.orientation).inv()
-                * Rotation.from_quat(found.orientation)).magnitude()
         counters = json.loads(self.status)['counters']
-        return Tracking(times - commands[0, 0] - LEAD_IN, found.position - goal.position, turn,
-                        counters['late'] / max(counters['cycles'], 1))
+        return _tracking(np.array(self.commands), np.array(self.states),
+                         counters['late'] / max(counters['cycles'], 1))
 
 
-def _seconds(message: object) -> float:
-    stamp = message.header.stamp  # type: ignore[attr-defined]
-    return float(stamp.sec % 1_000_000 + stamp.nanosec * 1e-9)
+def _tracking(commands: np.ndarray, states: np.ndarray, late_share: float) -> Tracking:
+    inside = (states[:, 0] > commands[0, 0] + LEAD_IN) & (states[:, 0] < commands[-1, 0])
+    sent, positions, velocities, _ = _columns(commands)
+    times, measured, _, _ = _columns(states[inside])
+    geometry = DriveModel.load().robot.geometry
+    goal = solve_forward_kinematics(
+        geometry, CubicHermiteSpline(sent, positions, velocities)(times))
+    found = solve_forward_kinematics(geometry, measured)
+    turn = (Rotation.from_quat(goal.orientation).inv()
+            * Rotation.from_quat(found.orientation)).magnitude()
+    return Tracking(times - sent[0] - LEAD_IN, found.position - goal.position, turn, late_share,
+                    commands, states)
+
+
+def _columns(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, positions, velocities and efforts of rows."""
+    count = len(DRIVES)
+    time_s, position, velocity, effort = np.split(
+        rows, (1, 1 + count, 1 + 2 * count), axis=1)
+    return time_s[:, 0], position, velocity, effort
+
+
+def _row(message: Any) -> list[float]:
+    stamp = message.header.stamp
+    return [stamp.sec % 1_000_000 + stamp.nanosec * 1e-9, *message.position, *message.velocity,
+            *message.effort]

@@ -25,10 +25,11 @@ MAY_USE = {
     'measurement': {'mechanism', 'effects', 'model'},
     'diagnosis': {'mechanism', 'effects', 'model', 'measurement'},
     'simulation': {'mechanism', 'model', 'measurement'},
-    'report': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis'},
+    'experiments': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis'},
+    'report': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis', 'experiments'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'diagnosis', 'simulation',
-                 'report'},
+                 'experiments', 'report'},
 }
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))

@@ -11,7 +11,7 @@ from pprs_dynamics.commands.recordings import add_recordings, read_all
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import localise
 from pprs_dynamics.diagnosis.measuring import measure_residuals
-from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.comparison_page import comparison_page
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.tables import comparison_table, console
@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = DriveModel.load(options.model)
-    recordings = read_all(options, screen)
+    model = load_model(options.model)
+    recordings = read_all(options, screen, model.drives)
     for recording in recordings:
         for finding in recording.findings:
             screen.print(f'[yellow]![/] {escape(recording.name)}: {escape(finding.text)}')

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_all
 from pprs_dynamics.measurement.recording import describe
+from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.tables import console, recording_table
 
 
@@ -19,7 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    summaries = [describe(recording) for recording in read_all(options, screen)]
+    drives = load_model(options.model).drives
+    summaries = [describe(recording) for recording in read_all(options, screen, drives)]
     for summary in summaries:
         screen.print(recording_table(summary))
         for finding in summary.findings:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.model.atomic_file import write_text as write_text
 
 
 def make_folder(path: str | PathLike[str]) -> Path:
@@ -21,31 +20,6 @@ def make_folder(path: str | PathLike[str]) -> Path:
         raise UnreadableFileError(folder, f'cannot be a folder for output: {error.strerror}'
                                   ) from None
     return folder
-
-
-def write_text(path: str | PathLike[str], text: str) -> None:
-    """Write a text file atomically: a reader sees the old content or the new one, never half."""
-    target = Path(path)
-    try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f'.{target.name}.')
-    except OSError as error:
-        raise UnreadableFileError(target, f'cannot be written: {error.strerror}') from None
-    try:
-        with os.fdopen(handle, 'w', encoding='utf-8') as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        # mkstemp makes files that only their owner may read.
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
-    except OSError as error:
-        Path(temporary).unlink(missing_ok=True)
-        raise UnreadableFileError(target, f'cannot be written: {error.strerror}') from None
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def write_json(path: str | PathLike[str], content: Any) -> None:

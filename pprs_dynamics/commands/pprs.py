@@ -6,25 +6,30 @@ Exit status: 0 done; 1 refused or a check failed; 2 bad usage or unreadable inpu
 from __future__ import annotations
 
 import argparse
+import ast
 import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 
 from pprs_dynamics import __version__
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.threads import use_one_thread
 
 # Each a module of this folder with a docstring, add_arguments and run.
-COMMANDS = ('compare', 'info', 'reproduce', 'simulate')
+COMMANDS = ('adopt', 'compare', 'diagnose', 'history', 'info', 'next-experiment', 'reproduce',
+            'simulate')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
     use_one_thread()
-    options = _parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    options = _parser(given).parse_args(given)
     try:
-        status: int = import_module(f'{__package__}.{options.command}').run(options)
+        status: int = _module(options.command).run(options)
         sys.stdout.flush()
     except PprsError as error:
         print(f'pprs {options.command}: {error}', file=sys.stderr)
@@ -44,19 +49,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _parser() -> argparse.ArgumentParser:
+def _module(command: str) -> ModuleType:
+    return import_module(f'{__package__}.{command.replace("-", "_")}')
+
+
+def _summary(command: str) -> str:
+    """Return what a command does, from the first line of its module, which is not imported."""
+    file = Path(__file__).with_name(f'{command.replace("-", "_")}.py')
+    first = (ast.get_docstring(ast.parse(file.read_text(encoding='utf-8'))) or '').splitlines()[0]
+    return first.split(': ', 1)[1]
+
+
+def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
+    """Return the parser, with the arguments of the command that is called."""
     parser = argparse.ArgumentParser(
         prog='pprs', description='Dynamics of the 3-PPRS parallel robot: what the model says, '
         'what was measured, and which physical effect is missing.')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
     for name in COMMANDS:
-        module = import_module(f'{__package__}.{name}')
-        summary = (module.__doc__ or '').splitlines()[0]
-        summary = summary.split(': ', 1)[1]
+        summary = _summary(name)
         command = commands.add_parser(name, help=summary, description=summary)
         command.add_argument('--model', metavar='FILE', default='config/paper.yaml',
                              help='model file (default: the paper\'s robot, config/paper.yaml)')
         command.add_argument('--json', metavar='FILE', help='write the result as JSON too')
-        module.add_arguments(command)
+        if name in given:
+            # Only this one: importing all would take longer than most of them run.
+            _module(name).add_arguments(command)
     return parser

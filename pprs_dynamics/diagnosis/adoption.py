@@ -10,12 +10,12 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.design import SHAPE_STEP, BaseColumn, Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, JointFit, Regression
-from pprs_dynamics.diagnosis.reversal_widths import KEY, estimate_widths
+from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, place_of
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.mechanism.robot import Array
-from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import build_model
 
 DELAY_STEP = 1e-4  # [s]
@@ -184,12 +184,13 @@ def calibrations(regression: Regression, fit: JointFit) -> list[Calibration]:
     common = np.broadcast_to(regression.design.model.reversal.velocity,
                              len(regression.design.drives))
     # Widths are told without an uncertainty: the fits allow for all of them anyway.
-    found += [Calibration(KEY, d, float(common[d]), float(f'{width:.{DIGITS}g}'), 0.0, 'm/s')
+    found += [Calibration(*place_of(regression.design, d), float(common[d]),
+                          float(f'{width:.{DIGITS}g}'), 0.0, 'm/s')
               for d, width in estimate_widths(regression, fit).items()]
     return found
 
 
-def fitted_model(regression: Regression, fit: JointFit, calibrate: bool = True) -> DriveModel:
+def fitted_model(regression: Regression, fit: JointFit, calibrate: bool = True) -> ForceModel:
     """Return the model with the effects of a fit, and its own numbers as the fit moves them.
 
     Raises

@@ -11,10 +11,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pprs_dynamics.diagnosis.axis_sensitivities import AxisSensitivities
 from pprs_dynamics.diagnosis.measuring import join_tables, treated_table
+from pprs_dynamics.diagnosis.platform_sensitivities import PlatformSensitivities
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.diagnosis.sensitivities import ChunkSensitivities, Number, known_numbers
-from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.diagnosis.sensitivities import (
+    HOMING,
+    NUMBERS,
+    OF_DRIVES,
+    OF_JOINTS,
+    PRESENT,
+    Number,
+    Sensitivities,
+)
 from pprs_dynamics.effects.drive_effect import (
     DriveEffect,
     DriveRange,
@@ -29,11 +38,13 @@ from pprs_dynamics.effects.time_delay import TimeDelay, shifted
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.mechanism.robot import DRIVES, Array
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.axis_model import AxisModel
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel, Forces
 
-HOMING_STRIDE = 5  # samples; its columns change slowly
 SHAPE_STEP = 1e-3  # relative, for derivatives by shape parameters of effects in the model
+COLUMN = 'column '
 FREE = 1e-6  # prior precision of what is not known beforehand
 Rows = dict[int, Array]
 """Columns by drive, (k, M) each; drives that are not in it feel nothing."""
@@ -86,7 +97,7 @@ class BaseColumn:
 
 @dataclass(frozen=True)
 class FullRate:
-    """What the drives did at every sample of a recording, in segments; (N, 6) arrays.
+    """What the drives did at every sample of a recording, in segments; (N, D) arrays.
 
     `effort` is the model's, `effort_measured` the recording's.
     """
@@ -116,7 +127,7 @@ class Design:
 
     Parameters
     ----------
-    model : DriveModel
+    model : ForceModel
     residuals : Residuals
     recordings : tuple of FullRate
     base : list of BaseColumn
@@ -126,7 +137,7 @@ class Design:
     notes : tuple of str
     """
 
-    model: DriveModel
+    model: ForceModel
     residuals: Residuals
     recordings: tuple[FullRate, ...]
     base: list[BaseColumn]
@@ -142,13 +153,11 @@ class Design:
 
     @classmethod
     def of(
-        cls, model: DriveModel, recordings: Sequence[Recording],
+        cls, model: ForceModel, recordings: Sequence[Recording],
         progress: Callable[[float], None] | None = None,
     ) -> Design:
         """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`."""
-        numbers = known_numbers(model)
-        absent = [e for e in catalogue().values() if issubclass(e, StructureEffect)
-                  and e.name not in {effect.name for effect in model.effects}]
+        sensitivities = sensitivities_of(model)
         tables: list[dict[str, Array]] = []
         full: list[FullRate] = []
         notes: list[str] = []
@@ -159,42 +168,45 @@ class Design:
                 if progress is not None:
                     progress((k + 0.3 + 0.7 * done / total) / len(recordings))
 
-            collector = _Collector(model, numbers, absent)
+            collector = _Collector(sensitivities)
             tables.append(treated_table(model, reconstruction, report, collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
-        return cls._assembled(model, numbers, absent, tables, tuple(full), tuple(notes))
+        return cls._assembled(sensitivities, tables, tuple(full), tuple(notes))
 
     @classmethod
     def _assembled(
-        cls, model: DriveModel, numbers: tuple[Number, ...],
-        absent: list[type[StructureEffect]], tables: list[dict[str, Array]],
+        cls, sensitivities: Sensitivities, tables: list[dict[str, Array]],
         full: tuple[FullRate, ...], notes: tuple[str, ...],
     ) -> Design:
+        model, numbers = sensitivities.model, sensitivities.numbers
+        drives, count = model.drives, len(model.drives)
         stacked: dict[str, Array] = {}
-        for name in [name for name in tables[0] if name.startswith('column ')]:
+        for name in [name for name in tables[0] if name.startswith(COLUMN)]:
             flat = np.concatenate([table.pop(name) for table in tables])
             # (M, k * D) -> (k, D, M)
-            stacked[name[7:]] = flat.reshape(len(flat), -1, len(DRIVES)).transpose(1, 2, 0)
-        residuals = join_tables(tables)
+            stacked[name.removeprefix(COLUMN)] = flat.reshape(len(flat), -1, count).transpose(
+                1, 2, 0)
+        residuals = join_tables(drives, tables)
         base = [BaseColumn('number', number.label, _rows(column), 1.0, number)
-                for number, column in zip(numbers, stacked['numbers'], strict=True)]
+                for number, column in zip(numbers, stacked[NUMBERS], strict=True)]
         base += [BaseColumn('width', f'{drive} {factor}', {d: column[d]}, 1.0)
-                 for factor, column in enumerate(stacked['drive widths'])
-                 for d, drive in enumerate(DRIVES) if np.any(column[d])]
+                 for factor, column in enumerate(stacked[OF_DRIVES])
+                 for d, drive in enumerate(drives) if np.any(column[d])]
         base += [BaseColumn('width', f'passive {factor}', _rows(column), 1.0)
-                 for factor, column in enumerate(stacked['passive widths']) if np.any(column)]
+                 for factor, column in enumerate(stacked.get(OF_JOINTS, ())) if np.any(column)]
         structure = [Term(effect, None, {}, {d: stacked[effect.name][:, d]
-                                             for d in range(len(DRIVES))}) for effect in absent]
-        homing = [Term(HomingError, drive, {}, {d: column[None, d] for d in range(len(DRIVES))})
-                  for drive, column in enumerate(stacked['homing'])]
+                                             for d in range(count)})
+                     for effect in sensitivities.absent]
+        homing = [Term(HomingError, drive, {}, {d: column[None, d] for d in range(count)})
+                  for drive, column in enumerate(stacked.get(HOMING, ()))]
         design = cls(model, residuals, full, base, structure, homing, notes)
-        design.covered = [design._covered(drive) for drive in range(len(DRIVES))]
+        design.covered = [design._covered(drive) for drive in range(count)]
         for effect in model.effects:
             if isinstance(effect, DriveEffect):
                 design.base += design._present_in_drives(effect)
             elif isinstance(effect, StructureEffect):
-                rows = stacked[f'present {effect.name}']
+                rows = stacked[PRESENT + effect.name]
                 design.base += [
                     BaseColumn('present', f'{effect.name}..{c.name}', _rows(column * c.scale),
                                FREE)
@@ -296,33 +308,26 @@ def _rows(column: Array) -> dict[int, Array]:
     return {drive: row for drive, row in enumerate(column) if np.any(row)}
 
 
+def sensitivities_of(model: ForceModel) -> Sensitivities:
+    """Return the sensitivities of a model of either kind."""
+    if isinstance(model, AxisModel):
+        return AxisSensitivities(model)
+    assert isinstance(model, DriveModel)
+    return PlatformSensitivities(model)
+
+
 class _Collector:
     """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
 
-    def __init__(self, model: DriveModel, numbers: tuple[Number, ...],
-                 absent: list[type[StructureEffect]]) -> None:
-        self.model, self.numbers, self.absent = model, numbers, absent
+    def __init__(self, sensitivities: Sensitivities) -> None:
+        self.sensitivities = sensitivities
         self.kept: list[tuple[Array, ...]] = []
 
-    def __call__(self, forces: DriveForces) -> dict[str, Array]:
+    def __call__(self, forces: Forces) -> dict[str, Array]:
         s = forces.mechanism
         self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, forces.total))
-        found = ChunkSensitivities(self.model, forces)
-        samples = np.arange(min(HOMING_STRIDE // 2, len(s.velocity) - 1), len(s.velocity),
-                            HOMING_STRIDE)
-        nearest = np.minimum(np.arange(len(s.velocity)) // HOMING_STRIDE, len(samples) - 1)
-        columns = {
-            'numbers': found.of_numbers(self.numbers), 'drive widths': found.of_drive_widths(),
-            'passive widths': found.of_passive_widths(),
-            'homing': found.of_homing(samples)[:, nearest]}
-        for effect in self.absent:
-            columns[effect.name] = np.stack(list(found.of_structure(effect)))
-        for present in self.model.effects:
-            if isinstance(present, StructureEffect):
-                columns[f'present {present.name}'] = np.stack(
-                    [column for _, _, column in found.of_present(present)])
-        return {f'column {name}': column.transpose(1, 0, 2).reshape(len(s.velocity), -1)
-                for name, column in columns.items()}
+        return {COLUMN + name: column.transpose(1, 0, 2).reshape(len(s.velocity), -1)
+                for name, column in self.sensitivities.columns(forces).items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:
         """Return what the drives did, with positions as the mechanism has them."""

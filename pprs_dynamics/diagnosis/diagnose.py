@@ -28,7 +28,7 @@ from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import Array
-from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel
 
 # Shares of the work, for the progress bar.
 DESIGN, SELECTION = 0.4, 0.3
@@ -116,9 +116,9 @@ class Diagnosis:
     calibrated : tuple of Calibration
         Numbers that moved within their tolerances.
     warnings, notes : tuple of str
-    model : DriveModel
+    model : ForceModel
         As given.
-    adopted : DriveModel
+    adopted : ForceModel
         With the effects.
     residuals : Residuals
         Of the model as given.
@@ -141,8 +141,8 @@ class Diagnosis:
     calibrated: tuple[Calibration, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    model: DriveModel
-    adopted: DriveModel
+    model: ForceModel
+    adopted: ForceModel
     residuals: Residuals
     remaining: Array
     noise_floor: float
@@ -169,14 +169,14 @@ class Diagnosis:
 
 
 def diagnose(
-    model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
     Parameters
     ----------
-    model : DriveModel
+    model : ForceModel
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
@@ -215,7 +215,7 @@ class _Stage:
     selection: Selection
 
     @classmethod
-    def of(cls, model: DriveModel, recordings: Sequence[Recording],
+    def of(cls, model: ForceModel, recordings: Sequence[Recording],
            report: Callable[[float], None], earlier: Sequence[Judged] = ()) -> _Stage:
         design = Design.of(model, recordings, lambda share: report(DESIGN * share))
         regression = Regression(design)
@@ -226,7 +226,7 @@ class _Stage:
         return cls(design, regression, selector, selection)
 
 
-def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> DriveModel:
+def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> ForceModel:
     """Return the model with some of what a stage adopted, its own numbers as they were."""
     fit = stage.selection.fit
     kept = {id(active) for one in adopted for active in one.candidate.active}
@@ -315,7 +315,7 @@ def _fit_of_first(stage: _Stage, adopted: Sequence[Judged], count: int) -> Joint
     return stage.regression.fit(active, selection.fit.noises, iterations=1)
 
 
-def _error_on(model: DriveModel, recordings: Sequence[Recording]) -> float:
+def _error_on(model: ForceModel, recordings: Sequence[Recording]) -> float:
     residuals, _ = measure_residuals(model, recordings)
     return float(np.sqrt(np.nanmean(residuals.error ** 2)))
 

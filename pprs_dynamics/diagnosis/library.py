@@ -150,7 +150,8 @@ class Library:
         terms, trials = [], {}
         for effect in catalogue().values():
             if (not issubclass(effect, DriveEffect) or effect is HomingError
-                    or (effect.name, design.drives[d]) in present):
+                    or (effect.name, design.drives[d]) in present
+                    or not design.model.offers(effect)):
                 continue
             shapes = effect.trials(design.covered[d])
             trials[effect.name] = len(shapes)

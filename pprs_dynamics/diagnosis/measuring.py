@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct, treated_forces
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.robot import DRIVES, Array
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.force_model import ForceModel
 
-# Variables of the interface that every drive sees alike; the others are one per drive.
-PLATFORM_VARIABLES = ('platform_x', 'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
-DRIVE_VARIABLES = ('position', 'velocity', 'acceleration', 'load', 'rod_angle')
+MOTION = ('position', 'velocity', 'acceleration')
+# Of the names in a table: variables that each drive has for itself, and those that all share.
+OWN, SHARED = 'own ', 'shared '
 # Between recordings [s], so that times of all together increase.
 PAUSE = 1.0
 
 
 def measure_residuals(
-    model: DriveModel, recordings: Sequence[Recording],
+    model: ForceModel, recordings: Sequence[Recording],
     progress: Callable[[float, float], None] | None = None,
 ) -> tuple[Residuals, tuple[str, ...]]:
     """Return measured and modelled efforts of recordings side by side, and how, in words.
 
     Parameters
     ----------
-    model : DriveModel
+    model : ForceModel
     recordings : sequence of Recording
         One after the other, with a pause between; each segment stays one of its own.
     progress : callable, optional
@@ -63,45 +64,42 @@ def measure_residuals(
         notes += reconstruction.notes
         # Motion at full rate takes several times the room of all that follows.
         del reconstruction
-    return join_tables(tables), tuple(notes)
+    return join_tables(model.drives, tables), tuple(notes)
 
 
 def treated_table(
-    model: DriveModel, reconstruction: Reconstruction,
+    model: ForceModel, reconstruction: Reconstruction,
     progress: Callable[[int, int], None] | None = None,
-    more: Callable[[DriveForces], Mapping[str, Array]] = lambda forces: {},
+    more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
 ) -> dict[str, Array]:
     """Return all that a comparison needs of one recording, treated, by name.
 
     Parameters
     ----------
-    model : DriveModel
+    model : ForceModel
     reconstruction : Reconstruction
     progress : callable, optional
     more : callable, optional
         Gives further quantities to be treated, see `treated_forces`.
     """
+    def variables(forces: Any) -> dict[str, Array]:
+        found = model.variables(forces.mechanism)
+        return {(OWN if values.ndim > 1 else SHARED) + name: values.reshape(len(values), -1)
+                for name, values in found.items()}
+
     treat = reconstruction.treat
     table = treated_forces(model, reconstruction, progress,
-                           lambda forces: {**_variables(forces), **more(forces)})
+                           lambda forces: {**variables(forces), **more(forces)})
     table['measured'] = treat(reconstruction.effort)
     table['time'] = treat(reconstruction.time[:, None])[:, 0]
-    for name in DRIVE_VARIABLES[:3]:
-        table[name] = treat(getattr(reconstruction, name))
+    for name in MOTION:
+        table[OWN + name] = treat(getattr(reconstruction, name))
     edges = [segment.start for segment in reconstruction.segments]
     table['segment'] = np.searchsorted(edges, treat.starts, side='right').astype(float) - 1
     return table
 
 
-def _variables(forces: DriveForces) -> dict[str, Array]:
-    mechanism = forces.mechanism
-    motion = mechanism.motion
-    platform = np.column_stack((motion.position, motion.tilt, motion.turn))
-    return {'load': mechanism.guide_load, 'platform': platform,
-            'rod_angle': np.tile(mechanism.chains.rod_angle, 2)}
-
-
-def join_tables(tables: list[dict[str, Array]]) -> Residuals:
+def join_tables(drives: tuple[str, ...], tables: list[dict[str, Array]]) -> Residuals:
     """Return the residuals of recordings one after the other, from their tables."""
     start, segments = 0.0, 0.0
     for table in tables:
@@ -110,11 +108,14 @@ def join_tables(tables: list[dict[str, Array]]) -> Residuals:
         start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
     joined = (tables[0] if len(tables) == 1 else
               {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
-    platform = joined.pop('platform')
-    variables = {name: joined.pop(name) for name in DRIVE_VARIABLES}
-    variables.update(zip(PLATFORM_VARIABLES, platform.T, strict=True))
+    variables = {name: joined.pop(OWN + name) for name in MOTION}
+    for name in list(joined):
+        if name.startswith(OWN):
+            variables[name.removeprefix(OWN)] = joined.pop(name)
+        elif name.startswith(SHARED):
+            variables[name.removeprefix(SHARED)] = joined.pop(name)[:, 0]
     time, segment = joined.pop('time'), joined.pop('segment').astype(int)
     measured, model = joined.pop('measured'), joined.pop('total')
     steps = np.diff(time)[np.diff(segment) == 0]
-    return Residuals(DRIVES, time, segment, measured, model, joined, variables,
+    return Residuals(drives, time, segment, measured, model, joined, variables,
                      float(np.median(steps)))

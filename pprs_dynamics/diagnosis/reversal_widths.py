@@ -10,15 +10,22 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.effects.active_friction import ActiveFriction
+from pprs_dynamics.effects.axis_friction import AxisFriction
 from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.mechanism.robot import Array
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
 TRIALS = 13
 LEAST_GAIN = 15.0  # twice the log-likelihood, for which a width is told
-KEY = 'friction.reversal_velocities'
+KEY, COMMON_KEY = 'friction.reversal_velocities', 'friction.reversal_velocity'
+
+
+def place_of(design: Design, d: int) -> tuple[str, int | None]:
+    """Return the key and the element under which a model file has the width of a drive."""
+    return (KEY, d) if KEY in design.model.keys else (COMMON_KEY, None)
 
 
 def estimate_widths(regression: Regression, fit: JointFit) -> dict[int, float]:
@@ -32,7 +39,8 @@ def estimate_widths(regression: Regression, fit: JointFit) -> dict[int, float]:
 
 def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
     design = regression.design
-    friction = next((e for e in design.model.effects if isinstance(e, ActiveFriction)), None)
+    friction = next((e for e in design.model.effects
+                     if isinstance(e, (ActiveFriction, AxisFriction))), None)
     if friction is None:
         return {}
     found = {}
@@ -48,8 +56,8 @@ def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
         white = series.whiten(fit.noises[d], rest)
 
         def gain(logarithm: float, d: int = d, width: float = width, white: Array = white,
-                 mu: float = friction.coulomb[d], constant: float = constant) -> float:
-            column = _column(regression, d, mu, constant, width * float(np.exp(logarithm)))
+                 constant: float = constant) -> float:
+            column = _column(regression, d, friction, constant, width * float(np.exp(logarithm)))
             own = regression.series[d].whiten(fit.noises[d], column)
             return float(2 * own @ white - own @ own)
 
@@ -74,11 +82,12 @@ def _constant_friction(regression: Regression, fit: JointFit, d: int) -> float:
     return force
 
 
-def _column(regression: Regression, d: int, mu: float, constant: float, width: float) -> Array:
+def _column(regression: Regression, d: int, friction: ActiveFriction | AxisFriction,
+            constant: float, width: float) -> Array:
     parts = []
     for one in regression.design.recordings:
         turned = smooth_sign(one.velocity[:, d], width) - one.direction[:, d]
-        dry = mu * one.guide_load[:, d] + constant
+        dry = friction.dry(one.guide_load)[:, d] + constant
         parts.append(one.treat((dry * turned)[:, None])[:, 0])
     column: Array = np.concatenate(parts)[regression.series[d].index]
     return column

@@ -1,42 +1,31 @@
-"""How the model's forces change with its own numbers and with effects that it lacks.
+"""How a model's forces change with its own numbers and with effects that it lacks.
 
 Everything is linear here: a column is the change of all drives' measured efforts per unit of one
-coefficient, at one chunk of a recording, at full rate.
+coefficient, at one chunk of a recording, at full rate. What a kind of model has for columns beside
+those of effects in its drives is behind `Sensitivities`; the rest of the diagnosis is the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from pprs_dynamics.effects.active_friction import ActiveFriction
-from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
-from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.effects.passive_friction import PassiveFriction
-from pprs_dynamics.effects.structure_effect import BodyEffect, PassiveJointEffect, StructureEffect
-from pprs_dynamics.mechanism.forward_motion import platform_rates, solve_forward_motion
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.mechanism.robot import DRIVES, Array
-from pprs_dynamics.mechanism.state import MechanismState
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
-from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.effects.structure_effect import StructureEffect
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.force_model import ForceModel
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
-HOMING_STEP = 1e-5  # [m]
 # Friction that turns over in another width than the model's is no effect: multiples of the
 # width whose differences span what is between 0.2 and 5 times the model's.
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
-PASSIVE_WIDTHS = (0.25, 4.0)
-# Numbers that act on the drives of one chain, or on one drive, only: all at once, then split.
-PER_DRIVE = ('friction.drives.viscous', 'friction.drives.coulomb')
-PER_CHAIN = ('masses.slides', 'masses.lifts')
+# Names of columns; those of effects outside the drives have the effects' names.
+NUMBERS, HOMING, PRESENT = 'numbers', 'homing', 'present '
+OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
 
 
 @dataclass(frozen=True)
@@ -65,13 +54,11 @@ class Number:
         return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
 
 
-def known_numbers(model: DriveModel) -> tuple[Number, ...]:
+def known_numbers(model: ForceModel) -> tuple[Number, ...]:
     """Return the model's numbers that its `tolerances` leave open.
 
     A tolerance is a limit: 2.5 standard deviations.
     """
-    from pprs_dynamics.model.keys import KEYS
-
     found = []
     for name, tolerance in model.values.items():
         key = name.removeprefix('tolerances.')
@@ -79,194 +66,52 @@ def known_numbers(model: DriveModel) -> tuple[Number, ...]:
             continue
         value = model.values[key]
         elements = enumerate(value) if isinstance(value, tuple) else [(None, value)]
-        found += [Number(key, element, one, abs(one) * tolerance / DEVIATIONS, KEYS[key].unit)
+        found += [Number(key, element, one, abs(one) * tolerance / DEVIATIONS, model.keys[key].unit)
                   for element, one in elements if one]
     return tuple(found)
 
 
-class ChunkSensitivities:
-    """Columns of one chunk.
+class Sensitivities(ABC):
+    """Columns that a model has, chunk by chunk.
 
     Parameters
     ----------
-    model : DriveModel
-    forces : DriveForces
-        Of the model, before its sensors.
+    model : ForceModel
+
+    Attributes
+    ----------
+    numbers : tuple of Number
+    absent : tuple of type of StructureEffect
+        Effects outside the drives that the model could have and has not.
     """
 
-    def __init__(self, model: DriveModel, forces: DriveForces) -> None:
-        self.model, self.state = model, forces.mechanism
-        self._following = [
-            effect for effect in model.effects
-            if not effect.is_measurement and not isinstance(effect, BodyEffect)
-            and effect.initial_memory() is None]
-        self._sensors = [e for e in model.effects if isinstance(e, MeasurementEffect)]
+    def __init__(self, model: ForceModel) -> None:
+        self.model = model
+        self.numbers = known_numbers(model)
+        present = {effect.name for effect in model.effects}
+        self.absent: tuple[type[StructureEffect], ...] = tuple(
+            effect for effect in catalogue().values() if issubclass(effect, StructureEffect)
+            and model.offers(effect) and effect.name not in present)
 
-    @cached_property
-    def _reference(self) -> Array:
-        return self._forces(self.state)
+    @abstractmethod
+    def columns(self, forces: Any) -> dict[str, Array]:
+        """Return columns by name, (K, N, D) each.
 
-    def _forces(self, state: MechanismState) -> Array:
-        total: Array = state.rigid_body.force + sum(e.force(state) for e in self._following)
-        return total
-
-    def sensed(self, column: Array) -> Array:
-        """Return what the model's sensors make of a change of the drives' forces, (N, 6)."""
-        for effect in self._sensors:
-            column = effect.sensed(column, self.state.time, DRIVES)
-        return column
-
-    def of_structure(self, effect: type[StructureEffect]) -> Iterator[Array]:
-        """Yield the column of every coefficient of an effect that is not in the model, (N, 6)."""
-        for coefficient in effect.coefficients:
-            step = coefficient.scale
-            small = effect.at({coefficient.name: step})
-            if isinstance(small, BodyEffect):
-                column = (self._forces(small.apply(self.state)) - self._reference) / step
-            else:
-                column = small.force(self.state) / step
-            yield self.sensed(column)
-
-    def of_present(self, effect: CatalogueEffect) -> Iterator[tuple[str, str, Array]]:
-        """Yield drive ('' for none), coefficient and column of an effect that is in the model."""
-        if isinstance(effect, StructureEffect):
-            at = effect.to_coefficients(effect.values)
-            for c in effect.coefficients:
-                moved = effect.at({**at, c.name: at[c.name] + c.scale})
-                if isinstance(moved, BodyEffect):
-                    model = self._with(effect, moved)
-                    change = self._difference(model)
-                else:
-                    change = moved.force(self.state) - effect.force(self.state)
-                yield '', c.name, self.sensed(change / c.scale)
-
-    def _with(self, old: CatalogueEffect, new: CatalogueEffect) -> DriveModel:
-        return replace(self.model, effects=tuple(
-            new if effect is old else effect for effect in self.model.effects))
-
-    def _difference(self, model: DriveModel) -> Array:
-        """Return the change with another model of the same geometry, memories left out."""
-        robot = model.robot
-        state = replace(self.state, load=None, reversal=model.reversal).loaded(robot)
-        for effect in model.effects:
-            if isinstance(effect, BodyEffect):
-                state = effect.apply(state)
-        total = state.rigid_body.force + sum(
-            effect.force(state) for effect in model.effects
-            if not effect.is_measurement and not isinstance(effect, BodyEffect)
-            and effect.initial_memory() is None)
-        difference: Array = total - self._reference
-        return difference
-
-    def of_numbers(self, numbers: tuple[Number, ...]) -> Array:
-        """Return the column of each number, per standard deviation, (K, N, 6)."""
-        columns = np.zeros((len(numbers), *self.state.velocity.shape))
-        together: dict[str, Array] = {}
-        for row, number in enumerate(numbers):
-            key, element = number.key, number.element
-            if key in PER_DRIVE or key in PER_CHAIN:
-                if key not in together:
-                    together[key] = self._moved(key, None)
-                assert element is not None
-                mine = ([element] if key in PER_DRIVE else [element, element + 3])
-                columns[row][:, mine] = together[key][:, mine]
-            else:
-                columns[row] = self._moved(key, element)
-            columns[row] = self.sensed(columns[row] * number.deviation / abs(number.value))
-        return columns
-
-    def _moved(self, key: str, element: int | None) -> Array:
-        """Return the change per relative change of a number, or of all of a list, (N, 6)."""
-        value = self.model.values[key]
-        if isinstance(value, tuple):
-            moved: Any = tuple(one * (1 + RELATIVE_STEP * (element in (None, k)))
-                               for k, one in enumerate(value))
-        else:
-            moved = value * (1 + RELATIVE_STEP)
-        model = build_model({**self.model.values, key: moved})
-        if key.startswith('geometry.'):
-            s = self.state
-            found = solve_forward_motion(model.robot.geometry, s.position, s.velocity,
-                                         s.acceleration, s.motion[:1])
-            motion = found.motion if s.time is None else found.motion.with_time(s.time)
-            change = model.forces_at(model.mechanism(motion)).total - self.model.forces_at(
-                self.model.mechanism(s.motion)).total
-        elif key.startswith('friction.'):
-            change = self._changed_friction(model)
-        else:
-            change = self._difference(model)
-        result: Array = change * np.sign(np.max(value)) / RELATIVE_STEP
-        return result
-
-    def _changed_friction(self, model: DriveModel) -> Array:
-        state = replace(self.state, reversal=model.reversal)
-        change = np.zeros_like(self.state.velocity)
-        for before, after in zip(self.model.effects, model.effects, strict=True):
-            if isinstance(after, (ActiveFriction, PassiveFriction)):
-                change += after.force(state) - before.force(self.state)
-        return change
-
-    def of_drive_widths(self) -> Array:
-        """Return what other widths of turning over would change in each drive, (W, N, 6)."""
-        friction = next(e for e in self.model.effects if isinstance(e, ActiveFriction))
-        dry = np.asarray(friction.coulomb) * self.state.guide_load
-        width = np.asarray(self.model.reversal.velocity)
-        return np.stack([self.sensed(dry * (
-            smooth_sign(self.state.velocity, factor * width) - self.state.direction))
-            for factor in DRIVE_WIDTHS])
-
-    def of_passive_widths(self) -> Array:
-        """Return the same for the passive joints, all at once, (W, N, 6)."""
-        friction = next(e for e in self.model.effects if isinstance(e, PassiveFriction))
-        reversal, before = self.model.reversal, friction.force(self.state)
-        return np.stack([self.sensed(friction.force(replace(
-            self.state, reversal=Reversal(reversal.velocity, factor * reversal.rate))) - before)
-            for factor in PASSIVE_WIDTHS])
-
-    def of_homing(self, samples: np.ndarray) -> Array:
-        """Return the change per metre that each drive's measured position is too large.
+        `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
+        other widths of turning over would change in every drive, and `OF_JOINTS` in all passive
+        joints; `HOMING` per metre that each drive is measured too far; the coefficients of each effect of `absent` by
+        its name, and of those that the model has after `PRESENT`. What a kind of model does not
+        have is left out.
 
         Parameters
         ----------
-        samples : (n,) int array
-            Of the chunk; the others would tell nothing new.
-
-        Returns
-        -------
-        (6, n, 6) array
-            By the drive that is off, then samples and drives [N/m].
+        forces : Forces
+            Of the model at one chunk.
         """
-        from scipy.spatial.transform import Rotation
 
-        s = self.state
-        motion, time = s.motion[samples], None if s.time is None else s.time[samples]
-        velocity, acceleration = s.velocity[samples], s.acceleration[samples]
-        robot = self.model.robot
-        bare = replace(self.model, effects=tuple(
-            effect for effect in self.model.effects if effect.initial_memory() is None))
-        turned = Rotation.from_quat(motion.orientation)
-
-        def forces(pose: PlatformMotion) -> Array:
-            rates = platform_rates(robot.geometry, pose, velocity, acceleration)
-            rates = rates if time is None else rates.with_time(time)
-            return bare.forces_at(bare.mechanism(rates)).total
-
-        before = forces(motion)
-        columns = np.empty((len(DRIVES), len(samples), len(DRIVES)))
-        for drive in range(len(DRIVES)):
-            move = -HOMING_STEP * s.jacobians.J[samples][:, :, drive]
-            pose = PlatformMotion.at_rest(
-                motion.position + move[:, :3],
-                (Rotation.from_rotvec(move[:, 3:]) * turned).as_quat())
-            columns[drive] = (forces(pose) - before) / HOMING_STEP
-        return columns
-
-
-def drive_values(effect: DriveEffect) -> Mapping[str, Mapping[str, float]]:
-    """Return parameters by drive."""
-    return effect.drives
-
-
-def is_structure(effect: type[CatalogueEffect]) -> bool:
-    """Return whether an effect has one set of parameters for the whole mechanism."""
-    return issubclass(effect, (BodyEffect, PassiveJointEffect))
+    def sensed(self, column: Array, state: Any) -> Array:
+        """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
+        for effect in self.model.effects:
+            if isinstance(effect, MeasurementEffect):
+                column = effect.sensed(column, state.time, self.model.drives)
+        return column

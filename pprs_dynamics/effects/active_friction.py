@@ -14,6 +14,11 @@ from pprs_dynamics.mechanism.state import MechanismState
 Six = tuple[float, float, float, float, float, float]
 
 
+def drive_friction(c: Any, mu: Any, q_dot: Any, load: Any, sgn: Any) -> Any:
+    """Return the friction of drives [N]: viscous, and dry in proportion to the guide's load."""
+    return c * q_dot + mu * load * sgn                                         # Eq. (15), (16)
+
+
 @dataclass(frozen=True)
 class ActiveFriction(Effect):
     """Viscous and load-dependent Coulomb friction of the prismatic drives.
@@ -32,7 +37,11 @@ class ActiveFriction(Effect):
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^m, (N, 6) [N]."""
-        c, mu = np.asarray(self.viscous), np.asarray(self.coulomb)
-        q_dot, sgn = state.velocity, state.direction
-        Q_m: Array = c * q_dot + mu * state.guide_load * sgn                   # Eq. (15), (16)
+        Q_m: Array = drive_friction(np.asarray(self.viscous), np.asarray(self.coulomb),
+                                    state.velocity, state.guide_load, state.direction)
         return Q_m
+
+    def dry(self, guide_load: Array) -> Array:
+        """Return the dry friction in full motion [N], for loads of the guides (N, 6) [N]."""
+        dry: Array = np.asarray(self.coulomb) * guide_load
+        return dry

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 GROUP = 'pprs_dynamics.effects'
 # Parts of the drive forces and keys of the block `effects` that have these names already.
-RESERVED = ('active', 'active_friction', 'measured', 'passive_friction', 'rigid_body')
+RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
 
 CATALOGUE: dict[str, type[CatalogueEffect]] = {
     effect.name: effect

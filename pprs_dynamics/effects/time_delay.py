@@ -17,7 +17,9 @@ from pprs_dynamics.effects.drive_effect import DriveRange, MeasurementEffect
 from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.mechanism.robot import Array
 
-LONGEST = 0.03  # [s], tried; filters and buses of drives delay by less
+LONGEST, STEP = 0.03, 0.002  # [s], tried; filters and buses of drives delay by less
+# Where the effort changes fast a delay of twice the true one fits worse than none.
+SHORT = (STEP / 8, STEP / 4, STEP / 2)
 
 
 class TimeDelay(MeasurementEffect):
@@ -39,9 +41,9 @@ class TimeDelay(MeasurementEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return delays from -30 to 30 ms in steps of 2 ms, but none of 0."""
-        steps = np.arange(-LONGEST, LONGEST + 1e-9, 0.002)
-        return [{'delay': float(d)} for d in steps if abs(d) > 1e-9]
+        """Return delays from -30 to 30 ms in steps of 2 ms, shorter ones in fractions of it."""
+        late = [*SHORT, *np.arange(STEP, LONGEST + 1e-9, STEP)]
+        return [{'delay': float(d)} for d in (*(-one for one in reversed(late)), *late)]
 
     @classmethod
     def drive_memory(cls) -> Any:

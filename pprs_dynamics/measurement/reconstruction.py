@@ -1,28 +1,28 @@
-"""From six measured drive positions to the platform's motion, at every sample of a recording.
+"""From measured drive positions to the motion of what they move, at every sample of a recording.
 
-Per segment: equal steps, smoothed position, velocity and acceleration of the drives, forward
-kinematics that follows the branch, and the platform's twist and acceleration through the
-Jacobian. Effort is only cut to the same samples. `Reconstruction.treat` is for both sides.
+Per segment: equal steps, smoothed position, velocity and acceleration of the drives, and, for a
+3-PPRS, forward kinematics that follows the branch, and the platform's twist and acceleration
+through the Jacobian. Effort is only cut to the same samples. `Reconstruction.treat` is for both
+sides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.differentiation import Smoothing
-from pprs_dynamics.measurement.drive_motion import DriveMotion, Measured, smooth_drives
+from pprs_dynamics.measurement.drive_motion import Measured, smooth_drives
+from pprs_dynamics.measurement.followed_motion import CHUNK, Motion, kinematics_of
 from pprs_dynamics.measurement.samples import Progress
 from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.mechanism.forward_motion import find_jumps, solve_forward_motion
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES, Array, Geometry
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.model.force_model import ForceModel
 
-CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
 
 @dataclass(frozen=True)
 class Chunk:
@@ -30,7 +30,7 @@ class Chunk:
 
     Parameters
     ----------
-    motion : PlatformMotion
+    motion : PlatformMotion or AxisMotion
         With times.
     samples, blocks : slice
         Its place in the reconstruction, before and after treatment.
@@ -40,7 +40,7 @@ class Chunk:
         For these samples alone.
     """
 
-    motion: PlatformMotion
+    motion: Motion
     samples: slice
     blocks: slice
     is_start: bool
@@ -55,11 +55,11 @@ class Reconstruction:
     ----------
     time : (N,) array
         [s].
-    position, velocity, acceleration : (N, 6) arrays
+    position, velocity, acceleration : (N, D) arrays
         Of the drives, smoothed [m, m/s, m/s^2].
-    motion : PlatformMotion
+    motion : PlatformMotion or AxisMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
-    effort : (N, 6) array
+    effort : (N, D) array
         As measured [N]; NaN where it was not.
     index : (N,) int array
         The samples' places in the recording.
@@ -70,7 +70,7 @@ class Reconstruction:
     smoothing : Smoothing
     block : int
         Samples per block, in the longest segment.
-    from_recorded : (2, 6) bool array
+    from_recorded : (2, D) bool array
         Drives whose velocity, and those whose acceleration, come from recorded velocities.
     near_branch : (N,) bool array
         See `ForwardKinematics`.
@@ -86,7 +86,7 @@ class Reconstruction:
     position: Array
     velocity: Array
     acceleration: Array
-    motion: PlatformMotion
+    motion: Motion
     effort: Array
     index: np.ndarray
     segments: tuple[slice, ...]
@@ -120,14 +120,14 @@ class Reconstruction:
 
 
 def reconstruct(
-    robot: DriveModel | Geometry, recording: Measured, progress: Progress | None = None,
+    model: ForceModel | Geometry, recording: Measured, progress: Progress | None = None,
     window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
-    robot : DriveModel or Geometry
+    model : ForceModel or Geometry
         Whose kinematics to use.
     recording : Recording
         Or anything with its arrays and segments.
@@ -139,51 +139,48 @@ def reconstruct(
     Raises
     ------
     MotionError
-        Where no segment is long enough, or the drives are not the robot's six.
+        Where no segment is long enough, or the drives are not the model's.
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    geometry = robot.robot.geometry if isinstance(robot, DriveModel) else robot
-    if tuple(recording.drives) != DRIVES:
+    kinematics = kinematics_of(model)
+    if tuple(recording.drives) != kinematics.drives:
+        order = ', in this order' if len(kinematics.drives) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
-                          f'be {", ".join(DRIVES)}, in this order', 'shape')
+                          f'be {", ".join(kinematics.drives)}{order}', 'shape')
     drives = smooth_drives(recording, window)
-    if isinstance(robot, DriveModel) and np.any(robot.position_error):
-        drives = replace(drives, position=drives.position - robot.position_error)
+    if isinstance(model, ForceModel) and np.any(model.position_error):
+        drives = replace(drives, position=drives.position - model.position_error)
     time, total = recording.time[drives.index], len(drives.index)
-    motion, near, jumps = _platform_motion(geometry, time, drives, progress)
+    followed = kinematics.follow(time, drives, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
-             f'{len(drives.segments)} segments, what fills no block, and segments too short']
-    if np.any(near):
-        notes.append(f'{int(near.sum())} samples lie near another solution of the forward '
-                     'kinematics, where small errors of positions matter most')
-    if len(jumps):
-        notes.append(f'the pose jumps at {len(jumps)} places, first at {time[jumps[0]]:.6g} s: '
-                     'forward kinematics may have left its branch')
+             f'{len(drives.segments)} segments, what fills no block, and segments too short',
+             *followed.notes(time)]
     return Reconstruction(
-        time, drives.position, drives.velocity, drives.acceleration, motion,
+        time, drives.position, drives.velocity, drives.acceleration, followed.motion,
         recording.effort[drives.index], drives.index, drives.segments,
         Treatment(drives.block_starts, total), drives.smoothing, drives.block,
-        drives.from_recorded, near, jumps, dropped, tuple(notes))
+        drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes))
 
 
 def treated_forces(
-    model: DriveModel, reconstruction: Reconstruction, progress: Progress | None = None,
-    more: Callable[[DriveForces], Mapping[str, Array]] = lambda forces: {},
+    model: ForceModel, reconstruction: Reconstruction, progress: Progress | None = None,
+    more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
 ) -> dict[str, Array]:
-    """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, 6) [N].
+    """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
 
     Effects with memory run through each segment and start afresh in the next.
 
     Parameters
     ----------
-    model : DriveModel
+    model : ForceModel
     reconstruction : Reconstruction
     progress : callable, optional
         Called with (samples done, all) now and then.
     more : callable, optional
-        Gives further quantities of the same evaluation to be treated, (N, k) each, by name.
+        Gives further quantities of the same evaluation, from what `drive_forces` of the model
+        returns, to be treated, (N, k) each, by name.
 
     Raises
     ------
@@ -203,42 +200,3 @@ def treated_forces(
         if progress is not None:
             progress(chunk.samples.stop, len(reconstruction))
     return treated
-
-
-def _platform_motion(
-    geometry: Geometry, time: Array, drives: DriveMotion, progress: Progress | None,
-) -> tuple[PlatformMotion, np.ndarray, np.ndarray]:
-    """Return motion, nearness to another branch, and jumps, chunk by chunk."""
-    count = len(time)
-    arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
-    near = np.zeros(count, dtype=bool)
-    for segment in drives.segments:
-        seed = None
-        for start in range(segment.start, segment.stop, CHUNK):
-            rows = slice(start, min(start + CHUNK, segment.stop))
-            try:
-                found = solve_forward_motion(
-                    geometry, drives.position[rows], drives.velocity[rows],
-                    drives.acceleration[rows], seed)
-            except ConvergenceError as error:
-                sample = start + error.sample
-                raise ConvergenceError(
-                    int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
-                    error.rule) from None
-            part = found.motion
-            for array, values in zip(arrays, (
-                    part.position, part.orientation, part.linear_velocity, part.angular_velocity,
-                    part.linear_acceleration, part.angular_acceleration), strict=True):
-                array[rows] = values
-            near[rows] = found.near_branch
-            seed = part[-1:]
-            if progress is not None:
-                progress(rows.stop, count)
-    motion = PlatformMotion(*arrays)
-    jumps = []
-    for segment in drives.segments:
-        for start in range(segment.start, segment.stop, CHUNK):
-            first = max(start - 1, segment.start)  # the step from the last chunk counts too
-            rows = slice(first, min(start + CHUNK, segment.stop))
-            jumps.append(first + np.flatnonzero(find_jumps(motion[rows].with_time(time[rows]))))
-    return motion, near, np.concatenate(jumps)

@@ -10,23 +10,28 @@ two conditions alone do not single out one pose: others that meet them are turne
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError
-from pprs_dynamics.mechanism.inverse_kinematics import (
-    solve_inverse_kinematics,
-    spherical_joint_arms,
-)
+from pprs_dynamics.mechanism.arithmetic import everywhere, larger, sqrt
+from pprs_dynamics.mechanism.closure import Six, closure_rows, eliminate, solve_closure
+from pprs_dynamics.mechanism.evaluation import evaluate
+from pprs_dynamics.mechanism.inverse_kinematics import chain_arm, solve_inverse_kinematics
 from pprs_dynamics.mechanism.motion import PlatformMotion, checked_matrix
+from pprs_dynamics.mechanism.numbers import Chain, Lengths, chain, lengths
 from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.sample import Rotation, rotation, vector
+from pprs_dynamics.mechanism.vectors import ChainVector, Vector, add, dot, in_chain, plus, times
 
 RESIDUAL_TOLERANCE = 1e-13  # of the lengths involved; a few rounding errors of the closure
 MAXIMUM_STEPS = 30
 # Where det [B] has fallen to this share of its value at home, two solutions are about to meet.
 NEAR_BRANCH = 0.1
 SINGULAR_HOME = 1e-9
+POSE = 7  # columns of a motion that are position and orientation
 
 
 @dataclass(frozen=True)
@@ -92,14 +97,13 @@ def solve_forward_kinematics(
     if len(start) not in (1, len(q)):
         raise MotionError('seed', f'it has {len(start)} poses',
                           f'have 1 or {len(q)}, as the drive positions', 'shape')
-    P = np.array(np.broadcast_to(start.position, (len(q), 3)))
-    rotation = np.array(np.broadcast_to(start.rotation, (len(q), 3, 3)))
+    pose = np.array(np.broadcast_to(start.rows[:, :POSE], (len(q), POSE)))
     if seed is None:
-        P[:, 2] += q[:, 3:].mean(axis=1) - _drive_positions(geometry, home)[0, 3:].mean()
-    home_B = _closure(geometry, home.position, home.rotation, _drive_positions(geometry, home))[1]
-    home_determinant = float(np.linalg.det(home_B)[0])
+        pose[:, 2] += q[:, 3:].mean(axis=1) - _drive_positions(geometry, home)[0, 3:].mean()
+    home_determinant = float(_newton(
+        geometry, _drive_positions(geometry, home), home.rows[:, :POSE].copy()).determinant[0])
     # In units of the platform's radius det [B] is a pure number, 0.6 for the paper's robot.
-    if abs(home_determinant) < SINGULAR_HOME * geometry.platform_radius ** 3:
+    if not abs(home_determinant) >= SINGULAR_HOME * geometry.platform_radius ** 3:
         raise SingularityError(0, 'det [B] is 0 at the home pose of this geometry',
                                'home must tell which assembly mode is meant')
 
@@ -108,119 +112,144 @@ def solve_forward_kinematics(
     pending = np.arange(len(q))
     # The straight way first; what fails follows the branch in ever smaller moves of the drives.
     for moves in (1, 4, 16, 64):
-        P_new, rotation_new, target = P[pending].copy(), rotation[pending].copy(), q[pending]
+        moved, target = (pose.copy(), q) if moves == 1 else (pose[pending], q[pending])
         good = np.ones(len(pending), dtype=bool)
         count = np.zeros(len(pending), dtype=int)
         if moves > 1:
             q_start = _drive_positions(
-                geometry, PlatformMotion.at_rest(P_new, _quaternions(rotation_new)))
+                geometry, PlatformMotion.at_rest(moved[:, :3], moved[:, 3:]))
             for move in range(1, moves):
-                way = q_start + (target - q_start) * (move / moves)
-                good &= _newton(geometry, way, P_new, rotation_new, count)[0]
+                found = _newton(geometry, q_start + (target - q_start) * (move / moves), moved)
+                good &= found.converged
+                count += found.steps
                 if not good.any():
                     break
         if not good.any():
             continue
-        converged, B = _newton(geometry, target, P_new, rotation_new, count)
-        good &= converged
-        with np.errstate(all='ignore'):
-            found = np.linalg.det(B) / home_determinant
-        good &= (found > 0) & _elbow_agrees(geometry, P_new, rotation_new, q[pending])
+        found = _newton(geometry, target, moved)
+        good &= found.converged & found.upright
+        count += found.steps
+        relative = found.determinant / home_determinant
+        good &= relative > 0
         done = pending[good]
-        P[done], rotation[done] = P_new[good], rotation_new[good]
-        determinant[done] = found[good]
+        pose[done], determinant[done] = moved[good], relative[good]
         steps[pending] += count
-        pending = pending[~good]
-        if not len(pending):
+        if good.all():
             break
+        pending = pending[~good]
     else:
         raise ConvergenceError(
             int(pending[0]), f'no pose found for drive positions {q[pending[0]].tolist()} m',
             'they must close the mechanism in the assembly mode of the home pose')
-    return ForwardKinematics(P, _quaternions(rotation), steps, determinant < NEAR_BRANCH)
+    return ForwardKinematics(np.ascontiguousarray(pose[:, :3]), np.ascontiguousarray(pose[:, 3:]),
+                             steps, determinant < NEAR_BRANCH)
 
 
-def _newton(
-    geometry: Geometry, q: Array, P: Array, rotation: Array, steps: np.ndarray,
-) -> tuple[np.ndarray, Array]:
-    """Improve poses in place, count steps, and return where they converged, with [B] there."""
-    active = np.arange(len(q))
-    converged = np.zeros(len(q), dtype=bool)
-    found = np.full((len(q), 6, 6), np.nan)
-    for _ in range(MAXIMUM_STEPS):
-        residual, B = _closure(geometry, P[active], rotation[active], q[active])
-        size = np.abs(residual).max(axis=1)
-        # Heights far from 0 carry their own rounding.
-        arrived = size <= RESIDUAL_TOLERANCE * (
-            geometry.rod_length + np.abs(q[active]).max(axis=1))
-        converged[active[arrived]], found[active[arrived]] = True, B[arrived]
-        active, residual, B = active[~arrived], residual[~arrived], B[~arrived]
-        if not len(active):
-            break
-        with np.errstate(all='ignore'):
-            try:
-                step = np.linalg.solve(B, -residual[..., None])[..., 0]
-            except np.linalg.LinAlgError:
-                # One exactly singular matrix stops all: go on with the others.
-                regular = np.isfinite(B).all(axis=(1, 2)) & (np.linalg.det(B) != 0.0)
-                active, residual, B = active[regular], residual[regular], B[regular]
-                step = np.linalg.solve(B, -residual[..., None])[..., 0]
-            # A Newton step longer than the mechanism leaves the branch: shorten it.
-            length = np.maximum(np.linalg.norm(step[:, :3], axis=1) / geometry.rod_length,
-                                np.linalg.norm(step[:, 3:], axis=1))
-            step *= np.minimum(1.0, 0.5 / np.maximum(length, 1e-300))[:, None]
-        steps[active] += 1
-        usable = np.isfinite(step).all(axis=1)
-        active, step = active[usable], step[usable]
-        P[active] += step[:, :3]
-        rotation[active] = _turned(rotation[active], step[:, 3:])
-    return converged, found
+class _Found(NamedTuple):
+    """Where Newton-Raphson ended: whether it arrived there, and det [B] times a constant."""
+
+    converged: np.ndarray
+    determinant: Array
+    upright: np.ndarray
+    steps: np.ndarray
 
 
-def _closure(geometry: Geometry, P: Array, rotation: Array, q: Array) -> tuple[Array, Array]:
-    """Return the residual of Eq. (3) [m] and its Jacobian with respect to (P, rotation)."""
-    frames = geometry.frames
-    arms = spherical_joint_arms(geometry, rotation)
-    A = P[:, None, :] + arms
-    n = np.stack((-frames.sin, frames.cos, np.zeros(3)), axis=-1)
-    C = (geometry.base_radius * np.stack((frames.cos, frames.sin, np.zeros(3)), axis=-1)
-         + q[:, :3, None] * n + q[:, 3:, None] * np.array([0.0, 0.0, 1.0]))
-    rod = A - C
-    along = np.broadcast_to(n, rod.shape)
+def _newton(geometry: Geometry, q: Array, pose: Array) -> _Found:
+    """Improve poses in place."""
+    found = np.empty((len(q), 4))
+    evaluate(newton_kernel, geometry.numbers, np.ascontiguousarray(q), pose, found)
+    return _Found(found[:, 0] > 0, found[:, 1], found[:, 2] > 0, found[:, 3].astype(int))
+
+
+class Closure(NamedTuple):
+    """What Eq. (3) leaves of a chain at a pose that does not yet close it.
+
+    `slide` and `lift` are residuals [m]; the rod is given as it then is.
+    """
+
+    arm: ChainVector
+    cos_u: Any
+    sin_u: Any
+    slide: Any
+    lift: Any
+
+
+def chain_closure(size: Lengths, k: Chain, P: Vector, R: Rotation, q: Any, h: Any) -> Closure:
+    """Return the residuals of Eq. (3) for a slide at q and a lift at h.
+
+    The rod may point out of its chain's plane. That part of its row in [B] is a multiple of the
+    slide's row, which is taken off here: the rows are then those of `closure_rows`.
+    """
+    arm = chain_arm(k, R)
+    A = add(in_chain(k, P), arm)
+    rod = ChainVector(A.e - size.R, A.n - q, A.k - h)
     # The squared rod equation is divided by 2 l, so that both halves are in metres.
-    residual = np.concatenate((
-        np.einsum('nij,ij->ni', rod, n),
-        (np.einsum('nij,nij->ni', rod, rod) - geometry.rod_length ** 2)
-        / (2 * geometry.rod_length)), axis=1)                                  # Eq. (3)
-    directions = np.concatenate((along, rod / geometry.rod_length), axis=1)
-    moments = np.cross(np.concatenate((arms, arms), axis=1), directions)
-    return residual, np.concatenate((directions, moments), axis=2)
+    length = (rod.e * rod.e + rod.n * rod.n + rod.k * rod.k - size.l * size.l) / (2.0 * size.l)
+    return Closure(arm, -rod.e / size.l, rod.k / size.l,
+                   rod.n, length - rod.n * rod.n / size.l)                     # Eq. (3)
 
 
-def _elbow_agrees(geometry: Geometry, P: Array, rotation: Array, q: Array) -> np.ndarray:
-    height = P[:, None, 2] + spherical_joint_arms(geometry, rotation)[..., 2] - q[:, 3:]
-    agrees: np.ndarray = np.all(height * geometry.elbow_sign > 0, axis=1)
-    return agrees
+def newton_kernel(p: Any, s: Any, q: Any, pose: Any, found: Any) -> Any:
+    """Improve a table of poses until they belong to drive positions; p is the geometry."""
+    size = lengths(p)
+    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
+    P = vector(pose, s, 0)
+    x, y, z, w = pose[s, 3], pose[s, 4], pose[s, 5], pose[s, 6]
+    # Heights far from 0 carry their own rounding.
+    tolerance = RESIDUAL_TOLERANCE * (size.l + _largest(
+        q[s, 0], q[s, 1], q[s, 2], q[s, 3], q[s, 4], q[s, 5]))
+    steps, determinant, upright, arrived = 0.0 * x, 0.0 * x, 0.0 * x, x > 2.0
+    for k in range(MAXIMUM_STEPS + 1):
+        R = rotation(x, y, z, w)
+        one = chain_closure(size, k1, P, R, q[s, 0], q[s, 3])
+        two = chain_closure(size, k2, P, R, q[s, 1], q[s, 4])
+        three = chain_closure(size, k3, P, R, q[s, 2], q[s, 5])
+        # The least of the rods' sines, where positive is as the elbow says.
+        upright = -larger(larger(-size.elbow * one.sin_u, -size.elbow * two.sin_u),
+                          -size.elbow * three.sin_u)
+        arrived = _largest(one.slide, two.slide, three.slide,
+                           one.lift, two.lift, three.lift) <= tolerance
+        # The last step moves nothing that the determinant could tell.
+        if k > 0 and everywhere(arrived):
+            break
+        eliminated = eliminate(
+            p, closure_rows(k1, one.arm, one.cos_u, one.sin_u),
+            closure_rows(k2, two.arm, two.cos_u, two.sin_u),
+            closure_rows(k3, three.arm, three.cos_u, three.sin_u), one, two, three)
+        determinant = eliminated.determinant
+        v, omega = solve_closure(p, eliminated, one, two, three, Six(
+            -one.slide, -two.slide, -three.slide, -one.lift, -two.lift, -three.lift))
+        # A Newton step longer than the mechanism leaves the branch: shorten it.
+        reach = larger(sqrt(dot(v, v)) / size.l, sqrt(dot(omega, omega)))
+        share = (1.0 - 1.0 * arrived) * 0.5 / larger(reach, 0.5)
+        steps = steps + (1.0 - 1.0 * arrived)
+        P = plus(P, times(share, v))
+        x, y, z, w = turned_quaternion(times(0.5 * share, omega), x, y, z, w)
+    pose[s, 0], pose[s, 1], pose[s, 2] = P.x, P.y, P.z
+    pose[s, 3], pose[s, 4], pose[s, 5], pose[s, 6] = x, y, z, w
+    found[s, 0], found[s, 1] = 1.0 * arrived, determinant
+    found[s, 2], found[s, 3] = upright, steps
+    return True
+
+
+def turned_quaternion(half: Vector, x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any]:
+    """Return a unit quaternion after a turn whose vector in `base`, halved, is given.
+
+    Exact to the turn's second order.
+    """
+    X = x + w * half.x + half.y * z - half.z * y
+    Y = y + w * half.y + half.z * x - half.x * z
+    Z = z + w * half.z + half.x * y - half.y * x
+    W = w - half.x * x - half.y * y - half.z * z
+    scale = 1.0 / sqrt(X * X + Y * Y + Z * Z + W * W)
+    return scale * X, scale * Y, scale * Z, scale * W
+
+
+def _largest(a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> Any:
+    """Return the largest absolute value."""
+    return larger(larger(larger(abs(a), abs(b)), larger(abs(c), abs(d))),
+                  larger(abs(e), abs(f)))
 
 
 def _drive_positions(geometry: Geometry, pose: PlatformMotion) -> Array:
     return solve_inverse_kinematics(geometry, pose).position
-
-
-def _turned(rotation: Array, turn: Array) -> Array:
-    """Return rotations after small turns about axes of `base` (Rodrigues)."""
-    angle = np.linalg.norm(turn, axis=1)
-    x, y, z = turn.T
-    zero = np.zeros_like(x)
-    K = np.stack((zero, -z, y, z, zero, -x, -y, x, zero), axis=-1).reshape(-1, 3, 3)
-    a = np.sinc(angle / np.pi)[:, None, None]
-    b = (0.5 * np.sinc(angle / (2 * np.pi)) ** 2)[:, None, None]
-    turned: Array = rotation + a * (K @ rotation) + b * (K @ (K @ rotation))
-    return turned
-
-
-def _quaternions(rotation: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    quaternions: Array = Rotation.from_matrix(rotation).as_quat()
-    return quaternions

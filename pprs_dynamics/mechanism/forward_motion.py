@@ -13,20 +13,26 @@ for the lifts.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.mechanism.closure import Twist, answer, read_inverse
+from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.mechanism.inverse_kinematics import solve_inverse_kinematics
-from pprs_dynamics.mechanism.jacobians import compute_jacobians
+from pprs_dynamics.mechanism.inverse_kinematics import ChainSample, chain_table, read_chain
+from pprs_dynamics.mechanism.jacobians import inverse_table
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array, ChainVector, Geometry, add, cross
+from pprs_dynamics.mechanism.numbers import Chain, chain
+from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.vectors import add, cross, in_chain
 
 # Marks that seed the samples between them are at most this much travel of any drive apart [m]:
 # Newton-Raphson then converges in one or two steps, far from any other solution.
 LONGEST_MOVE = 0.005
+LEAST_SINE = 1e-6  # of a rod, below which its drive tells nothing
 # Two solutions from different seeds agree to rounding; other solutions lie centimetres away.
 SAME_POSE = 1e-6
 # A pose that moves otherwise than its twist says by more than this, of the move and at least
@@ -113,22 +119,50 @@ def platform_rates(
     velocity, acceleration : (N, 6) array_like
         q_dot [m/s], q_ddot [m/s^2] in drive order.
     """
-    frames, l = geometry.frames, geometry.rod_length
-    q_dot, q_ddot = np.asarray(velocity, dtype=float), np.asarray(acceleration, dtype=float)
-    chains = solve_inverse_kinematics(
-        geometry, PlatformMotion.at_rest(poses.position, poses.orientation))
-    jacobians = compute_jacobians(geometry, chains)
-    A, B_inverse = jacobians.A, jacobians.B_inverse
+    still = PlatformMotion.at_rest(poses.position, poses.orientation)
+    chains = chain_table(geometry, still, LEAST_SINE)
+    rates = np.empty((len(poses), 12))
+    evaluate(rates_kernel, geometry.numbers, chains,
+             inverse_table(geometry, chains, np.inf), _table(velocity), _table(acceleration), rates)
+    return PlatformMotion(poses.position, poses.orientation, rates[:, 0:3], rates[:, 3:6],
+                          rates[:, 6:9], rates[:, 9:12], poses.time)
 
-    X_dot = _apply(B_inverse, A * q_dot)                                       # Eq. (4)
-    omega = frames.components(X_dot[:, 3:])
-    spin = cross(omega, chains.arm)
-    c = cross(omega, spin)
-    u_dot = add(frames.components(X_dot[:, :3]), spin).e / (l * chains.sin_u)
-    along_rod = _dot(chains.rod_direction, c) + l * u_dot * u_dot
-    X_ddot = _apply(B_inverse, A * q_ddot - np.concatenate((c.n, along_rod), axis=1))
-    return PlatformMotion(poses.position, poses.orientation, X_dot[:, :3], X_dot[:, 3:],
-                          X_ddot[:, :3], X_ddot[:, 3:], poses.time)
+
+def _table(values: ArrayLike) -> Array:
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def rates_kernel(
+    p: Any, s: Any, chains: Any, inverse: Any, q_dot: Any, q_ddot: Any, rates: Any,
+) -> Any:
+    """Fill a table of v, omega, a_o and epsilon from drives' rates; p is the geometry."""
+    l = p[1]
+    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
+    one, two, three = read_chain(chains, s, 0), read_chain(chains, s, 1), read_chain(chains, s, 2)
+    s1, s2, s3 = one.sin_u, two.sin_u, three.sin_u
+    B_inverse = read_inverse(inverse, s)
+    X_dot = answer(B_inverse, q_dot[s, 0], q_dot[s, 1], q_dot[s, 2],
+                   s1 * q_dot[s, 3], s2 * q_dot[s, 4], s3 * q_dot[s, 5])       # Eq. (4)
+    slide_1, lift_1 = centripetal(k1, l, one, X_dot)
+    slide_2, lift_2 = centripetal(k2, l, two, X_dot)
+    slide_3, lift_3 = centripetal(k3, l, three, X_dot)
+    X_ddot = answer(B_inverse, q_ddot[s, 0] - slide_1, q_ddot[s, 1] - slide_2,
+                    q_ddot[s, 2] - slide_3, s1 * q_ddot[s, 3] - lift_1,
+                    s2 * q_ddot[s, 4] - lift_2, s3 * q_ddot[s, 5] - lift_3)
+    rates[s, 0], rates[s, 1], rates[s, 2] = X_dot.v
+    rates[s, 3], rates[s, 4], rates[s, 5] = X_dot.omega
+    rates[s, 6], rates[s, 7], rates[s, 8] = X_ddot.v
+    rates[s, 9], rates[s, 10], rates[s, 11] = X_ddot.omega
+    return True
+
+
+def centripetal(k: Chain, l: Any, c: ChainSample, X_dot: Twist) -> tuple[Any, Any]:
+    """Return n_i . c_i, and d_i . c_i + l u_dot_i^2."""
+    omega = in_chain(k, X_dot.omega)
+    spin = cross(omega, c.arm)
+    inward = cross(omega, spin)
+    u_dot = add(in_chain(k, X_dot.v), spin).e / (l * c.sin_u)
+    return inward.n, c.sin_u * inward.k - c.cos_u * inward.e + l * u_dot * u_dot
 
 
 def find_jumps(motion: PlatformMotion) -> np.ndarray:
@@ -204,12 +238,3 @@ def _differ(position: Array, orientation: Array, other: Array, turned: Array) ->
     same: np.ndarray = ((np.abs(position - other).max(axis=-1) < SAME_POSE)
                         & (1 - cosine < SAME_POSE ** 2))
     return ~same
-
-
-def _apply(matrix: Array, vector: Array) -> Array:
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
-
-
-def _dot(a: ChainVector, b: ChainVector) -> Array:
-    return a.e * b.e + a.n * b.n + a.k * b.k

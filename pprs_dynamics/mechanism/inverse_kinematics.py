@@ -7,12 +7,20 @@ C_i = R e_i + q_i n_i + q_(i+3) k and A_i = C_i + l (-cos u_i e_i + sin u_i k).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.errors import SingularityError, WorkspaceError
+from pprs_dynamics.mechanism.arithmetic import sqrt
+from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array, ChainVector, Geometry, add, cross
+from pprs_dynamics.mechanism.numbers import Chain, Lengths, chain, lengths
+from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.sample import MotionSample, Rotation, motion_sample, turned
+from pprs_dynamics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
+
+CHAIN_COLUMNS = 48
 
 
 @dataclass(frozen=True)
@@ -46,18 +54,132 @@ class ChainKinematics:
     @property
     def rod_direction(self) -> ChainVector:
         """Unit vectors d_i along the rods, from C_i to A_i."""
-        return ChainVector(-self.cos_u, np.zeros_like(self.cos_u), self.sin_u)
+        return rod_direction(self.cos_u, self.sin_u)
 
     @property
     def rod_normal(self) -> ChainVector:
         """Unit vectors w_i: minus the direction in which the rod's tip moves as u_i grows."""
-        return ChainVector(-self.sin_u, np.zeros_like(self.cos_u), -self.cos_u)
+        return rod_normal(self.cos_u, self.sin_u)
 
     @property
     def rod_angle(self) -> Array:
         """u_i [rad], (N, 3)."""
         angle: Array = np.arctan2(self.sin_u, self.cos_u)
         return angle
+
+    @classmethod
+    def from_table(cls, table: Array) -> ChainKinematics:
+        """Return the chains of a table that a kernel has filled, (N, `CHAIN_COLUMNS`)."""
+        e, n, k, c_u, s_u, u_dot, u_ddot = (
+            np.ascontiguousarray(table[:, column:column + 3]) for column in range(0, 21, 3))
+        q, q_dot, q_ddot = (
+            np.ascontiguousarray(table[:, column:column + 6]) for column in (21, 27, 33))
+        omega = ChainVector(*(
+            np.ascontiguousarray(table[:, column:column + 3]) for column in (39, 42, 45)))
+        return cls(ChainVector(e, n, k), c_u, s_u, u_dot, u_ddot, q, q_dot, q_ddot, omega)
+
+    def table(self) -> Array:
+        """Return the table that `from_table` reads."""
+        return np.concatenate((
+            *self.arm, self.cos_u, self.sin_u, self.u_dot, self.u_ddot, self.position,
+            self.velocity, self.acceleration, *self.angular_velocity), axis=1)
+
+
+class ChainSample(NamedTuple):
+    """One chain at one sample, see `ChainKinematics`."""
+
+    arm: ChainVector
+    cos_u: Any
+    sin_u: Any
+    u_dot: Any
+    u_ddot: Any
+    slide: Any
+    lift: Any
+    slide_velocity: Any
+    lift_velocity: Any
+    slide_acceleration: Any
+    lift_acceleration: Any
+    omega: ChainVector
+
+
+def rod_direction(c_u: Any, s_u: Any) -> ChainVector:
+    """Return d_i, the unit vector along the rod from C_i to A_i."""
+    return ChainVector(-c_u, 0.0 * c_u, s_u)
+
+
+def rod_normal(c_u: Any, s_u: Any) -> ChainVector:
+    """Return w_i, minus the direction in which the rod's tip moves as u_i grows."""
+    return ChainVector(-s_u, 0.0 * c_u, -c_u)
+
+
+def chain_arm(chain: Chain, R: Rotation) -> ChainVector:
+    """Return rho_i = Rot r e'_i: the spherical joints lie in the platform's plane."""
+    return in_chain(chain, turned(R, Vector(chain.x, chain.y, 0.0)))
+
+
+def chain_motion(size: Lengths, chain: Chain, motion: MotionSample) -> ChainSample:
+    """Return the motion of a chain that belongs to the platform's, Eq. (3) and (4)."""
+    R, l = size.R, size.l
+    rho = chain_arm(chain, motion.rotation)
+    omega = in_chain(chain, motion.omega)
+    epsilon = in_chain(chain, motion.epsilon)
+    A = add(in_chain(chain, motion.position), rho)
+
+    cos_u = (R - A.e) / l
+    sin_u = size.elbow * sqrt(1.0 - cos_u * cos_u)
+    q_slide = A.n                                                              # Eq. (3)
+    q_lift = A.k - l * sin_u                                                   # Eq. (3)
+
+    spin = cross(omega, rho)
+    v_A = add(in_chain(chain, motion.v), spin)
+    u_dot = v_A.e / (l * sin_u)
+    q_slide_dot = v_A.n                                                        # Eq. (4)
+    q_lift_dot = v_A.k - l * cos_u * u_dot                                     # Eq. (4)
+
+    a_A = add(in_chain(chain, motion.a), add(cross(epsilon, rho), cross(omega, spin)))
+    u_ddot = (a_A.e / l - cos_u * u_dot * u_dot) / sin_u
+    q_slide_ddot = a_A.n
+    q_lift_ddot = a_A.k - l * (cos_u * u_ddot - sin_u * u_dot * u_dot)
+    return ChainSample(rho, cos_u, sin_u, u_dot, u_ddot, q_slide, q_lift, q_slide_dot,
+                       q_lift_dot, q_slide_ddot, q_lift_ddot, omega)
+
+
+def write_chain(table: Any, s: Any, i: int, c: ChainSample) -> None:
+    """Write chain i of sample s to a table, see `ChainKinematics.from_table`."""
+    table[s, i], table[s, 3 + i], table[s, 6 + i] = c.arm.e, c.arm.n, c.arm.k
+    table[s, 9 + i], table[s, 12 + i] = c.cos_u, c.sin_u
+    table[s, 15 + i], table[s, 18 + i] = c.u_dot, c.u_ddot
+    table[s, 21 + i], table[s, 24 + i] = c.slide, c.lift
+    table[s, 27 + i], table[s, 30 + i] = c.slide_velocity, c.lift_velocity
+    table[s, 33 + i], table[s, 36 + i] = c.slide_acceleration, c.lift_acceleration
+    table[s, 39 + i], table[s, 42 + i], table[s, 45 + i] = c.omega.e, c.omega.n, c.omega.k
+
+
+def read_chain(table: Any, s: Any, i: int) -> ChainSample:
+    """Return chain i of sample s of such a table."""
+    return ChainSample(
+        ChainVector(table[s, i], table[s, 3 + i], table[s, 6 + i]),
+        table[s, 9 + i], table[s, 12 + i], table[s, 15 + i], table[s, 18 + i],
+        table[s, 21 + i], table[s, 24 + i], table[s, 27 + i], table[s, 30 + i],
+        table[s, 33 + i], table[s, 36 + i],
+        ChainVector(table[s, 39 + i], table[s, 42 + i], table[s, 45 + i]))
+
+
+def is_within_reach(c: ChainSample, minimum_sine: Any) -> Any:
+    """Return whether the rod reaches and is not too nearly horizontal; false for NaN."""
+    return abs(c.sin_u) >= minimum_sine
+
+
+def chain_kernel(p: Any, s: Any, motion: Any, chains: Any) -> Any:
+    """Fill a table of chains from a table of motions; p is the geometry and the least sine."""
+    m, size, least = motion_sample(motion, s), lengths(p), p[24]
+    one, two, three = (chain_motion(size, chain(p, 0), m), chain_motion(size, chain(p, 1), m),
+                       chain_motion(size, chain(p, 2), m))
+    write_chain(chains, s, 0, one)
+    write_chain(chains, s, 1, two)
+    write_chain(chains, s, 2, three)
+    return (is_within_reach(one, least) & is_within_reach(two, least)
+            & is_within_reach(three, least))
 
 
 def spherical_joint_arms(geometry: Geometry, rotation: Array) -> Array:
@@ -110,45 +232,26 @@ def solve_inverse_kinematics(
     SingularityError
         Where abs(sin u_i) < `minimum_sine`: the rod lies (almost) horizontally.
     """
-    R, l = geometry.base_radius, geometry.rod_length
-    frames = geometry.frames
-    rho = frames.components(spherical_joint_arms(geometry, motion.rotation))
-    omega = frames.components(motion.angular_velocity)
-    epsilon = frames.components(motion.angular_acceleration)
-    A = add(frames.components(motion.position), rho)
-
-    cos_u = (R - A.e) / l
-    _require_reach(cos_u, A.e, geometry)
-    sin_u = geometry.elbow_sign * np.sqrt(1.0 - cos_u * cos_u)
-    _require_upright_rods(sin_u, minimum_sine)
-    q_slide = A.n                                                              # Eq. (3)
-    q_lift = A.k - l * sin_u                                                   # Eq. (3)
-
-    spin = cross(omega, rho)
-    v_A = add(frames.components(motion.linear_velocity), spin)
-    u_dot = v_A.e / (l * sin_u)
-    q_slide_dot = v_A.n                                                        # Eq. (4)
-    q_lift_dot = v_A.k - l * cos_u * u_dot                                     # Eq. (4)
-
-    a_A = add(frames.components(motion.linear_acceleration),
-              add(cross(epsilon, rho), cross(omega, spin)))
-    u_ddot = (a_A.e / l - cos_u * u_dot * u_dot) / sin_u
-    q_slide_ddot = a_A.n
-    q_lift_ddot = a_A.k - l * (cos_u * u_ddot - sin_u * u_dot * u_dot)
-    return ChainKinematics(
-        rho, cos_u, sin_u, u_dot, u_ddot,
-        np.concatenate((q_slide, q_lift), axis=1),
-        np.concatenate((q_slide_dot, q_lift_dot), axis=1),
-        np.concatenate((q_slide_ddot, q_lift_ddot), axis=1), omega)
+    return ChainKinematics.from_table(chain_table(geometry, motion, minimum_sine))
 
 
-def _require_reach(cos_u: Array, A_e: Array, geometry: Geometry) -> None:
+def chain_table(geometry: Geometry, motion: PlatformMotion, minimum_sine: float) -> Array:
+    """Return the same as a table for kernels."""
+    table = np.empty((len(motion), CHAIN_COLUMNS))
+    numbers = np.append(geometry.numbers, minimum_sine)
+    if evaluate(chain_kernel, numbers, motion.rows, table) >= 0:
+        _require_reach(table[:, 9:12], geometry)
+        _require_upright_rods(table[:, 12:15], minimum_sine)
+    return table
+
+
+def _require_reach(cos_u: Array, geometry: Geometry) -> None:
     beyond = ~(np.abs(cos_u) <= 1.0)
     if np.any(beyond):
         sample, chain = (int(i) for i in np.argwhere(beyond)[0])
         raise WorkspaceError(
             sample, f'the rod of chain {chain + 1} would have to span '
-            f'{abs(geometry.base_radius - A_e[sample, chain]):.6g} m radially',
+            f'{abs(cos_u[sample, chain]) * geometry.rod_length:.6g} m radially',
             f'its length is geometry.rod_length = {geometry.rod_length:g} m')
 
 

@@ -7,47 +7,95 @@ transpose also carries the reactions in Eq. (6).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from pprs_dynamics.errors import SingularityError
+from pprs_dynamics.mechanism.closure import (
+    INVERSE_COLUMNS,
+    Wrench,
+    closure_rows,
+    inverse_kernel,
+    rod_row,
+    unit_wrench,
+)
+from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics
-from pprs_dynamics.mechanism.robot import Array, ChainFrames, ChainVector, Geometry, cross
+from pprs_dynamics.mechanism.robot import Array, ChainFrames, Geometry
+from pprs_dynamics.mechanism.vectors import ChainVector
 
 
 @dataclass(frozen=True)
 class Jacobians:
-    """Jacobians at N poses.
+    """Jacobians at N poses, evaluated where they are asked for.
 
     Parameters
+    ----------
+    geometry : Geometry
+    chains : ChainKinematics
+    B_inverse : (N, 6, 6) array
+
+    Attributes
     ----------
     A : (N, 6) array
         Diagonal of [A]: 1 for the slides, sin u_i for the lifts.
     B : (N, 6, 6) array
         [B] with A q_dot = B X_dot, X_dot = (v, omega) in `base`.        Eq. (4)
-    B_inverse : (N, 6, 6) array
     J : (N, 6, 6) array
         [J] = [B]^-1 [A], X_dot = J q_dot.                               Eq. (11)
     J_u : (N, 3, 6) array
         u_dot = J_u q_dot.                                               Eq. (10)
+    J_omega : (N, 3, 6) array
+        Lower half of [J], omega = J_omega q_dot.
     """
 
-    A: Array
-    B: Array
+    geometry: Geometry
+    chains: ChainKinematics
     B_inverse: Array
-    J: Array
-    J_u: Array
+
+    @cached_property
+    def A(self) -> Array:
+        """Diagonal of [A], (N, 6)."""
+        return np.concatenate((np.ones_like(self.chains.sin_u), self.chains.sin_u),
+                              axis=1)                                          # Eq. (4)
+
+    @cached_property
+    def B(self) -> Array:
+        """[B], (N, 6, 6)."""
+        chains = self.chains
+        rows = closure_rows(self.geometry.frames, chains.arm, chains.cos_u, chains.sin_u)
+        return np.concatenate([_matrix(wrench) for wrench in rows], axis=1)
+
+    @cached_property
+    def J(self) -> Array:
+        """[J], (N, 6, 6)."""
+        J: Array = self.B_inverse * self.A[:, None, :]                         # Eq. (11)
+        return J
+
+    @cached_property
+    def J_u(self) -> Array:
+        """[J_u], (N, 3, 6)."""
+        chains = self.chains
+        rows = _matrix(rod_row(self.geometry.frames, self.geometry.rod_length, chains.arm,
+                               chains.sin_u))
+        J_u: Array = rows @ self.J                                             # Eq. (10)
+        return J_u
 
     @property
     def J_omega(self) -> Array:
-        """Lower half of [J], omega = J_omega q_dot, (N, 3, 6)."""
+        """Lower half of [J], (N, 3, 6)."""
         return self.J[:, 3:]
 
 
 def wrench_rows(frames: ChainFrames, direction: ChainVector, arm: ChainVector) -> Array:
     """Return [f, rho x f] per chain for unit forces at A_i, in `base`, (N, 3, 6)."""
-    moment = frames.base(cross(arm, direction))
-    return np.concatenate((frames.base(direction), moment), axis=-1)
+    return _matrix(unit_wrench(frames, direction, arm))
+
+
+def _matrix(wrench: Wrench) -> Array:
+    """Return wrenches as rows, (N, 3, 6)."""
+    return np.stack((*wrench.force, *wrench.moment), axis=-1)
 
 
 def compute_jacobians(
@@ -68,27 +116,24 @@ def compute_jacobians(
         Where det [B] = 0 (the drives cannot hold the platform) or the conditioning is over its
         limit.
     """
-    frames, zero = geometry.frames, np.zeros_like(chains.cos_u)
-    one = np.ones_like(zero)
-    axis, radial = ChainVector(zero, one, zero), ChainVector(one, zero, zero)
-    A = np.concatenate((one, chains.sin_u), axis=1)                            # Eq. (4)
-    B = np.concatenate((
-        wrench_rows(frames, axis, chains.arm),
-        wrench_rows(frames, chains.rod_direction, chains.arm)), axis=1)        # Eq. (4)
-    try:
-        B_inverse = np.asarray(np.linalg.inv(B), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        sample = int(np.argmax([np.linalg.matrix_rank(matrix) < 6 for matrix in B]))
-        raise SingularityError(sample, 'det [B] is 0',
-                               'the drives cannot hold the platform here') from None
-    J = B_inverse * A[:, None, :]                                              # Eq. (11)
-    # The rod follows its tip: u_dot_i = e_i . v_Ai / (l sin u_i).
-    rod_rows: Array = wrench_rows(frames, radial, chains.arm)
-    J_u: Array = (rod_rows / (geometry.rod_length * chains.sin_u)[..., None]) @ J  # Eq. (10)
-    jacobians = Jacobians(A, B, B_inverse, J, J_u)
-    if np.isfinite(condition_limit):
-        _require_conditioning(geometry, jacobians, condition_limit)
-    return jacobians
+    table = inverse_table(geometry, chains.table(), condition_limit)
+    return Jacobians(geometry, chains, table.reshape(-1, 6, 6))
+
+
+def inverse_table(geometry: Geometry, chains: Array, condition_limit: float) -> Array:
+    """Return [B]^-1, (N, 36), at the poses of a table of chains; see `compute_jacobians`."""
+    inverse, bound = np.empty((len(chains), INVERSE_COLUMNS)), np.empty((len(chains), 1))
+    numbers = np.concatenate((
+        geometry.numbers, [condition_limit ** 2, geometry.platform_radius]))
+    if evaluate(inverse_kernel, numbers, chains, inverse, bound) >= 0:
+        _require_regular(inverse)
+        # The Frobenius condition number is never below the 2-norm one and costs a twentieth:
+        # only samples that it does not clear are looked at closely.
+        doubtful = np.flatnonzero(~(bound[:, 0] <= condition_limit ** 2))
+        if np.isfinite(condition_limit) and len(doubtful):
+            _require_conditioning(geometry, chains[doubtful], inverse[doubtful], doubtful,
+                                  condition_limit)
+    return inverse
 
 
 def condition_number(geometry: Geometry, J: Array) -> Array:
@@ -113,20 +158,21 @@ def _homogeneous(geometry: Geometry, J: Array) -> Array:
     return scaled
 
 
-def _require_conditioning(geometry: Geometry, jacobians: Jacobians, limit: float) -> None:
-    # The Frobenius condition number is never below the 2-norm one and costs a twentieth: only
-    # samples that it does not clear are looked at closely.
-    r, sin_u = geometry.platform_radius, jacobians.A
-    J = _homogeneous(geometry, jacobians.J)
-    J_inverse = jacobians.B / sin_u[..., None] / np.array([1.0, 1.0, 1.0, r, r, r])
-    bound = np.sqrt(np.einsum('nij,nij->n', J, J) * np.einsum('nij,nij->n', J_inverse, J_inverse))
-    doubtful = np.flatnonzero(~(bound <= limit))
-    if not len(doubtful):
-        return
-    number = condition_number(geometry, np.nan_to_num(jacobians.J[doubtful], posinf=0, neginf=0))
+def _require_regular(inverse: Array) -> None:
+    singular = ~np.isfinite(inverse).all(axis=1)
+    if np.any(singular):
+        raise SingularityError(int(np.argmax(singular)), 'det [B] is 0',
+                               'the drives cannot hold the platform here')
+
+
+def _require_conditioning(
+    geometry: Geometry, chains: Array, inverse: Array, samples: np.ndarray, limit: float,
+) -> None:
+    A = np.concatenate((np.ones((len(chains), 3)), chains[:, 12:15]), axis=1)
+    number = condition_number(geometry, inverse.reshape(-1, 6, 6) * A[:, None, :])  # Eq. (11)
     over = ~(number <= limit)
     if np.any(over):
         worst = int(np.argmax(over))
         raise SingularityError(
-            int(doubtful[worst]), f'the condition number of the drive Jacobian is '
+            int(samples[worst]), f'the condition number of the drive Jacobian is '
             f'{number[worst]:.4g}', f'limits.condition_number is {limit:g}')

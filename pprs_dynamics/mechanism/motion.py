@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.errors import MotionError
+from pprs_dynamics.mechanism.arithmetic import sqrt
+from pprs_dynamics.mechanism.evaluation import evaluate_if_ready
 from pprs_dynamics.mechanism.robot import Array
-
-if TYPE_CHECKING:
-    from typing import Any
+from pprs_dynamics.mechanism.sample import rotation
 
 # A quaternion printed with three decimals is still accepted; a Euler triple with a 0 is not.
 UNIT_LENGTH_TOLERANCE = 1e-3
+QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
+              'linear_acceleration', 'angular_acceleration')
+WIDTHS = [3, 4, 3, 3, 3, 3]
+OTHERS = (0, 1, 2, *range(7, 19))  # columns that are not orientations
+_NONE = np.empty(0)
+FLOAT = np.dtype(np.float64)
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
 
-@dataclass(frozen=True, init=False, eq=False)
 class PlatformMotion:
-    """N samples of the motion of the platform's origin o, everything in `base`.
+    """N samples of the motion of the platform's origin o, everything in `base`. Not changeable.
 
     Parameters
     ----------
@@ -37,6 +42,11 @@ class PlatformMotion:
     time : (N,) array_like, optional
         Strictly increasing times [s]; needed by effects with memory.
 
+    Attributes
+    ----------
+    rows : (N, 19) array
+        All of it but the times, in the order of the parameters: what kernels take.
+
     Raises
     ------
     MotionError
@@ -44,44 +54,74 @@ class PlatformMotion:
         not strictly increase.
     """
 
-    position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
-    linear_acceleration: Array
-    angular_acceleration: Array
-    time: Array | None = None
+    rows: Array
+    time: Array | None
 
     def __init__(
         self, position: ArrayLike, orientation: ArrayLike, linear_velocity: ArrayLike,
         angular_velocity: ArrayLike, linear_acceleration: ArrayLike,
         angular_acceleration: ArrayLike, time: ArrayLike | None = None,
     ) -> None:
-        columns = {
-            'position': (position, 3), 'orientation': (orientation, 4),
-            'linear_velocity': (linear_velocity, 3), 'angular_velocity': (angular_velocity, 3),
-            'linear_acceleration': (linear_acceleration, 3),
-            'angular_acceleration': (angular_acceleration, 3)}
-        samples: int | None = None
-        for name, (value, width) in columns.items():
-            array = checked_matrix(name, value, width, samples)
-            samples = len(array)
-            object.__setattr__(self, name, array)
-        object.__setattr__(self, 'orientation', _normalised(self.orientation))
-        object.__setattr__(self, 'time', None if time is None else _times(time, len(self)))
+        columns = (position, orientation, linear_velocity, angular_velocity, linear_acceleration,
+                   angular_acceleration)
+        rows = _joined(columns)
+        if rows is None or evaluate_if_ready(_motion_kernel, _NONE, rows) >= 0:
+            rows = _checked(columns)
+        self.__dict__['rows'] = rows
+        self.__dict__['time'] = None if time is None else _times(time, len(rows))
+
+    def _set(self, rows: Array, time: Array | None) -> None:
+        self.__dict__['rows'] = rows
+        self.__dict__['time'] = time
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f'a PlatformMotion stays as it is: {name} was to be set')
 
     def __len__(self) -> int:
-        return len(self.position)
+        return len(self.rows)
 
     def __getitem__(self, index: Any) -> PlatformMotion:
         """Return the samples that `index` (slice, mask or indices) selects."""
         if isinstance(index, (int, np.integer)):
             index = range(len(self))[index]  # raises IndexError, and ends a loop
             index = slice(index, index + 1)
-        return PlatformMotion(
-            self.position[index], self.orientation[index], self.linear_velocity[index],
-            self.angular_velocity[index], self.linear_acceleration[index],
-            self.angular_acceleration[index], None if self.time is None else self.time[index])
+        rows = np.array(self.rows[index])
+        if not len(rows):
+            raise MotionError('position', f'its shape is {(0, 3)}',
+                              'be (N, 3) with N of at least 1', 'shape')
+        selected = object.__new__(PlatformMotion)
+        selected._set(rows, None if self.time is None else _times(self.time[index], len(rows)))
+        return selected
+
+    @cached_property
+    def position(self) -> Array:
+        """P [m], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 0:3])
+
+    @cached_property
+    def orientation(self) -> Array:
+        """Unit quaternions x, y, z, w, (N, 4)."""
+        return np.ascontiguousarray(self.rows[:, 3:7])
+
+    @cached_property
+    def linear_velocity(self) -> Array:
+        """v of o [m/s], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 7:10])
+
+    @cached_property
+    def angular_velocity(self) -> Array:
+        """omega [rad/s], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 10:13])
+
+    @cached_property
+    def linear_acceleration(self) -> Array:
+        """a_o [m/s^2], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 13:16])
+
+    @cached_property
+    def angular_acceleration(self) -> Array:
+        """epsilon [rad/s^2], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 16:19])
 
     def is_closed(self) -> bool:
         """Return whether it ends within 1 mm and 1 mrad of where it starts."""
@@ -92,9 +132,9 @@ class PlatformMotion:
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
         """Return the same motion with other times [s]."""
-        return PlatformMotion(
-            self.position, self.orientation, self.linear_velocity, self.angular_velocity,
-            self.linear_acceleration, self.angular_acceleration, time)
+        same = object.__new__(PlatformMotion)
+        same._set(self.rows, _times(time, len(self)))
+        return same
 
     def resampled(self, rate: float) -> PlatformMotion:
         """Return the motion at a constant rate.
@@ -123,12 +163,8 @@ class PlatformMotion:
     @cached_property
     def rotation(self) -> Array:
         """Rotation matrices from `platform` to `base`, (N, 3, 3)."""
-        x, y, z, w = self.orientation.T
-        return np.stack((
-            1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
-        ), axis=-1).reshape(-1, 3, 3)
+        columns = rotation(*self.orientation.T)
+        return np.stack([np.stack(column, axis=-1) for column in columns], axis=-1)
 
     @property
     def tilt(self) -> Array:
@@ -206,6 +242,41 @@ class PlatformMotion:
             path(moments), rotation.as_quat(), path.derivative(1)(moments),
             rotation.apply(turn(moments, 1)), path.derivative(2)(moments),
             rotation.apply(turn(moments, 2)), knots if at is None else None)
+
+
+def _joined(columns: Sequence[Any]) -> Array | None:
+    """Return columns as one table where they are floats of the right shapes, else None."""
+    try:
+        widths = [column.shape[1] for column in columns]
+        rows = np.concatenate(columns, axis=1)
+    except (AttributeError, IndexError, ValueError):
+        return None
+    right = widths == WIDTHS and type(rows) is np.ndarray and rows.dtype is FLOAT and len(rows)
+    return rows if right else None
+
+
+def _motion_kernel(p: Any, s: Any, rows: Any) -> Any:
+    """Normalise quaternions in place; return whether a sample needs no closer look."""
+    x, y, z, w = rows[s, 3], rows[s, 4], rows[s, 5], rows[s, 6]
+    length = sqrt(x * x + y * y + z * z + w * w)
+    rows[s, 3], rows[s, 4] = x / length, y / length
+    rows[s, 5], rows[s, 6] = z / length, w / length
+    everything = length
+    for column in OTHERS:
+        everything = everything + rows[s, column]
+    # 0 times infinity or NaN is NaN.
+    return (abs(length - 1.0) <= UNIT_LENGTH_TOLERANCE) & (everything * 0.0 == 0.0)
+
+
+def _checked(columns: Sequence[ArrayLike]) -> Array:
+    """Return columns as one table, or raise MotionError."""
+    samples: int | None = None
+    arrays = []
+    for name, value, width in zip(QUANTITIES, columns, WIDTHS, strict=True):
+        arrays.append(checked_matrix(name, value, width, samples))
+        samples = len(arrays[0])
+    arrays[1] = _normalised(arrays[1])
+    return np.concatenate(arrays, axis=1)
 
 
 def checked_matrix(

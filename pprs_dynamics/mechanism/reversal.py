@@ -8,10 +8,9 @@ a formula; here sgn(v) = tanh(v / v_rev), which is 0 at rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.mechanism.arithmetic import larger, tanh
 
 
 @dataclass(frozen=True)
@@ -30,15 +29,13 @@ class Reversal:
     rate: float = 0.001
 
 
-def smooth_sign(velocity: Array, reversal_velocity: float | Array) -> Array:
+def smooth_sign(velocity: Any, reversal_velocity: Any) -> Any:
     """Return sgn(v) as tanh(v / v_rev); a width per column of (N, D) velocities is allowed."""
-    sign: Array = np.tanh(velocity / reversal_velocity)
-    return sign
+    return tanh(velocity / reversal_velocity)
 
 
-def sign_over_speed(speed: Array, reversal_velocity: float) -> Array:
+def sign_over_speed(speed: Any, reversal_velocity: Any) -> Any:
     """Return tanh(s / v_rev) / s for s >= 0, with its limit 1 / v_rev at rest."""
     # Below 1e-8 the quotient equals its limit to rounding; dividing there would give 0 / 0.
-    safe = np.maximum(speed, 1e-8 * reversal_velocity)
-    quotient: Array = np.tanh(safe / reversal_velocity) / safe
-    return quotient
+    safe = larger(speed, 1e-8 * reversal_velocity)
+    return tanh(safe / reversal_velocity) / safe

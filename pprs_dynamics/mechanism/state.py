@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics, solve_inverse_kinematics
-from pprs_dynamics.mechanism.jacobians import Jacobians, compute_jacobians
+from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics, chain_table
+from pprs_dynamics.mechanism.jacobians import Jacobians, inverse_table
+from pprs_dynamics.mechanism.joint_rates import turnover_table
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.mechanism.rigid_body import RigidBody, StructureLoad, solve_inverse_dynamics
-from pprs_dynamics.mechanism.robot import DRIVES, Array, Robot
+from pprs_dynamics.mechanism.rigid_body import RigidBody, StructureLoad, solve_bodies
+from pprs_dynamics.mechanism.robot import DRIVES, Array, Geometry, Robot
 
 
 class DriveStates(Protocol):
@@ -48,7 +50,60 @@ class DriveStates(Protocol):
         """[N], (N, D)."""
 
 
-@dataclass(frozen=True)
+class Kinematics:
+    """What a motion does to a mechanism whatever its masses; solved where it is asked for.
+
+    Raises
+    ------
+    WorkspaceError, SingularityError
+        On first use, see `solve_inverse_kinematics` and `compute_jacobians`.
+    """
+
+    def __init__(
+        self, geometry: Geometry, motion: PlatformMotion, minimum_sine: float,
+        condition_limit: float,
+    ) -> None:
+        self.geometry, self.motion = geometry, motion
+        self.minimum_sine, self.condition_limit = minimum_sine, condition_limit
+
+    @cached_property
+    def chain_table(self) -> Array:
+        """Motion of the chains for kernels."""
+        return chain_table(self.geometry, self.motion, self.minimum_sine)
+
+    @cached_property
+    def inverse_table(self) -> Array:
+        """[B]^-1 for kernels, (N, 36)."""
+        return inverse_table(self.geometry, self.chain_table, self.condition_limit)
+
+    @cached_property
+    def chains(self) -> ChainKinematics:
+        """Motion of the chains."""
+        return ChainKinematics.from_table(self.chain_table)
+
+    @cached_property
+    def jacobians(self) -> Jacobians:
+        """Jacobians of the mechanism."""
+        return Jacobians(self.geometry, self.chains, self.inverse_table.reshape(-1, 6, 6))
+
+    def direction(self, width: float | tuple[float, ...]) -> Array:
+        """Return sgn of the drive velocities, (N, 6), turning over within widths [m/s]."""
+        return self._kept('direction', width, lambda: np.asarray(
+            smooth_sign(self.chains.velocity, np.asarray(width))))
+
+    def turnover(self, width: float) -> Array:
+        """Return sgn(s) / s of the joints C_i, then A_i, (N, 6), within `width` [rad/s]."""
+        return self._kept('turnover', width, lambda: turnover_table(self.chain_table, width))
+
+    def _kept(self, name: str, width: Any, found: Callable[[], Array]) -> Array:
+        kept: tuple[Any, Array] | None = self.__dict__.get(f'_{name}')
+        if kept is None or not np.array_equal(kept[0], width):
+            # The last one only: a fit tries many widths.
+            kept = self.__dict__[f'_{name}'] = (width, found())
+        return kept[1]
+
+
+@dataclass(frozen=True, eq=False)
 class MechanismState:
     """Motion, Jacobians and frictionless forces at N samples.
 
@@ -58,17 +113,40 @@ class MechanismState:
 
     robot: Robot
     motion: PlatformMotion
-    chains: ChainKinematics
-    jacobians: Jacobians
-    rigid_body: RigidBody
+    kinematics: Kinematics
     reversal: Reversal
     printed: bool = False
     load: StructureLoad | None = None
+
+    @classmethod
+    def unsolved(
+        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: Kinematics,
+    ) -> MechanismState:
+        """Return the state of other fields and these; in a fifth of the constructor's time."""
+        state = object.__new__(cls)
+        state.__dict__.update(fields, motion=motion, kinematics=kinematics)
+        return state
 
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
         return DRIVES
+
+    @property
+    def chains(self) -> ChainKinematics:
+        """Motion of drives and rods."""
+        return self.kinematics.chains
+
+    @property
+    def jacobians(self) -> Jacobians:
+        """Jacobians of the mechanism."""
+        return self.kinematics.jacobians
+
+    @cached_property
+    def rigid_body(self) -> RigidBody:
+        """Frictionless drive forces and reactions."""
+        return solve_bodies(self.robot, self.motion, self.kinematics.chain_table,
+                            self.kinematics.inverse_table, self.printed, self.load)
 
     @property
     def time(self) -> Array | None:
@@ -95,10 +173,10 @@ class MechanismState:
         """Normal forces on the drives' guides [N]."""
         return self.rigid_body.guide_load
 
-    @cached_property
+    @property
     def direction(self) -> Array:
         """sgn of the drive velocities, turning over within the reversal velocity."""
-        return smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
+        return self.kinematics.direction(self.reversal.velocity)
 
     def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
         """Return the same motion with other bodies, and with a load more.
@@ -109,9 +187,7 @@ class MechanismState:
             load = self.load
         elif self.load is not None:
             load = self.load + load
-        rigid_body = solve_inverse_dynamics(
-            robot, self.motion, self.chains, self.jacobians, printed=self.printed, load=load)
-        return replace(self, robot=robot, rigid_body=rigid_body, load=load)
+        return replace(self, robot=robot, load=load)
 
 
 def solve_mechanism(
@@ -125,8 +201,7 @@ def solve_mechanism(
     WorkspaceError, SingularityError
         See `solve_inverse_kinematics` and `compute_jacobians`.
     """
-    chains = solve_inverse_kinematics(robot.geometry, motion, minimum_sine)
-    jacobians = compute_jacobians(robot.geometry, chains, condition_limit)
-    rigid_body = solve_inverse_dynamics(robot, motion, chains, jacobians, printed=printed)
-    return MechanismState(robot, motion, chains, jacobians, rigid_body, reversal or Reversal(),
-                          printed)
+    kinematics = Kinematics(robot.geometry, motion, minimum_sine, condition_limit)
+    state = MechanismState(robot, motion, kinematics, reversal or Reversal(), printed)
+    _ = kinematics.inverse_table
+    return state

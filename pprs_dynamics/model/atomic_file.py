@@ -25,34 +25,39 @@ def write_text(path: str | PathLike[str], text: str) -> None:
     target = Path(path)
     try:
         content = text.encode('utf-8')
-        handle = _nameless(target.parent)
-        if handle is None:
+        if not _write_nameless(target, content):
             _write_named(target, content)
-            return
-        with os.fdopen(handle, 'wb') as file:
-            _fill(file.fileno(), content)
-            _give_name(file.fileno(), target)
     except OSError as error:
         raise UnreadableFileError(target, f'cannot be written: {error.strerror}') from None
 
 
-def _nameless(folder: Path) -> int | None:
-    """Open a file without a name, which a kill in mid-write leaves nothing of; None: not here."""
+def _write_nameless(target: Path, content: bytes) -> bool:
+    """Write by way of a file without a name, of which a kill in mid-write leaves nothing.
+
+    False where the file system or the system does not know such files; what else is wrong, the
+    other way will tell.
+    """
     flag = getattr(os, 'O_TMPFILE', None)
-    if flag is None or not os.path.isdir('/proc/self/fd'):
-        return None
+    if flag is None:
+        return False
     try:
-        return os.open(folder, flag | os.O_WRONLY, PERMISSIONS)
+        handle = os.open(target.parent, flag | os.O_WRONLY, PERMISSIONS)
     except OSError:
-        return None  # a file system without; what else is wrong the other way will tell
+        return False
+    with os.fdopen(handle, 'wb') as file:
+        _fill(file.fileno(), content)
+        return _give_name(file.fileno(), target)
 
 
-def _give_name(handle: int, target: Path) -> None:
+def _give_name(handle: int, target: Path) -> bool:
     name = f'.{target.name}.{uuid4().hex}'
     folder = os.open(target.parent, os.O_RDONLY)
     try:
-        # With a folder given, Python follows the link in /proc to the file itself.
-        os.link(f'/proc/self/fd/{handle}', name, dst_dir_fd=folder, follow_symlinks=True)
+        try:
+            # With a folder given, Python follows the link in /proc to the file itself.
+            os.link(f'/proc/self/fd/{handle}', name, dst_dir_fd=folder, follow_symlinks=True)
+        except OSError:
+            return False
         try:
             os.replace(name, target.name, src_dir_fd=folder, dst_dir_fd=folder)
         except OSError:
@@ -60,6 +65,7 @@ def _give_name(handle: int, target: Path) -> None:
             raise
         with suppress(OSError):
             os.fsync(folder)  # the new entry on the disk, too
+        return True
     finally:
         os.close(folder)
 

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
-from pprs_dynamics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.effects.effect import Effect
+from pprs_dynamics.effects.active_friction import ActiveFriction
+from pprs_dynamics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.effects.passive_friction import PassiveFriction, WholeMechanismFriction
 from pprs_dynamics.effects.structure_effect import BodyEffect
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.robot import DRIVES, Array, Robot
 from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
+from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
+from pprs_dynamics.model.keys import KEYS
 from pprs_dynamics.model.limits import Limits
+from pprs_dynamics.model.one_pass import OnePass
 
-RIGID_BODY = 'rigid_body'
+__all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
 
 
 @dataclass(frozen=True)
-class DriveForces:
+class DriveForces(Forces):
     """Drive forces of N samples.
 
     Parameters
@@ -38,53 +40,30 @@ class DriveForces:
         Drive motion, Jacobians, reactions: what the forces were computed from.
     """
 
-    total: Array
-    parts: dict[str, Array]
     mechanism: MechanismState
 
 
-class ModelState:
-    """What effects with memory keep between calls; made by `DriveModel.initial_state`."""
-
-    def __init__(self, memories: dict[str, Any]) -> None:
-        self.memories = memories
-
-    @property
-    def has_memory(self) -> bool:
-        """Whether any effect keeps anything."""
-        return any(memory is not None for memory in self.memories.values())
-
-    def copy(self) -> ModelState:
-        """Return an independent copy, to look ahead without advancing this one."""
-        return ModelState(copy.deepcopy(self.memories))
-
-
-@dataclass(frozen=True)
-class DriveModel:
+@dataclass(frozen=True, kw_only=True)
+class DriveModel(ForceModel):
     """The inverse dynamic model of a 3-PPRS with friction, Eq. (14): Q^m = sum of parts.
 
     Parameters
     ----------
     robot : Robot
-    effects : tuple of Effect
-        What acts beside the rigid body; the paper's friction comes first.
     limits : Limits
-    reversal : Reversal
     equations : {'corrected', 'printed'}
         'printed' takes (7), (12), (13) to the letter.
-    values : mapping
-        The flat keys and values that the model was built from, complete with defaults.
-    source : str
-        The file that it came from, if any.
+    effects, reversal, values, source
+        See `ForceModel`; the paper's friction comes first.
     """
 
+    title: ClassVar[str] = 'a 3-PPRS'
+    drives: ClassVar[tuple[str, ...]] = DRIVES
+    keys = KEYS
+
     robot: Robot
-    effects: tuple[Effect, ...]
     limits: Limits
-    reversal: Reversal
     equations: str = 'corrected'
-    values: Mapping[str, Any] = field(default_factory=dict)
-    source: str = ''
 
     @classmethod
     def load(cls, path: str | PathLike[str] = 'config/paper.yaml') -> DriveModel:
@@ -101,23 +80,18 @@ class DriveModel:
         UnreadableFileError
             Where the file does not exist or is not YAML.
         ModelError
-            For a key that is unknown, missing, of the wrong type or impossible.
+            For a key that is unknown, missing, of the wrong type or impossible, and for a single
+            axis, which `AxisModel.load` and `load_model` read.
         """
-        from pprs_dynamics.model.model_file import load_model
+        from pprs_dynamics.model.model_file import build_robot, find_file, read_parameters
 
-        return load_model(path)
+        file = find_file(path)
+        return build_robot(read_parameters(file), source=str(file))
 
-    def initial_state(self) -> ModelState:
-        """Return a fresh state for effects with memory."""
-        return ModelState({effect.name: effect.initial_memory() for effect in self.effects})
-
-    def continued_state(self, model: DriveModel, state: ModelState) -> ModelState:
-        """Return a state that goes on from another model's for the effects that both have."""
-        fresh = self.initial_state()
-        for effect in self.effects:
-            if effect in model.effects:
-                fresh.memories[effect.name] = copy.deepcopy(state.memories[effect.name])
-        return fresh
+    @classmethod
+    def offers(cls, effect: type[CatalogueEffect]) -> bool:
+        """Return True: the catalogue is that of this robot."""
+        return True
 
     def mechanism(self, motion: PlatformMotion) -> MechanismState:
         """Return drive motion, Jacobians and frictionless forces for a platform motion.
@@ -154,61 +128,62 @@ class DriveModel:
             See `mechanism`. Strokes and efforts are not checked here: `limits` does that, so
             that recordings beyond them can still be compared.
         """
-        return self.forces_at(self.mechanism(motion), state)
+        one_pass = self._one_pass
+        forces = None if one_pass is None else one_pass.forces(motion)
+        if one_pass is None or forces is None:
+            return self.forces_at(self.mechanism(motion), state)
+        total, body, active, passive = forces
+        parts = {RIGID_BODY: body, ActiveFriction.name: active, PassiveFriction.name: passive}
+        mechanism, added = one_pass.mechanism(motion), self.effects[2:]
+        if not added:
+            return DriveForces(total, parts, mechanism)
+        return self._with_effects(added, parts, mechanism, state)
+
+    @cached_property
+    def _one_pass(self) -> OnePass | None:
+        """The paper's model in one pass, where no effect changes the bodies that it is of."""
+        match self.effects:
+            case (ActiveFriction() as active, WholeMechanismFriction() as passive, *added):
+                if not any(isinstance(effect, BodyEffect) for effect in added):
+                    return OnePass(self.robot, active, passive, self.limits, self.reversal,
+                                   self.equations == 'printed')
+        return None
 
     def forces_at(
         self, mechanism: MechanismState, state: ModelState | None = None,
     ) -> DriveForces:
         """Return the forces at a solved state of the mechanism; see `drive_forces`."""
         parts = {RIGID_BODY: mechanism.rigid_body.force}
+        return self._with_effects(self.effects, parts, mechanism, state)
+
+    def _with_effects(
+        self, effects: tuple[Effect, ...], parts: dict[str, Array], mechanism: MechanismState,
+        state: ModelState | None,
+    ) -> DriveForces:
+        """Return the forces of parts that are there and of effects."""
         state = self.initial_state() if state is None else state
         for effect in self.effects:
             effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             # Bodies and what acts on them change the loads that friction follows: they go first.
-            for effect in self.effects:
+            for effect in effects:
                 if isinstance(effect, BodyEffect):
                     loaded = effect.apply(mechanism)
                     parts[effect.name] = loaded.rigid_body.force - mechanism.rigid_body.force
                     mechanism = loaded
-            for effect in self.effects:
+            for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
             total: Array = np.sum(list(parts.values()), axis=0)                # Eq. (14)
         return DriveForces(total, parts, mechanism)
 
-    def measured(self, forces: DriveForces, state: ModelState | None = None) -> DriveForces:
-        """Return what the sensors say where the drives apply `forces`.
-
-        Effects of measurement become parts of their own; without any, `forces` are returned.
-
-        Parameters
-        ----------
-        forces : DriveForces
-            Consecutive samples with times, of `drive_forces`.
-        state : ModelState, optional
-            As there.
-        """
-        sensors = [effect for effect in self.effects if effect.is_measurement]
-        if not sensors:
-            return forces
-        mechanism, parts, total = forces.mechanism, dict(forces.parts), forces.total
-        state = self.initial_state() if state is None else state
-        for effect in sensors:
-            memory = state.memories[effect.name]
-            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
-                     if isinstance(effect, MeasurementEffect)
-                     else total + effect.force(mechanism, memory))
-            parts[effect.name], total = after - total, after
-        return DriveForces(total, parts, mechanism)
-
-    @property
-    def position_error(self) -> Array:
-        """What must be taken off measured drive positions [m], (6,)."""
-        errors = [effect.position_error(DRIVES) for effect in self.effects
-                  if isinstance(effect, MeasurementEffect)]
-        total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(DRIVES))
-        return total
+    def variables(self, state: MechanismState) -> dict[str, Array]:
+        """Return loads of the guides, rod angles, and where the platform is."""
+        motion = state.motion
+        x, y, z = motion.position.T
+        return {'load': state.guide_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
+                'platform_x': x, 'platform_y': y, 'platform_z': z,
+                'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
 
     def condition_number(self, motion: PlatformMotion) -> Array:
         """Return the condition number of the drive Jacobian, rotations times r, (N,).

@@ -6,6 +6,7 @@ The file loader, the nodes' parameter descriptors and the documentation read thi
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -140,6 +141,29 @@ KEYS: dict[str, Key] = {key.name: key for key in (
     Key('limits.rod_cosine', 'smallest |cos u_i| for independent_chains', positive=True,
         upper=0.5, default=0.05),
 )}
+
+# A single axis: one prismatic drive, as on a bench.
+AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
+    Key('axis.mass', 'M, all that the drive moves, rotor and screw included', 'kg',
+        positive=True),
+    Key('axis.viscous', 'F_v, viscous friction', 'N s/m', lower=0),
+    Key('axis.coulomb', 'F_c, dry friction', 'N', lower=0),
+    Key('axis.offset', 'constant force beside weight and friction', 'N', default=0.0),
+    Key('axis.gravity', 'gravity along the positive direction: -9.81 where that is up', 'm/s^2',
+        default=0.0),
+    Key('friction.reversal_velocity', 'width in which sgn turns over', 'm/s', positive=True),
+)}
+
+
+def is_axis(names: Iterable[str]) -> bool:
+    """Return whether keys are those of a single axis, not of a 3-PPRS."""
+    return any(name.startswith('axis.') for name in names)
+
+
+def keys_of(names: Iterable[str]) -> dict[str, Key]:
+    """Return the keys of the kind of model that some of its keys belong to."""
+    return AXIS_KEYS if is_axis(names) else KEYS
+
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.
 NODE_KEYS = frozenset({

@@ -1,11 +1,10 @@
-"""Model files: YAML that is also a ROS 2 parameter file -> DriveModel.
+"""Model files: YAML that is also a ROS 2 parameter file -> DriveModel or AxisModel.
 
 The same `build_model` serves files and the nodes' parameters: both are flat keys and values.
 """
 
 from __future__ import annotations
 
-import difflib
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,8 +15,8 @@ from typing import Any
 import yaml
 
 from pprs_dynamics.effects.active_friction import ActiveFriction
-from pprs_dynamics.effects.catalogue import catalogue, find_effect
-from pprs_dynamics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.effects.effect import Effect
 from pprs_dynamics.effects.passive_friction import (
     IndependentChainsFriction,
     JointFriction,
@@ -28,14 +27,20 @@ from pprs_dynamics.effects.structure_effect import BodyEffect
 from pprs_dynamics.errors import MISSING, ModelError, UnreadableFileError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.robot import Geometry, Masses, Robot
+from pprs_dynamics.model.axis_model import AxisModel
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import KEYS, NODE_KEYS, NODE_PREFIXES
+from pprs_dynamics.model.effects_block import ADDED, added_effects, check_tolerances, suggestion
+from pprs_dynamics.model.keys import (
+    AXIS_KEYS,
+    KEYS,
+    NODE_KEYS,
+    NODE_PREFIXES,
+    is_axis,
+    keys_of,
+)
 from pprs_dynamics.model.limits import Limits
 
 DEFAULT_MODEL = 'config/paper.yaml'
-# Blocks whose keys are not listed one by one.
-LISTS = ('effects.active', 'effects.measured')
-ADDED = ('effects.', 'tolerances.', 'history.')
 
 
 def find_file(path: str | PathLike[str]) -> Path:
@@ -61,8 +66,8 @@ def find_file(path: str | PathLike[str]) -> Path:
     raise UnreadableFileError(path, 'no such file, nor one of that name in the package')
 
 
-def load_model(path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel:
-    """Read a model file; see `DriveModel.load`."""
+def load_model(path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel | AxisModel:
+    """Read a model file of either kind; see `DriveModel.load`."""
     file = find_file(path)
     return build_model(read_parameters(file), source=str(file))
 
@@ -115,13 +120,14 @@ def other_nodes(text: str) -> dict[str, Any]:
             if block['ros__parameters'] is not chosen}
 
 
-def build_model(parameters: Mapping[str, Any], source: str = '') -> DriveModel:
+def build_model(parameters: Mapping[str, Any], source: str = '') -> DriveModel | AxisModel:
     """Build the model from flat keys and values, each checked.
 
     Parameters
     ----------
     parameters : mapping
-        E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored.
+        E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored. With keys of `axis`
+        it is a single axis.
     source : str
         Named in errors.
 
@@ -131,11 +137,27 @@ def build_model(parameters: Mapping[str, Any], source: str = '') -> DriveModel:
         For a key that is unknown, missing, of the wrong type or impossible.
     """
     try:
-        return _build(parameters, source)
+        return (_build_axis if is_axis(parameters) else _build_robot)(parameters, source)
     except ModelError as error:
         if error.source:
             raise
         raise ModelError(error.key, error.value, error.rule, source) from None
+
+
+def build_robot(parameters: Mapping[str, Any], source: str = '') -> DriveModel:
+    """Build the model of a 3-PPRS; a single axis is refused.
+
+    Raises
+    ------
+    ModelError
+        As `build_model`.
+    """
+    model = build_model(parameters, source)
+    if isinstance(model, AxisModel):
+        key = next(name for name in parameters if is_axis((name,)))
+        raise ModelError(key, parameters[key], 'not be there: this needs a 3-PPRS, and a single '
+                         'axis is for pprs compare, diagnose, adopt and history', source)
+    return model
 
 
 def default_parameters() -> dict[str, Any]:
@@ -143,20 +165,38 @@ def default_parameters() -> dict[str, Any]:
     return read_parameters(find_file(DEFAULT_MODEL))
 
 
-def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
+def _checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of all keys, complete with defaults, and the added blocks as given."""
     values: dict[str, Any] = {}
+    keys = keys_of(parameters)
     _require_known(parameters)
-    for name, key in KEYS.items():
+    for name, key in keys.items():
         if name in parameters:
             values[name] = key.check(parameters[name])
         elif key.default is None:
             raise ModelError(name, MISSING, key.rule)
         else:
             values[name] = key.default
+    check_tolerances(parameters, keys)
+    return {**values, **{name: value for name, value in parameters.items()
+                         if name.startswith(ADDED)}}
+
+
+def _build_axis(parameters: Mapping[str, Any], source: str) -> AxisModel:
+    values = _checked_values(parameters)
+    friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])
+    return AxisModel(
+        mass=values['axis.mass'], gravity=values['axis.gravity'],
+        effects=(friction, AxisOffset(values['axis.offset']),
+                 *added_effects(parameters, AxisModel)),
+        reversal=Reversal(values['friction.reversal_velocity']), values=values, source=source)
+
+
+def _build_robot(parameters: Mapping[str, Any], source: str) -> DriveModel:
+    values = _checked_values(parameters)
     for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
         if not values[stroke][0] < values[stroke][1]:
             raise ModelError(stroke, values[stroke], 'be a lower and a higher position [m]')
-    _check_tolerances(parameters)
 
     def group(prefix: str) -> dict[str, Any]:
         return {name.removeprefix(prefix): value for name, value in values.items()
@@ -172,15 +212,13 @@ def _build(parameters: Mapping[str, Any], source: str) -> DriveModel:
         passive = WholeMechanismFriction(*joints, printed)
     else:
         passive = IndependentChainsFriction(*joints, printed, limits.rod_cosine)
-    effects = (ActiveFriction(**group('friction.drives.')), passive, *_added_effects(parameters))
+    effects = (ActiveFriction(**group('friction.drives.')), passive,
+               *added_effects(parameters, DriveModel))
     _require_bodies(robot, effects)
-    for name, value in parameters.items():
-        if name.startswith(ADDED):
-            values[name] = value
     return DriveModel(
-        robot, effects, limits,
-        Reversal(_reversal_velocity(values), values['friction.reversal_rate']),
-        values['equations'], values, source)
+        robot=robot, effects=effects, limits=limits,
+        reversal=Reversal(_reversal_velocity(values), values['friction.reversal_rate']),
+        equations=values['equations'], values=values, source=source)
 
 
 def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
@@ -188,45 +226,6 @@ def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
     common: float = values['friction.reversal_velocity']
     own: tuple[float, ...] = values['friction.reversal_velocities']
     return tuple(one or common for one in own) if any(own) else common
-
-
-def _added_effects(parameters: Mapping[str, Any]) -> Iterator[CatalogueEffect]:
-    active = parameters.get('effects.active', [])
-    if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
-        raise ModelError('effects.active', active, 'be a list of names of effects')
-    if len(set(active)) < len(active):
-        raise ModelError('effects.active', list(active), 'name each effect once')
-    for name in active:
-        if find_effect(name) is None:
-            raise ModelError('effects.active', list(active), f'name known effects, not {name!r}'
-                             + _suggestion(name, catalogue()) + f': {", ".join(catalogue())}')
-    blocks = _nested('effects', {key: value for key, value in parameters.items()
-                                 if key.startswith('effects.') and key not in LISTS})
-    of_sensors = _effects_of_sensors(parameters)
-    for name, block in blocks.items():
-        kind = find_effect(name)
-        if kind is None:
-            raise ModelError(f'effects.{name}', block, 'belong to a known effect'
-                             + _suggestion(name, catalogue()) + f': {", ".join(catalogue())}')
-        # A block that is not active is checked all the same, but may still be incomplete.
-        effect = kind.from_file(block, complete=name in active)
-        if name in active:
-            if name in of_sensors:
-                effect.is_measurement = True
-            yield effect
-    missing = [name for name in active if name not in blocks]
-    if missing:
-        raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
-
-
-def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
-    names = parameters.get('effects.measured', [])
-    if not isinstance(names, (list, tuple)) or not all(
-            isinstance(name, str) and (kind := find_effect(name)) is not None
-            and kind.may_be_measurement for name in names):
-        raise ModelError('effects.measured', names, "be a list of effects that may be a sensor's:"
-                         ' effort_offset')
-    return list(names)
 
 
 def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:
@@ -239,32 +238,26 @@ def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:
                                  'leave masses greater than 0')
 
 
-def _check_tolerances(parameters: Mapping[str, Any]) -> None:
-    for name, value in parameters.items():
-        target = name.removeprefix('tolerances.')
-        if target == name:
-            continue
-        if target not in KEYS or KEYS[target].choices:
-            raise ModelError(name, value, 'name a number of the model'
-                             + _suggestion(target, KEYS))
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
-            raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
-
-
 def _require_known(parameters: Mapping[str, Any]) -> None:
+    keys = keys_of(parameters)
     for name, value in parameters.items():
         block = name.split('.')[0]
         if name == block and value in (None, {}) and any(
-                key.startswith(f'{block}.') for key in (*KEYS, *ADDED)):
+                key.startswith(f'{block}.') for key in (*keys, *ADDED)):
             continue  # a block that somebody left empty says nothing
-        if not is_known(name):
+        if name not in keys and not _is_for_others(name):
             raise ModelError(name, value, 'not be there: no such key'
-                             + _suggestion(name, (*KEYS, *NODE_KEYS)))
+                             + suggestion(name, (*keys, *NODE_KEYS)))
 
 
 def is_known(name: str) -> bool:
     """Return whether a model file may hold a key of that name."""
-    return (name in KEYS or name in NODE_KEYS or name.startswith((*NODE_PREFIXES, *ADDED)))
+    return name in KEYS or name in AXIS_KEYS or _is_for_others(name)
+
+
+def _is_for_others(name: str) -> bool:
+    """Return whether a key is a node's, or of a block whose keys are not listed one by one."""
+    return name in NODE_KEYS or name.startswith((*NODE_PREFIXES, *ADDED))
 
 
 def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
@@ -279,7 +272,7 @@ def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
     if '/**' in blocks:
         for node, block in blocks.items():
             for key, _ in _flatten(block) if node != '/**' else ():
-                if key in KEYS or key.startswith(ADDED):
+                if key in KEYS or key in AXIS_KEYS or key.startswith(ADDED):
                     raise UnreadableFileError(
                         path, f'{key} of the model stands under {node}: put it under /**, for '
                         'every node and command alike')
@@ -296,27 +289,6 @@ def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, 
             yield from _flatten(value, f'{prefix}{key}.')
         else:
             yield f'{prefix}{key}', value
-
-
-def _nested(root: str, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tree below `root`; a name cannot be a value and a block at once."""
-    tree: dict[str, Any] = {}
-    for name, value in flat.items():
-        *folders, leaf = name.removeprefix(f'{root}.').split('.')
-        branch = tree
-        for folder in folders:
-            branch = branch.setdefault(folder, {})
-            if not isinstance(branch, dict):
-                raise ModelError(name, value, f'not stand below {folder}, which has a value')
-        if isinstance(branch.get(leaf), dict):
-            raise ModelError(name, value, 'not be a value: keys stand below it')
-        branch[leaf] = value
-    return tree
-
-
-def _suggestion(name: str, known: Any) -> str:
-    close = difflib.get_close_matches(name, list(known), 1)
-    return f' (did you mean {close[0]}?)' if close else ''
 
 
 def _one_line(error: Exception) -> str:

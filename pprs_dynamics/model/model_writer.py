@@ -22,7 +22,7 @@ from pprs_dynamics.effects.catalogue import find_effect
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.atomic_file import write_text
-from pprs_dynamics.model.keys import KEYS
+from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, keys_of
 from pprs_dynamics.model.model_file import (
     build_model,
     other_nodes,
@@ -76,8 +76,10 @@ def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> No
 
 def kept_parameters(base: str | PathLike[str]) -> dict[str, Any]:
     """Return what a model file holds and a model does not: the keys of nodes."""
-    return {key: value for key, value in read_parameters(base).items()
-            if key not in KEYS and key.split('.')[0] not in (*WRITTEN, 'tolerances')}
+    parameters = read_parameters(base)
+    keys = keys_of(parameters)
+    return {key: value for key, value in parameters.items()
+            if key not in keys and key.split('.')[0] not in (*WRITTEN, 'tolerances')}
 
 
 def format_model(values: Mapping[str, Any]) -> str:
@@ -89,7 +91,7 @@ def format_model(values: Mapping[str, Any]) -> str:
         For values that are no model.
     """
     build_model(values)
-    ordered = {key: values[key] for key in KEYS if key in values}
+    ordered = {key: values[key] for key in keys_of(values) if key in values}
     ordered.update((key, value) for key, value in values.items() if key not in ordered
                    and not key.startswith(tuple(f'{block}.' for block in WRITTEN)))
     lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH),
@@ -115,8 +117,9 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
     """
     build_model(values)
     old = parse_parameters(text)
+    keys = keys_of(values)
     wanted = {key: value for key, value in values.items()
-              if key in old or key not in KEYS or _listed(value) != _listed(KEYS[key].default)}
+              if key in old or key not in keys or _listed(value) != _listed(keys[key].default)}
     try:
         edited = _edited(text, old, wanted)
         if _same(parse_parameters(edited), wanted):
@@ -217,12 +220,18 @@ def _written_blocks(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)
 
 
 def _rank(key: str, active: Sequence[str]) -> tuple[int, ...]:
-    """Return where a key of the written blocks stands: lists, effects as added, drives in order."""
+    """Return where a key of the written blocks stands: effects as added, drives in order.
+
+    `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
+    and a node takes no effect whose parameters it does not have.
+    """
     block, name, *rest = key.split('.')
-    if block != 'effects' or not rest:
-        return (0,)
+    if block != 'effects':
+        return (2,)
+    if not rest:
+        return (1,)
     order = active.index(name) if name in active else len(active)
-    return (1, order, DRIVES.index(rest[0]) if rest[0] in DRIVES else -1)
+    return (0, order, DRIVES.index(rest[0]) if rest[0] in DRIVES else -1)
 
 
 def _lines(values: Mapping[str, Any], depth: int, prefix: str = '') -> list[str]:
@@ -247,9 +256,9 @@ def _lines(values: Mapping[str, Any], depth: int, prefix: str = '') -> list[str]
 
 
 def _comment(key: str) -> str:
-    if key in KEYS:
-        unit = f' [{KEYS[key].unit}]' if KEYS[key].unit else ''
-        return KEYS[key].description + unit
+    known = KEYS.get(key) or AXIS_KEYS.get(key)
+    if known is not None:
+        return known.description + (f' [{known.unit}]' if known.unit else '')
     block, _, rest = key.partition('.')
     effect = find_effect(rest.partition('.')[0]) if block == 'effects' else None
     for parameter in effect.parameters if effect else ():

@@ -13,12 +13,15 @@ from pprs_dynamics.report.figures import BLUE, GREY, RED, finish, pyplot_module,
 from pprs_dynamics.report.page import plotly_objects
 
 
-def _levels(steps: Sequence[Step]) -> tuple[list[str], list[float], list[float], list[float]]:
-    """Return labels, errors on recordings and on held-out data, and noise, [N]."""
+def _levels(steps: Sequence[Step]) -> tuple[list[str], list[float], list[float], float]:
+    """Return labels, errors on recordings and on held-out data, and the noise, [N].
+
+    What a fit leaves is noise only once nothing is missing: the least of all steps is nearest.
+    """
     labels = ['before', *(f'{number}. {step.effect}' for number, step in enumerate(steps, 1))]
     return (labels, [steps[0].error_before, *(step.error_after for step in steps)],
             [steps[0].held_out_before, *(step.held_out_after for step in steps)],
-            [steps[0].noise_floor, *(step.noise_floor for step in steps)])
+            min(step.noise_floor for step in steps))
 
 
 def falling_error(steps: Sequence[Step]) -> Any:
@@ -27,9 +30,9 @@ def falling_error(steps: Sequence[Step]) -> Any:
     labels, fitted, held, noise = _levels(steps)
     figure = go.Figure([
         go.Bar(x=labels, y=fitted, name='recordings', marker={'color': BLUE}),
-        go.Bar(x=labels, y=held, name='held out', marker={'color': RED}),
-        go.Scatter(x=labels, y=noise, name='noise', mode='lines',
-                   line={'color': GREY, 'dash': 'dash', 'width': 1.5})])
+        go.Bar(x=labels, y=held, name='held out', marker={'color': RED})])
+    figure.add_hline(y=noise, line={'color': GREY, 'dash': 'dash', 'width': 1.5},
+                     annotation={'text': f'noise {noise:.3g}'})
     figure.update_layout(template='plotly_white', height=380, barmode='group',
                          yaxis={'title': 'error, rms [N]', 'rangemode': 'tozero'},
                          margin={'l': 60, 'r': 20, 't': 30, 'b': 45})
@@ -62,7 +65,7 @@ def draw_history(path: str | PathLike[str], steps: Sequence[Step]) -> Path:
         places = range(len(labels))
         axis.bar([place - 0.2 for place in places], fitted, 0.4, color=BLUE, label='recordings')
         axis.bar([place + 0.2 for place in places], held, 0.4, color=RED, label='held out')
-        axis.plot(places, noise, '--', color=GREY, label='noise')
+        axis.axhline(noise, ls='--', color=GREY, label=f'noise {noise:.3g}')
         axis.set_xticks(list(places), labels, rotation=20, ha='right')
     axis.set(ylabel='error, rms [N]', title='Error of the model as effects were added')
     finish(axis)

@@ -22,7 +22,7 @@ def history_page(name: str, steps: Sequence[Step]) -> Page:
     first, last = steps[0], steps[-1]
     page.text(f'{len(steps)} step{"s" * (len(steps) > 1)}: the error fell from '
               f'{first.error_before:.4g} to {last.error_after:.4g} N; noise leaves '
-              f'{last.noise_floor:.4g} N.', 'lead')
+              f'{min(step.noise_floor for step in steps):.4g} N.', 'lead')
     page.table(HEADINGS, step_rows(steps))
     page.heading('The error falls')
     page.figure(falling_error(steps))

@@ -37,7 +37,7 @@ def held_out(step: Step) -> str:
 def details(step: Step) -> list[str]:
     """Return what a step was made from, in sentences."""
     values = [f'{name} = {value:.5g}' + ('' if std >= NOT_KNOWN else f' ± {2 * std:.2g}')
-              + f' {unit}'
+              + f' {unit}' * (unit != '1')
               for name, value, std, unit in zip(step.parameters, step.values, step.std,
                                                 step.units, strict=False) if value]
     spans = [f'{name} ({last - first:.1f} s, sha256 {digest[:12]}…)'
@@ -45,7 +45,8 @@ def details(step: Step) -> list[str]:
                  step.recordings, step.sha256, step.spans[::2], step.spans[1::2], strict=False)]
     found = [', '.join(values), f'from {", ".join(spans)}; {step.date}, version {step.version}']
     if step.calibrated:
-        found.append(f'moved within their tolerances: {", ".join(step.calibrated)}')
+        found.append(f'{len(step.calibrated)} numbers of the model moved within their tolerances, '
+                     'the file holds which')
     if step.rivals:
         found.append(f'{", ".join(step.rivals)} would explain the recordings as well')
     if step.forced:
@@ -72,8 +73,8 @@ def _parts(steps: Sequence[Step]) -> Iterator[Any]:
         table.add_row(f'{number}', escape(f'+ {step.effect}{on}{again}'),
                       f'{step.error_after:.4f}', f'{step.held_out_after:.4f}',
                       _bar(step.error_after, largest, 'green'))
-    table.add_row('', 'noise', f'{steps[-1].noise_floor:.4f}', '',
-                  _bar(steps[-1].noise_floor, largest, 'white'))
+    noise = min(step.noise_floor for step in steps)
+    table.add_row('', 'noise', f'{noise:.4f}', '', _bar(noise, largest, 'white'))
     yield table
     for number, step in enumerate(steps, start=1):
         yield f'[bold]{number}. {escape(step.effect)}[/]'

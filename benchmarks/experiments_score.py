@@ -1,0 +1,223 @@
+"""Does the designed motion settle what a recording leaves open? Beside a random one and a repeat.
+
+    python benchmarks/experiments_score.py --seeds 10 --file experiments.jsonl
+    python benchmarks/experiments_score.py --table experiments.jsonl
+
+A robot with a hidden effect, numbers off within the model file's tolerances and noisy sensors
+makes a short slow recording, weaker and weaker until the diagnosis is ambiguous with the truth
+among the candidates. Then one run of 20 s is added: the designed one, a random one that uses the
+same limits, or the old motion repeated for as long. Settled is a diagnosis of both together that
+names the truth, holds nothing against it and adopts nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hidden_recordings import noise_settings, tolerant_model
+from hidden_strength import changed_values, tolerated_numbers
+
+from pprs_dynamics import PlatformMotion
+from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.experiments.motion_limits import MotionLimits
+from pprs_dynamics.experiments.next_experiment import experiment_of
+from pprs_dynamics.experiments.question import question_of
+from pprs_dynamics.experiments.trajectory_search import TrajectorySearch
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.simulation.driven_motion import DrivenMotion
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.plant import PlantSettings
+from pprs_dynamics.simulation.prescribed import PrescribedPlant
+from pprs_dynamics.simulation.run import DriveReference, simulate
+from pprs_dynamics.simulation.sensors import EffortNoise
+
+EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'rod_mass',
+           'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
+           'load_friction', 'viscous_friction', 'quadratic_friction', 'platform_drag',
+           'revolute_friction', 'revolute_stiffness', 'drive_inertia', 'platform_inertia')
+RATE, TOLERANCE, NOISE, CORRELATION = 250.0, 0.04, 0.08, 0.81
+OLD, NEW = 10.0, 20.0  # [s]
+SCALES = (1.0, 0.6, 0.35, 0.2)  # of the effect as drawn, until it is ambiguous
+SLOW = {'amplitude': 0.025, 'tilt': 0.05, 'highest_frequency': 0.25}
+
+
+class HiddenRobot:
+    """A robot with one hidden effect.
+
+    Parameters
+    ----------
+    name : str
+    seed : int
+    scale : float
+    """
+
+    def __init__(self, name: str, seed: int, scale: float) -> None:
+        self.model = tolerant_model(TOLERANCE)
+        rng = np.random.default_rng((seed, 2))
+        values: dict[str, Any] = dict(self.model.values)
+        for key, index in tolerated_numbers(self.model.values):
+            values = changed_values(values, key, index, 1 + TOLERANCE * rng.uniform(-1, 1))
+        self.values, self.name, self.seed, self.scale = values, name, seed, scale
+
+    def effect(self) -> HiddenEffect:
+        """Return the effect, afresh."""
+        return draw_effect(self.name, np.random.default_rng((self.seed, 3)), self.scale)
+
+    def record(self, motion: PlatformMotion, run: int) -> Recording:
+        """Return a recording of a motion; `run` seeds its noise."""
+        drives = self.model.mechanism(motion)
+        driven = DrivenMotion.of_drives(self.model.values, motion.time, drives.position,
+                                        drives.velocity, drives.acceleration)
+        read = PrescribedPlant(self.values, driven, PlantSettings(actual_loads=True)).readings(
+            [self.effect()])
+        settings = noise_settings(CORRELATION, NOISE)
+        noise = EffortNoise(settings, np.random.default_rng((self.seed, 4, run))).samples(
+            len(motion))
+        return Recording.from_arrays(f'run {run}', driven.time,
+                                     settings.quantised(read.position), None, read.effort + noise)
+
+    def follow(self, motion: PlatformMotion, limits: MotionLimits) -> dict[str, float]:
+        """Return the largest use of each limit by a simulated robot that follows a motion.
+
+        Without margins: 1 is the limit itself.
+        """
+        forces = self.model.drive_forces(motion)
+        state = forces.mechanism
+        run = simulate(_Values(self.values), DriveReference(
+            state.position, state.velocity, forces.total), [self.effect()], seed=self.seed,
+            rate=RATE)
+        truth = run.truth
+        lower, upper = self.model.limits.strokes
+        return {'stroke': float(np.max(np.abs(2 * truth.position - lower - upper)
+                                       / (upper - lower))),
+                'velocity': float(np.abs(truth.velocity).max() / limits.velocity),
+                'acceleration': float(np.abs(truth.acceleration).max() / limits.acceleration),
+                'effort': float(np.max(np.abs(truth.effort) / self.model.limits.efforts)),
+                'tilt': float(run.platform_motion().tilt.max() / limits.tilt)}
+
+
+class _Values:
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.values = values
+
+
+def times(duration: float) -> np.ndarray:
+    """Return the sampling times of a motion."""
+    return np.arange(round(duration * RATE)) / RATE
+
+
+def ambiguous_start(name: str, seed: int) -> tuple[HiddenRobot, Recording, Any] | None:
+    """Return a robot, its recording and the open question, or None."""
+    motion = Excitation(duration=OLD, seed=seed, **SLOW).motion(times(OLD))
+    for scale in SCALES:
+        robot = HiddenRobot(name, seed, scale)
+        old = robot.record(motion, 0)
+        question = question_of(robot.model, [old], lambda share: None)
+        pairs = {one for c in question.contests for one in (c.truth.name, c.rival.name)}
+        if name in pairs:
+            return robot, old, question
+        if not question.subjects or question.kind == 'excite':
+            return None
+    return None
+
+
+def verdict(robot: HiddenRobot, recordings: list[Recording]) -> str:
+    """Return settled, open or wrong."""
+    found = diagnose(robot.model, recordings)
+    names = {effect.name for effect in found.effects}
+    held = {one for group in found.indistinguishable for one in group}
+    if names == {robot.name} and robot.name not in held:
+        return 'settled'
+    return 'open' if robot.name in held | names or not names else 'wrong'
+
+
+def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
+    """Return how one case goes."""
+    start = ambiguous_start(name, seed)
+    if start is None:
+        return None
+    robot, old, question = start
+    limits = MotionLimits(effort_reserve=4 * question.noise_floor)
+    search = TrajectorySearch(question, limits, NEW, seed)
+    cpu, wall = time.process_time(), time.perf_counter()
+    found = search.run()
+    cost = {'design_cpu': time.process_time() - cpu, 'design_wall': time.perf_counter() - wall}
+    random = TrajectorySearch(question, limits, NEW, seed + 1000).screen(draws=1)[0].path
+    experiment = experiment_of(question, found)
+    result: dict[str, Any] = {
+        'effect': name, 'seed': seed, 'scale': robot.scale,
+        'rivals': sorted({one for c in question.contests
+                          for one in (c.truth.name, c.rival.name)} - {name}),
+        'promised': [list(pair) for pair in experiment.separates],
+        'probability': min((b.probability for b in experiment.bouts if b.truth == name),
+                           default=1.0),
+        'expected_evidence': experiment.expected_evidence,
+        'largest_use': max(experiment.limits.values()), **cost}
+    grid = times(NEW)
+    result['designed'] = verdict(robot, [old, robot.record(found.path.motion(grid), 1)])
+    result['random'] = verdict(robot, [old, robot.record(random.motion(grid), 2)])
+    again = Excitation(duration=OLD, seed=seed, **SLOW).motion(times(OLD))
+    result['repeat'] = verdict(robot, [old, robot.record(again, 3), robot.record(again, 4)])
+    if follow:
+        result['followed'] = robot.follow(found.path.motion(grid), limits)
+    return result
+
+
+def table(rows: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield the lines of a table."""
+    yield '| hidden | with it in the set | runs | designed | random | repeated |'
+    yield '|---|---|---|---|---|---|'
+    for name in [*dict.fromkeys(row['effect'] for row in rows), 'all']:
+        some = [row for row in rows if name in (row['effect'], 'all')]
+        rivals = sorted({rival for row in some for rival in row['rivals']})
+        counts = [sum(row[how] == 'settled' for row in some)
+                  for how in ('designed', 'random', 'repeat')]
+        wrong = [sum(row[how] == 'wrong' for row in some)
+                 for how in ('designed', 'random', 'repeat')]
+        cells = [f'{count}' + (f' ({bad} wrong)' if bad else '')
+                 for count, bad in zip(counts, wrong, strict=True)]
+        yield (f'| {name} | {"" if name == "all" else ", ".join(rivals)} | {len(some)} | '
+               f'{" | ".join(cells)} |')
+    followed = [row['followed'] for row in rows if 'followed' in row]
+    if followed:
+        worst = {key: max(one[key] for one in followed) for key in followed[0]}
+        yield f'followed by the simulated robot {len(followed)} times, largest use: ' + ', '.join(
+            f'{key} {value:.2f}' for key, value in worst.items())
+    promised = [row for row in rows if row['probability'] >= 0.9]
+    kept = sum(row['designed'] == 'settled' for row in promised)
+    yield f'promised with 0.9 or more: {len(promised)}, of which settled {kept}'
+    yield f'CPU of a design: {np.median([row["design_cpu"] for row in rows]):.0f} s (median)'
+
+
+def main() -> None:
+    """Run cases, or show the table of those that were run."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--effects', default=','.join(EFFECTS))
+    parser.add_argument('--seeds', type=int, default=10)
+    parser.add_argument('--first-seed', type=int, default=0)
+    parser.add_argument('--file', type=Path, default=Path('experiments.jsonl'))
+    parser.add_argument('--follow', action='store_true', help='let the simulated robot follow')
+    parser.add_argument('--table', type=Path, help='only show what is in a file')
+    options = parser.parse_args()
+    if not options.table:
+        for seed in range(options.first_seed, options.first_seed + options.seeds):
+            for name in options.effects.split(','):
+                row = score(name, seed, options.follow)
+                print(name, seed, row or 'not ambiguous', flush=True)
+                if row:
+                    with options.file.open('a') as file:
+                        file.write(json.dumps(row) + '\n')
+    path = options.table or options.file
+    print('\n'.join(table([json.loads(line) for line in path.read_text().splitlines()])))
+
+
+if __name__ == '__main__':
+    main()

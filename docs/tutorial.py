@@ -1,0 +1,120 @@
+"""Runs the commands of docs/tutorial.md and draws its pictures: python docs/tutorial.py [FOLDER].
+
+The recordings stand in for a user's own: the simulated robot with a hidden effect. Everything
+that the commands write and say goes to the folder (by default output/tutorial).
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parent
+IMAGES = DOCS / 'images'
+sys.path.insert(0, str(DOCS.parent / 'demo'))
+
+import numpy as np  # noqa: E402
+from before_after import draw_before_after, rms_of  # noqa: E402
+from rich.progress import track  # noqa: E402
+from ros_processes import executable  # noqa: E402
+
+from pprs_dynamics import DriveModel  # noqa: E402
+from pprs_dynamics.diagnosis.measuring import measure_residuals  # noqa: E402
+from pprs_dynamics.diagnosis.residuals import Residuals  # noqa: E402
+from pprs_dynamics.measurement.recording import read_recording  # noqa: E402
+from pprs_dynamics.report.figures import BLUE, GREY, RED, pyplot_module, save  # noqa: E402
+
+HIDDEN, ON = 'stribeck_friction', 'slide_1'
+BINS = 40  # of equal numbers of samples
+MOST_CANDIDATES = 8
+COMMANDS = {
+    'run': f'simulate --output run.mcap --effect {HIDDEN} --seed 2 --duration 30',
+    'other': f'simulate --output other.mcap --effect {HIDDEN} --seed 2 --duration 30 --path-seed 1',
+    'info': 'info run.mcap',
+    'compare': 'compare run.mcap --report before.html --json before.json',
+    'diagnose': 'diagnose run.mcap --validate other.mcap --report why.html --json why.json',
+    'adopt': f'adopt {HIDDEN} run.mcap --validate other.mcap --output adopted.yaml '
+             '--report adopt.html --json adopt.json',
+    'again': 'compare run.mcap --model adopted.yaml --report after.html --json after.json',
+    'wrong': 'adopt drive_spring run.mcap --validate other.mcap --output wrong.yaml',
+    'history': 'history adopted.yaml --report history.png',
+}
+
+
+def main() -> None:
+    """Run all commands that have not run yet, and draw the pictures."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else 'output/tutorial')
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, command in track(COMMANDS.items(), 'running the commands'):
+        said = folder / f'{name}.txt'
+        if not said.exists():
+            done = subprocess.run([executable('pprs'), *command.split()], cwd=folder, text=True,
+                                  capture_output=True)
+            said.write_text(f'$ pprs {command}\n{done.stdout}{done.stderr}'
+                            f'(status {done.returncode})\n')
+    run, other = (read_recording(folder / f'{name}.mcap') for name in ('run', 'other'))
+    before, after = DriveModel.load(), DriveModel.load(folder / 'adopted.yaml')
+    answer = json.loads((folder / 'why.json').read_text())
+    draw_where(measure_residuals(before, [run])[0])
+    draw_candidates(answer)
+    residuals = [measure_residuals(model, [other])[0] for model in (before, after)]
+    fall = [float(np.sqrt(np.nanmean(one.error ** 2))) for one in residuals]
+    draw_before_after(
+        IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
+        f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
+        f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
+
+
+def draw_where(residuals: Residuals) -> None:
+    """Draw the error of every drive, and of the worst one against its velocity."""
+    pyplot = pyplot_module()
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4), layout='constrained',
+                                            width_ratios=(2, 3))
+    sizes = rms_of(residuals.error)
+    worst = int(np.argmax(sizes))
+    left.barh(residuals.drives, sizes, color=[
+        RED if drive == worst else GREY for drive in range(len(sizes))])
+    left.invert_yaxis()
+    left.set(xlabel='measured minus model, rms [N]', title='which drive')
+    velocity = 1e3 * residuals.variables['velocity'][:, worst]
+    error = residuals.error[:, worst]
+    edges = np.quantile(velocity, np.linspace(0, 1, BINS + 1))
+    place = np.clip(np.searchsorted(edges, velocity, side='right') - 1, 0, BINS - 1)
+    right.plot(velocity, error, '.', color=GREY, ms=2, alpha=0.35, label='samples')
+    right.plot([velocity[place == k].mean() for k in range(BINS)],
+               [error[place == k].mean() for k in range(BINS)], '-', color=RED, lw=2,
+               label=f'mean in each of {BINS} bins')
+    right.set(xlabel='velocity [mm/s]', ylabel='measured minus model [N]',
+              title=f'{residuals.drives[worst]}, against its velocity')
+    right.legend(frameon=False)
+    _finish(pyplot, figure, (left, right), 'tutorial_where.png')
+
+
+def draw_candidates(answer: Mapping[str, Any]) -> None:
+    """Draw the evidence of the best candidates for the first place."""
+    pyplot = pyplot_module()
+    figure, axis = pyplot.subplots(figsize=(8, 3.5), layout='constrained')
+    best = answer['candidates'][:MOST_CANDIDATES]
+    names = [one['name'] + (f' on {", ".join(one["drives"])}' if one['drives'] and len(
+        one['drives']) < 4 else '') for one in best]
+    axis.barh(names, [one['evidence'] for one in best],
+              color=[BLUE, *[GREY] * (len(best) - 1)])
+    axis.axvline(0, color='black', lw=0.8)
+    axis.invert_yaxis()
+    axis.set(xlabel='evidence: twice the gain in log-likelihood, less penalties')
+    _finish(pyplot, figure, (axis,), 'tutorial_why.png')
+
+
+def _finish(pyplot: Any, figure: Any, axes: tuple[Any, ...], name: str) -> None:
+    for axis in axes:
+        axis.grid(alpha=0.25)
+        axis.spines[['top', 'right']].set_visible(False)
+    save(pyplot, figure, IMAGES / name)
+
+
+if __name__ == '__main__':
+    main()

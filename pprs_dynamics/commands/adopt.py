@@ -1,0 +1,68 @@
+"""pprs adopt: add a physical effect to the model, fitted and checked on held-out data.
+
+Writes a new model file with its entry in the ledger, or refuses with the figures (status 1).
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from rich.markup import escape
+
+from pprs_dynamics.commands.ledger_entry import Book, check_output
+from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.commands.recordings import (
+    add_recordings,
+    add_validation,
+    read_all,
+    read_validation,
+    show_findings,
+)
+from pprs_dynamics.diagnosis.adopt import adopt
+from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.model.model_file import load_model
+from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.report.adoption_page import adoption_page
+from pprs_dynamics.report.adoption_tables import adoption_view
+from pprs_dynamics.report.progress import progress_bar
+from pprs_dynamics.report.tables import console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('effect', metavar='EFFECT', help='name of an effect, on the drives that '
+                        'the recordings call for; or EFFECT:drive,drive')
+    add_recordings(parser)
+    add_validation(parser)
+    parser.add_argument('--output', metavar='FILE', required=True, help='model file to write')
+    parser.add_argument('--force', action='store_true',
+                        help='adopt it in spite of objections, which the ledger then holds')
+    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    base = check_output(options.output, options.model)
+    model = load_model(base)
+    offer = Offer.of(options.effect, model.drives)
+    offer.require_place(model)
+    recordings = read_all(options, screen, model.drives)
+    validation = read_validation(options, screen, model.drives)
+    show_findings((*recordings, *validation), screen)
+    with progress_bar(screen, f'adopting {offer.name}') as progress:
+        answer = adopt(model, offer, recordings, validation, options.force,
+                       lambda share: progress(share, 1.0))
+    screen.print(adoption_view(answer))
+    if options.json:
+        write_json(options.json, answer.as_data())
+    if options.report:
+        page = adoption_page(answer, recordings, validation)
+        screen.print(f'page: {escape(str(page.write(options.report)))}')
+    if not answer.adopted:
+        return 1
+    book = Book.of(dict(zip(options.recordings, recordings, strict=True)),
+                   dict(zip(options.validate, validation, strict=True)))
+    write_model(options.output, book.entered(answer).values, base)
+    screen.print(f'model: {escape(options.output)}')
+    return 0

@@ -1,0 +1,49 @@
+"""What `pprs diagnose --adopt-all` does after the diagnosis. Not a command of its own."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from pprs_dynamics.commands.ledger_entry import Book, check_output
+from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.diagnosis.loop import REFUSED, adopt_all
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.report.adoption_tables import adoption_view
+
+
+def adopt_what_was_found(
+    options: argparse.Namespace, model: ForceModel, recordings: Sequence[Recording],
+    validate: Sequence[Recording], diagnosis: Diagnosis, screen: Any,
+) -> int:
+    """Adopt step by step, write the model file, and return the exit status.
+
+    With nothing to adopt the file is written as it was; with a refusal, what was adopted before
+    it, if anything.
+    """
+    base = check_output(options.output, options.model)
+    book = Book.of(dict(zip(options.recordings, recordings, strict=True)),
+                   dict(zip(options.validate, validate, strict=True)))
+    columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=screen, transient=True) as bar:
+        task = bar.add_task('adopting', total=1.0)
+        walk = adopt_all(
+            model, recordings, validate, book.entered,
+            lambda what, share: bar.update(task, description=what, completed=share), diagnosis)
+    for step in walk.steps:
+        screen.print(adoption_view(step))
+    screen.print(f'[bold]{walk.ended}[/]: {escape(walk.reason)}')
+    if options.json:
+        write_json(options.json, {**diagnosis.as_data(), 'adoption': walk.as_data()})
+    if walk.adopted or walk.ended != REFUSED:
+        write_model(options.output, walk.model.values, base)
+        count = len(walk.adopted)
+        screen.print(f'model, {count} effect{"s" * (count != 1)} added: {escape(options.output)}')
+    return int(walk.ended == REFUSED)

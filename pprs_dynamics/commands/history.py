@@ -1,0 +1,58 @@
+"""pprs history: the ledger of a model file, and how the error fell with each effect."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from rich.markup import escape
+
+from pprs_dynamics.commands.ledger_entry import check_output
+from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.model.ledger import read_steps, without_last_step
+from pprs_dynamics.model.model_file import load_model
+from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.report.history_figures import draw_history
+from pprs_dynamics.report.history_page import history_page
+from pprs_dynamics.report.history_tables import history_view
+from pprs_dynamics.report.tables import console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('file', metavar='FILE', help='model file')
+    parser.add_argument('--undo', action='store_true', help='take the last step back')
+    parser.add_argument('--output', metavar='FILE', help='model file that --undo writes')
+    parser.add_argument('--report', metavar='FILE',
+                        help='draw the falling error: a page (.html) or a picture (.png)')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    if options.undo != bool(options.output):
+        raise ModelError('--output', options.output, 'be given with --undo, and only then')
+    if options.report and Path(options.report).suffix not in ('.html', '.png'):
+        raise ModelError('--report', options.report, 'end in .html or .png')
+    screen = console()
+    base = check_output(options.output, options.file) if options.undo else options.file
+    model = load_model(base)
+    steps = read_steps(model.values)
+    if options.undo and not steps:
+        print(f'pprs history: {options.file} holds no step that could be taken back',
+              file=sys.stderr)
+        return 1
+    screen.print(history_view(steps))
+    if options.json:
+        write_json(options.json, {'steps': [step.as_data() for step in steps]})
+    if options.report and options.report.endswith('.png'):
+        screen.print(f'picture: {escape(str(draw_history(options.report, steps)))}')
+    elif options.report:
+        page = history_page(Path(options.file).name, steps)
+        screen.print(f'page: {escape(str(page.write(options.report)))}')
+    if options.undo:
+        values, step = without_last_step(model.values)
+        write_model(options.output, values, base)
+        screen.print(f'{step.effect} taken back: {escape(options.output)}')
+    return 0

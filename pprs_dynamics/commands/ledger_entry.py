@@ -1,0 +1,108 @@
+"""From an adoption to a model file with its entry in the ledger."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+
+from pprs_dynamics import __version__
+from pprs_dynamics.diagnosis.adopt import Adoption
+from pprs_dynamics.diagnosis.paired_errors import rms_by_drive
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.fingerprint import fingerprint
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.ledger import NOT_KNOWN, Step, with_step
+from pprs_dynamics.model.model_file import build_model, find_file
+from pprs_dynamics.model.model_writer import refuse_same_file
+
+
+@dataclass(frozen=True)
+class Source:
+    """A recording as the ledger names it: file, hash, first and last time [s]."""
+
+    name: str
+    sha256: str
+    span: tuple[float, float]
+
+    @classmethod
+    def of(cls, path: str | PathLike[str], recording: Recording) -> Source:
+        """Return what the ledger says of a recording."""
+        time = recording.epoch + recording.time
+        return cls(recording.name, fingerprint(path), (float(time[0]), float(time[-1])))
+
+
+@dataclass(frozen=True)
+class Book:
+    """Enters adoptions into a model's ledger.
+
+    Parameters
+    ----------
+    fitted, validation : tuple of Source
+    """
+
+    fitted: tuple[Source, ...]
+    validation: tuple[Source, ...]
+
+    @classmethod
+    def of(cls, fitted: Mapping[str, Recording], validation: Mapping[str, Recording]) -> Book:
+        """Make it from recordings by path."""
+        return cls(tuple(Source.of(*one) for one in fitted.items()),
+                   tuple(Source.of(*one) for one in validation.items()))
+
+    def entered(self, adoption: Adoption) -> ForceModel:
+        """Return the model of an adoption with its step in the ledger."""
+        values = with_step(adoption.before.values, adoption.after.values, self._step(adoption))
+        return replace(build_model(values), source=adoption.before.source)
+
+    def _step(self, adoption: Adoption) -> Step:
+        before, after = (rms_by_drive(one) for one in (
+            adoption.residuals_before, adoption.residuals_after))
+        found = adoption.parameters
+        return Step(
+            effect=adoption.effect, drives=adoption.drives or (),
+            parameters=tuple(found), values=tuple(one.value for one in found.values()),
+            std=tuple(_rounded(one.std, 3) for one in found.values()),
+            units=tuple(one.unit for one in found.values()),
+            recordings=tuple(one.name for one in self.fitted),
+            sha256=tuple(one.sha256 for one in self.fitted),
+            spans=tuple(time for one in self.fitted for time in one.span),
+            validation=tuple(one.name for one in self.validation),
+            validation_sha256=tuple(one.sha256 for one in self.validation),
+            held_out_on=adoption.held_out_on,
+            error_before=_rounded(adoption.error_before),
+            error_after=_rounded(adoption.error_after),
+            held_out_before=_rounded(adoption.held_out_before),
+            held_out_after=_rounded(adoption.held_out_after),
+            noise_floor=_rounded(adoption.noise_floor), measured=tuple(before),
+            drive_errors_before=tuple(map(_rounded, before.values())),
+            drive_errors_after=tuple(map(_rounded, after.values())),
+            calibrated=tuple(one.label for one in adoption.calibrated), rivals=adoption.rivals,
+            objections=adoption.objections, forced=adoption.forced,
+            date=datetime.now(UTC).isoformat(timespec='seconds'), version=__version__)
+
+
+def check_output(output: str | PathLike[str], model: str | PathLike[str]) -> Path:
+    """Return the model file that an output is to be made from, before minutes are spent on it.
+
+    Raises
+    ------
+    ModelError
+        Where the output is the model itself.
+    UnreadableFileError
+        Where its folder does not exist, or it is a folder.
+    """
+    base, target = find_file(model), Path(output)
+    refuse_same_file(target, base)
+    if target.is_dir() or not target.absolute().parent.is_dir():
+        raise UnreadableFileError(target, 'cannot be written: ' + (
+            'it is a folder' if target.is_dir() else 'its folder does not exist'))
+    return base
+
+
+def _rounded(value: float, digits: int = 6) -> float:
+    return float(f'{value:.{digits}g}') if math.isfinite(value) else NOT_KNOWN

@@ -1,0 +1,86 @@
+"""pprs next-experiment: the motion that would tell most about what recordings leave open."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+from rich.markup import escape
+
+from pprs_dynamics.commands.arguments import at_least, positive, whole
+from pprs_dynamics.commands.ledger_entry import check_output
+from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.commands.recordings import add_recordings, read_all, show_findings
+from pprs_dynamics.experiments.motion_limits import MotionLimits
+from pprs_dynamics.experiments.next_experiment import (
+    PURPOSES,
+    check_duration,
+    check_purpose,
+    next_experiment,
+)
+from pprs_dynamics.measurement.pose_files import write_poses
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.report.experiment_page import experiment_page
+from pprs_dynamics.report.experiment_tables import experiment_view
+from pprs_dynamics.report.progress import progress_bar
+from pprs_dynamics.report.tables import console
+
+RATE = 100.0  # [Hz], the default of play_trajectory
+LIMITS = MotionLimits()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    add_recordings(parser, required=False)
+    parser.add_argument('--output', metavar='FILE.csv', required=True,
+                        help='poses for play_trajectory')
+    parser.add_argument('--purpose', choices=PURPOSES, default='separate',
+                        help='separate: what the recordings leave open (default); commission: '
+                        'the first motion of a new robot')
+    parser.add_argument('--seed', type=whole, default=0, help='of the search (default 0)')
+    parser.add_argument('--duration', type=positive, default=20.0, help='[s] (default 20)')
+    parser.add_argument('--rate', type=positive, default=RATE,
+                        help='of the poses, as play_trajectory is to play them [Hz] (default 100)')
+    parser.add_argument('--velocity', type=positive, default=LIMITS.velocity,
+                        help=f'limit of every drive [m/s] (default {LIMITS.velocity:g})')
+    parser.add_argument('--acceleration', type=positive, default=LIMITS.acceleration,
+                        help=f'limit of every drive [m/s^2] (default {LIMITS.acceleration:g})')
+    parser.add_argument('--tilt', type=positive, default=LIMITS.tilt,
+                        help=f'limit of the platform [rad] (default {LIMITS.tilt:g})')
+    parser.add_argument('--margin', type=at_least(0.0), default=LIMITS.margin,
+                        help='share of every limit, those of the model file included, that stays '
+                        f'unused (default {LIMITS.margin:g})')
+    parser.add_argument('--noise', type=positive, default=0.05,
+                        help='of the efforts over 0.01 s, for --purpose commission without '
+                        'recordings [N] (default 0.05)')
+    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    check_purpose(options.purpose, options.recordings)
+    check_duration(options.duration)
+    limits = MotionLimits(options.velocity, options.acceleration, options.tilt, options.margin)
+    model = DriveModel.load(check_output(options.output, options.model))
+    recordings = read_all(options, screen, model.drives)
+    show_findings(recordings, screen)
+    with progress_bar(screen, 'designing') as progress:
+        experiment = next_experiment(
+            model, recordings, options.purpose, limits, options.duration, options.seed,
+            options.noise, lambda share: progress(share, 1.0))
+    count = int(options.duration * options.rate + 1e-9) + 1
+    motion = experiment.motion(np.arange(count) / options.rate)
+    write_poses(options.output, motion)
+    screen.print(experiment_view(experiment))
+    if options.json:
+        write_json(options.json, {**experiment.as_data(), 'purpose': options.purpose,
+                                  'seed': options.seed, 'rate': options.rate,
+                                  'output': options.output})
+    if options.report:
+        page = experiment_page(experiment, motion)
+        screen.print(f'page: {escape(str(page.write(options.report)))}')
+    screen.print('[bold]play it[/]: ' + escape(
+        f'ros2 run pprs_dynamics play_trajectory --ros-args -p source:=csv -p '
+        f'file:={options.output} -p rate:={options.rate} -p lead_in:=3.0'))
+    return 0

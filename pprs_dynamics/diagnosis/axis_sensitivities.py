@@ -1,0 +1,60 @@
+"""How the force of a single axis changes with its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.sensitivities import (
+    DRIVE_WIDTHS,
+    NUMBERS,
+    OF_DRIVES,
+    RELATIVE_STEP,
+    Number,
+    Sensitivities,
+)
+from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.mechanism.reversal import smooth_sign
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.axis_model import AxisForces, AxisModel, AxisMotion
+from pprs_dynamics.model.model_file import build_model
+
+
+class AxisSensitivities(Sensitivities):
+    """Columns of a single axis.
+
+    Parameters
+    ----------
+    model : AxisModel
+    """
+
+    model: AxisModel
+
+    def columns(self, forces: AxisForces) -> dict[str, Array]:
+        """Return columns of numbers and of widths of turning over, (K, N, 1) each."""
+        state = forces.mechanism
+        numbers = np.zeros((len(self.numbers), *state.velocity.shape))
+        for row, number in enumerate(self.numbers):
+            numbers[row] = self.sensed(self._of_number(number, state), state)
+        dry = sum(effect.dry(state.guide_load) for effect in self.model.effects
+                  if isinstance(effect, AxisFriction))
+        width = np.asarray(self.model.reversal.velocity)
+        widths = np.stack([self.sensed(dry * (
+            smooth_sign(state.velocity, factor * width) - state.direction), state)
+            for factor in DRIVE_WIDTHS])
+        return {NUMBERS: numbers, OF_DRIVES: widths}
+
+    def _of_number(self, number: Number, motion: AxisMotion) -> Array:
+        """Return the change per standard deviation of a number, (N, 1) [N]."""
+        moved = build_model({**self.model.values, number.key: number.value * (1 + RELATIVE_STEP)})
+        assert isinstance(moved, AxisModel)
+        change = self._own_force(moved, motion) - self._own_force(self.model, motion)
+        scaled: Array = change * number.deviation / (RELATIVE_STEP * abs(number.value))
+        return scaled
+
+    @staticmethod
+    def _own_force(model: AxisModel, motion: AxisMotion) -> Array:
+        """Return the force without added effects, whose memories the chunk has advanced."""
+        own = tuple(e for e in model.effects if isinstance(e, (AxisFriction, AxisOffset)))
+        return replace(model, effects=own).drive_forces(motion).total

@@ -1,0 +1,132 @@
+"""The whole way: diagnose, adopt, diagnose again, until nothing more can be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pprs_dynamics.diagnosis.adopt import Adoption, adopt, original
+from pprs_dynamics.diagnosis.diagnose import Diagnosis, FoundEffect, diagnose
+from pprs_dynamics.diagnosis.selection import FORM_SHARE
+from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.force_model import ForceModel
+
+MOST_STEPS = 8
+REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
+
+
+@dataclass(frozen=True)
+class Walk:
+    """What was adopted, one after the other, and why it ended.
+
+    Parameters
+    ----------
+    steps : tuple of Adoption
+        The last of them is the refused one where that ended the walk.
+    ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
+    reason : str
+    model : ForceModel
+        With all that was adopted.
+    last : Diagnosis
+        Of the model where the walk ended.
+    """
+
+    steps: tuple[Adoption, ...]
+    ended: str
+    reason: str
+    model: ForceModel
+    last: Diagnosis
+
+    @property
+    def adopted(self) -> tuple[Adoption, ...]:
+        """The steps that were taken."""
+        return tuple(step for step in self.steps if step.adopted)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the walk for JSON."""
+        return {'ended': self.ended, 'reason': self.reason,
+                'steps': [step.as_data() for step in self.steps]}
+
+
+def adopt_all(
+    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    record: Callable[[Adoption], ForceModel] = lambda adoption: adoption.after,
+    progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
+) -> Walk:
+    """Adopt what recordings call for, until a diagnosis finds nothing, or cannot tell.
+
+    Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
+    error, and which of them it is another recording must show.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : sequence of Recording
+        To fit to.
+    validate : sequence of Recording, optional
+        Never fitted: an effect with which the error on them does not fall ends the walk.
+    record : callable, optional
+        Returns the model of an adoption with its entry in the ledger.
+    progress : callable, optional
+        Called with what is being done and the share of it that is done.
+    diagnosis : Diagnosis, optional
+        Of the model as given, where it is known already.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda what, share: None)
+    steps: list[Adoption] = []
+    taken: list[FoundEffect] = []
+    if diagnosis is not None and original(model) is not model:
+        diagnosis = None
+    while True:
+        if diagnosis is None:
+            diagnosis = diagnose(original(model), recordings, (),
+                                 lambda share: report('diagnosing', share))
+        found = _next(diagnosis, taken)
+        if found is None or len(taken) == MOST_STEPS:
+            ended = 'unknown' if diagnosis.depends_on else 'adequate'
+            reason = (f'what remains no effect of the catalogue explains: '
+                      f'{diagnosis.depends_on[0].text}' if diagnosis.depends_on
+                      else 'nothing that is left stands out against noise')
+            return Walk(tuple(steps), ended, reason, model, diagnosis)
+        name = found.name
+        step = adopt(model, Offer(found.effect, found.drives), recordings, validate,
+                     progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
+                     diagnosis=diagnosis)
+        steps.append(step)
+        if not step.adopted:
+            return Walk(tuple(steps), REFUSED, f'{name}: {step.reason}', model, diagnosis)
+        model = record(step)
+        taken.append(found)
+        if step.rivals:
+            return Walk(tuple(steps), AMBIGUOUS, f'{", ".join(step.rivals)} would explain these '
+                        f'recordings as well as {name}: pprs next-experiment tells which motion '
+                        'separates them', model, diagnosis)
+        diagnosis = None
+
+
+def _next(diagnosis: Diagnosis, taken: Sequence[FoundEffect]) -> FoundEffect | None:
+    """Return what to adopt: those that are certain first, an ambiguous one as the last."""
+    new = [one for one in diagnosis.effects if not _is_form(one, taken)]
+    ambiguous = {name for names in diagnosis.indistinguishable for name in names}
+    certain = [one for one in new if one.name not in ambiguous]
+    return next(iter(certain or new), None)
+
+
+def _is_form(one: FoundEffect, taken: Sequence[FoundEffect]) -> bool:
+    """Return whether an effect is what the form of an adopted one leaves.
+
+    Every effect is an idealisation; within one diagnosis the selection judges likewise.
+    """
+    for other in taken:
+        shared = (one.drives is None or other.drives is None
+                  or set(one.drives) & set(other.drives))
+        if shared and one.evidence < FORM_SHARE * other.evidence:
+            return True
+    return False

@@ -1,0 +1,56 @@
+"""What a single axis has beside its inertia: friction, and a constant force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.effects.effect import Effect
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.mechanism.state import DriveStates
+
+
+@dataclass(frozen=True)
+class AxisFriction(Effect):
+    """Viscous friction and dry friction that no load changes: F_v q_dot + F_c sgn(q_dot).
+
+    Parameters
+    ----------
+    viscous : float
+        F_v [N s/m].
+    coulomb : float
+        F_c [N].
+    """
+
+    name: ClassVar[str] = 'active_friction'
+    viscous: float
+    coulomb: float
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the drive's force, (N, 1) [N]."""
+        force: Array = self.viscous * state.velocity + self.coulomb * state.direction
+        return force
+
+    def dry(self, guide_load: Array) -> Array:
+        """Return the dry friction in full motion [N], in the shape of the guide's load."""
+        return np.full_like(guide_load, self.coulomb)
+
+
+@dataclass(frozen=True)
+class AxisOffset(Effect):
+    """A constant force: preload, cable chain, or what the amplifier adds.
+
+    Parameters
+    ----------
+    value : float
+        [N]
+    """
+
+    name: ClassVar[str] = 'offset'
+    value: float
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the drive's force, (N, 1) [N]."""
+        return np.full_like(state.velocity, self.value)

@@ -1,0 +1,1 @@
+"""Experiments: which motion would tell what the recordings leave open."""

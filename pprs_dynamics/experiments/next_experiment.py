@@ -1,0 +1,288 @@
+"""The next experiment: the whole way from recordings to the motion that would tell most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from pprs_dynamics.diagnosis.selection import FAR_SCORE
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.experiments.commissioning import commissioning
+from pprs_dynamics.experiments.criteria import Contest, Precision
+from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
+from pprs_dynamics.experiments.question import Question, question_of
+from pprs_dynamics.experiments.trajectory_search import Found, TrajectorySearch, forces_of
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+
+PURPOSES = ('separate', 'commission')
+SURE = 0.9  # probability from which a design counts as separating
+SHORTEST, LONGEST = 5.0, 120.0  # [s]
+RESERVE = 4.0  # standard deviations of noise that efforts are kept below their limits by
+
+
+class PurposeError(PprsError, ValueError):
+    """A purpose that needs what is not given."""
+
+
+@dataclass(frozen=True)
+class Bout:
+    """What a motion promises for one contest.
+
+    Parameters
+    ----------
+    truth, rival : str
+    now, expected : float
+        Twice the expected log-likelihood ratio less the penalties' difference: of the recordings,
+        and with the motion.
+    probability : float
+        That the rival falls behind by what a diagnosis asks for.
+    """
+
+    truth: str
+    rival: str
+    now: float
+    expected: float
+    probability: float
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'truth': self.truth, 'rival': self.rival, 'evidence_now': self.now,
+                'expected_evidence': self.expected, 'probability': self.probability}
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How well a number would be known.
+
+    Parameters
+    ----------
+    label : str
+    unit : str
+    scale : float
+        Size at which it matters, or the tolerance's standard deviation.
+    before, after : float
+        Standard deviations.
+    """
+
+    label: str
+    unit: str
+    scale: float
+    before: float
+    after: float
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'label': self.label, 'unit': self.unit, 'scale': self.scale,
+                'std_before': self.before, 'std_after': self.after}
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A motion with what it promises.
+
+    Parameters
+    ----------
+    kind : {'separate', 'estimate', 'excite', 'commission'}
+    subjects : tuple of str
+        Effects in question.
+    bouts : tuple of Bout
+    accuracies : tuple of Accuracy
+    expected_evidence : float
+        The least of all contests that it decides; without contests, of all effects in question
+        against their absence.
+    limits : dict of str to float
+        Use of each limit, its margin taken off: at most 1.
+    duration : float
+        [s]
+    motion : callable
+        Times [s] -> PlatformMotion.
+    model : DriveModel
+    """
+
+    kind: str
+    subjects: tuple[str, ...]
+    bouts: tuple[Bout, ...]
+    accuracies: tuple[Accuracy, ...]
+    expected_evidence: float
+    limits: dict[str, float]
+    duration: float
+    motion: Callable[[Array], PlatformMotion]
+    forces: Callable[[Array], DriveForces]
+    model: DriveModel
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """All pairs in question."""
+        return tuple(dict.fromkeys(tuple(sorted((one.truth, one.rival)))  # type: ignore[misc]
+                                   for one in self.bouts))
+
+    @property
+    def separates(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that it tells apart whichever of the two is true."""
+        return tuple(pair for pair in self.pairs if all(
+            one.probability >= SURE for one in self.bouts if {one.truth, one.rival} == {*pair}))
+
+    @property
+    def fails(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that it does not, or not in every case."""
+        return tuple(pair for pair in self.pairs if pair not in self.separates)
+
+    @property
+    def text(self) -> str:
+        """What it is for, and whether it will do, in one or two sentences."""
+        if self.kind == 'separate':
+            told = [f'{a} from {b}' for a, b in self.separates]
+            left = [f'{a} from {b}' for a, b in self.fails]
+            found = []
+            if told:
+                found.append(f'This motion tells {", ".join(told)}: evidence of '
+                             f'{self.expected_evidence:.0f} is expected.')
+            if left:
+                found.append(f'It will hardly tell {", ".join(left)}: no motion within these '
+                             'limits that was tried does so for sure.')
+            return ' '.join(found)
+        return {
+            'estimate': f'One explanation is left: {", ".join(self.subjects)}. This motion '
+                        'measures its parameters best.',
+            'excite': 'Nothing is missing as far as the recordings tell. This motion shows what '
+                      f'they hardly excite: {", ".join(self.subjects)}.' if self.subjects else
+                      'Nothing is missing, and all is excited. This motion measures the model\'s '
+                      'own numbers best.',
+            'commission': 'This motion measures the model\'s numbers and shows all common '
+                          'effects.'}[self.kind]
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the JSON of the interface, and what the documentation adds to it."""
+        return {'separates': [list(pair) for pair in self.separates],
+                'does_not_separate': [list(pair) for pair in self.fails],
+                'expected_evidence': self.expected_evidence,
+                'question': self.kind, 'subjects': list(self.subjects), 'text': self.text,
+                'contests': [one.as_data() for one in self.bouts],
+                'accuracy': [one.as_data() for one in self.accuracies],
+                'limits': self.limits, 'duration': self.duration}
+
+
+def next_experiment(
+    model: DriveModel, recordings: Sequence[Recording] = (), purpose: str = 'separate',
+    limits: MotionLimits | None = None, duration: float = 20.0, seed: int = 0,
+    noise: float = 0.05, progress: Callable[[float], None] | None = None,
+) -> Experiment:
+    """Return the motion that tells most about what is open.
+
+    Parameters
+    ----------
+    model : DriveModel
+    recordings : sequence of Recording
+    purpose : {'separate', 'commission'}
+        'separate': what recordings leave open. 'commission': a first motion of a new robot.
+    limits : MotionLimits, optional
+    duration : float
+        [s]
+    seed : int
+        Of the search.
+    noise : float
+        Standard deviation of means of the effort over 0.01 s [N]; for 'commission' without
+        recordings.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    PurposeError
+        For 'separate' without recordings.
+    NoMotionError
+        Where the limits leave no room.
+    PprsError
+        As `diagnose`.
+    """
+    report = progress or (lambda share: None)
+    check_purpose(purpose, recordings)
+    check_duration(duration)
+    question = (commissioning(model, recordings, noise) if purpose == 'commission' else
+                question_of(model, recordings, lambda share: report(0.2 * share)))
+    limits = limits or MotionLimits()
+    limits = replace(limits, effort_reserve=max(
+        limits.effort_reserve, RESERVE * question.noise_floor))
+    search = TrajectorySearch(question, limits, duration, seed)
+    found = search.run(lambda share: report(0.2 + 0.8 * share))
+    report(1.0)
+    return experiment_of(question, found)
+
+
+def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
+    """Raise PurposeError for a purpose that needs recordings where there are none."""
+    if purpose not in PURPOSES:
+        raise PurposeError(f'purpose is {purpose!r}, but it must be one of {", ".join(PURPOSES)}')
+    if purpose == 'separate' and not recordings:
+        raise PurposeError('purpose separate: no recording is given, but it reads from recordings '
+                           'what is to be told apart; a new robot starts with --purpose '
+                           'commission')
+
+
+def check_duration(duration: float) -> None:
+    """Raise PurposeError for a duration that no design is made for."""
+    if not SHORTEST <= duration <= LONGEST:
+        raise PurposeError(f'duration is {duration:g} s, but it must lie between {SHORTEST:g} and '
+                           f'{LONGEST:g} s')
+
+
+def experiment_of(question: Question, found: Found) -> Experiment:
+    """Return a motion with what it promises for a question."""
+    known, after = question.known, question.known + found.gram
+    bouts = tuple(_bout(one, known, after) for one in question.contests)
+    decided = [one.expected for one in bouts if one.probability >= SURE]
+    if bouts:
+        expected = min(decided or [one.expected for one in bouts])
+    else:
+        expected = _least_evidence(question, after)
+    return Experiment(
+        question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), bouts,
+        _accuracies(question, known, after), expected,
+        dict(zip(limit_names(question.model), map(float, found.uses), strict=True)),
+        found.path.duration, found.path.motion,
+        lambda time: forces_of(question.model, [found.path], time), question.model)
+
+
+def _bout(contest: Contest, known: Array, after: Array) -> Bout:
+    misfit, expected = contest.misfit(after), contest.evidence(after)
+    # Twice a log-likelihood ratio scatters by twice the root of its mean.
+    sure = float(norm.cdf((expected - FAR_SCORE) / (2 * np.sqrt(misfit) + 1e-9)))
+    return Bout(contest.truth.name, contest.rival.name, contest.evidence(known), expected, sure)
+
+
+def _least_evidence(question: Question, after: Array) -> float:
+    """Return the smallest evidence of a subject against its absence."""
+    base = tuple(range(len(question.plan.labels)))
+    found = []
+    for one in question.subjects:
+        own = Precision(one.index, base, np.ones(len(one.index))).own(after)
+        found.append(float(one.truth @ own @ one.truth) - one.penalty)
+    return min(found, default=0.0)
+
+
+def _accuracies(question: Question, known: Array, after: Array) -> tuple[Accuracy, ...]:
+    criterion = question.criterion
+    if not isinstance(criterion, Precision):
+        return ()
+    before, later = criterion.deviations(known), criterion.deviations(after)
+    labels: list[tuple[str, str]] = []
+    if not question.subjects or question.kind == 'commission':
+        labels += [(f'{number.label}', number.unit) for number in question.plan.numbers]
+    for one in question.subjects:
+        for block in one.blocks:
+            place = '' if block.drive is None else f'.{DRIVES[block.drive]}'
+            coefficients = [block.effect.coefficients[k] for k in block.chosen
+                            ] if block.effect.coefficients else []
+            labels += [(f'{block.effect.name}{place}.{c.name}', c.unit) for c in coefficients]
+            labels += [(f'{block.effect.name}{place}.{name}', 'relative')
+                       for name in list(block.shape)[0 if coefficients else -1:]]
+    return tuple(Accuracy(label, unit, float(scale), float(a), float(b))
+                 for (label, unit), scale, a, b in zip(
+                     labels, criterion.scales, before, later, strict=False))

@@ -1,0 +1,31 @@
+"""What tells one recording from every other: the SHA-256 of its file, or of a bag's files."""
+
+from __future__ import annotations
+
+import hashlib
+from os import PathLike
+from pathlib import Path
+
+from pprs_dynamics.errors import UnreadableFileError
+
+
+def fingerprint(path: str | PathLike[str]) -> str:
+    """Return the hash of a file; of a folder, of its files' names and hashes in order.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be read.
+    """
+    path = Path(path)
+    try:
+        if not path.is_dir():
+            with path.open('rb') as file:
+                return hashlib.file_digest(file, 'sha256').hexdigest()
+        whole = hashlib.sha256()
+        for file_path in sorted(one for one in path.rglob('*') if one.is_file()):
+            name = file_path.relative_to(path).as_posix()
+            whole.update(f'{name}\0{fingerprint(file_path)}\n'.encode())
+        return whole.hexdigest()
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None

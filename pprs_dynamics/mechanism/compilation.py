@@ -1,0 +1,101 @@
+"""Kernels compiled by Numba, kept on disk; imported only where something is evaluated."""
+
+from __future__ import annotations
+
+import dis
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Any
+
+from pprs_dynamics.mechanism import arithmetic
+
+PACKAGE = 'pprs_dynamics'
+REPLACED: dict[Any, Any] = {
+    arithmetic.sqrt: arithmetic.compiled_sqrt,
+    arithmetic.tanh: arithmetic.compiled_tanh,
+    arithmetic.larger: arithmetic.compiled_larger,
+    arithmetic.everywhere: arithmetic.compiled_everywhere,
+}
+MECHANISM, EFFECTS, MODEL = (Path(__file__).parents[1] / folder
+                             for folder in ('mechanism', 'effects', 'model'))
+
+
+def compiler() -> Callable[[Any], Callable[..., int]] | None:
+    """Return what compiles a kernel's loop, or None without Numba or a place to keep the result.
+
+    Compiling takes seconds, which pays only where it happens once: in the package's own
+    __pycache__ or the user's cache directory; NUMBA_CACHE_DIR names another one.
+    """
+    try:
+        import numba  # type: ignore[import-untyped, import-not-found, unused-ignore]  # noqa: F401
+    except ImportError:
+        return None
+    try:
+        _compiled_loop(_nothing)
+    except RuntimeError:  # no locator available: nowhere to write
+        return None
+    return _compiled_loop
+
+
+def _nothing(numbers: Any, s: Any) -> bool:
+    return True
+
+
+def _template(numbers: Any, *tables: Any) -> int:
+    first = -1
+    for s in range(len(tables[0])):
+        if not kernel(numbers, s, *tables) and first < 0:  # type: ignore[name-defined]  # noqa: F821
+            first = s
+    return first
+
+
+def _compiled_loop(kernel: Any) -> Callable[..., int]:
+    import numba
+
+    loop = FunctionType(_template.__code__, {**_template.__globals__, 'kernel': _compiled(kernel)},
+                        f'{kernel.__name__}_loop')
+    # Numba looks only at the file of the loop when it decides whether what it kept is up to
+    # date; the name tells it of all other files.
+    loop.__qualname__ = f'{kernel.__module__}.{kernel.__name__}_{_digest()}'.replace('.', '_')
+    loop.__module__ = __name__
+    compiled: Callable[..., int] = numba.njit(
+        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True)(loop)
+    return compiled
+
+
+@cache
+def _compiled(function: FunctionType) -> Any:
+    """Return a function of this package, and all that it calls, for Numba."""
+    import numba
+
+    namespace = dict(function.__globals__)
+    for name in _names(function.__code__):
+        used = namespace.get(name)
+        if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
+            namespace[name] = _compiled(REPLACED.get(used, used))
+    clone = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
+    clone.__module__ = function.__module__
+    # Inlined all of them, or their many results are copied through memory: four times slower.
+    # Nobody calls them from Python, and wrappers for that would take half of the compiling.
+    return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
+                      no_cfunc_wrapper=True)(clone)
+
+
+def _names(code: CodeType) -> set[str]:
+    """Return the global names that a function and those within it look up."""
+    own = {step.argval for step in dis.get_instructions(code) if step.opname == 'LOAD_GLOBAL'}
+    return own.union(*(_names(constant) for constant in code.co_consts
+                       if isinstance(constant, CodeType)))
+
+
+@cache
+def _digest() -> str:
+    """Return a fingerprint of every file that equations may stand in."""
+    content = hashlib.sha256()
+    for folder in (MECHANISM, EFFECTS, MODEL):
+        for file in sorted(folder.glob('*.py')):
+            content.update(file.read_bytes())
+    return content.hexdigest()[:12]

@@ -1,0 +1,154 @@
+"""A single axis: one prismatic drive, as a builder measures it before the robot is assembled.
+
+F = M (q_ddot - g) + F_v q_dot + F_c sgn(q_dot) + offset + effects, positive along the drive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.effects.drive_effect import DriveEffect
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.effects.homing_error import HomingError
+from pprs_dynamics.effects.load_friction import LoadFriction
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.mechanism.robot import AXIS, Array
+from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
+from pprs_dynamics.model.keys import AXIS_KEYS
+
+
+@dataclass(frozen=True)
+class AxisMotion:
+    """N samples of the drive's motion.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : (N, 1) arrays
+        [m, m/s, m/s^2]
+    time : (N,) array, optional
+        [s]
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    time: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, samples: slice) -> AxisMotion:
+        return AxisMotion(self.position[samples], self.velocity[samples],
+                          self.acceleration[samples],
+                          None if self.time is None else self.time[samples])
+
+    def with_time(self, time: Array) -> AxisMotion:
+        """Return the same motion at given times."""
+        return AxisMotion(self.position, self.velocity, self.acceleration, time)
+
+
+@dataclass(frozen=True)
+class AxisState(AxisMotion):
+    """A motion, and what effects on drives look at beside it."""
+
+    reversal: Reversal = field(default_factory=Reversal)
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        return (AXIS,)
+
+    @cached_property
+    def direction(self) -> Array:
+        """sgn of the velocity, turning over within the reversal velocity, (N, 1)."""
+        return smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
+
+    @property
+    def guide_load(self) -> Array:
+        """Unknown, and constant: dry friction is a force here, not a coefficient; (N, 1) [N]."""
+        return np.zeros_like(self.velocity)
+
+
+@dataclass(frozen=True)
+class AxisForces(Forces):
+    """Forces of N samples, (N, 1)."""
+
+    mechanism: AxisState
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisModel(ForceModel):
+    """The inverse dynamic model of one prismatic drive.
+
+    Parameters
+    ----------
+    mass : float
+        M, all that moves [kg].
+    gravity : float
+        g along the positive direction [m/s^2].
+    effects, reversal, values, source
+        See `ForceModel`; friction and offset are the first effects.
+    """
+
+    title: ClassVar[str] = 'a single axis'
+    drives: ClassVar[tuple[str, ...]] = (AXIS,)
+    keys = AXIS_KEYS
+
+    mass: float
+    gravity: float = 0.0
+
+    @classmethod
+    def load(cls, path: str | PathLike[str] = 'config/single_axis.yaml') -> AxisModel:
+        """Read a model file, as `DriveModel.load`.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where the file does not exist or is not YAML.
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for a 3-PPRS.
+        """
+        from pprs_dynamics.model.model_file import load_model
+
+        model = load_model(path)
+        if not isinstance(model, AxisModel):
+            raise ModelError('geometry', 'that of a 3-PPRS', 'be a single axis', model.source)
+        return model
+
+    @classmethod
+    def offers(cls, effect: type[CatalogueEffect]) -> bool:
+        """Return whether an effect can act here: in the drive, and not by load or by zero.
+
+        No force of the axis depends on where its zero is, and its guide's load is constant, so
+        that load_friction is coulomb_friction.
+        """
+        return issubclass(effect, DriveEffect) and effect not in (HomingError, LoadFriction)
+
+    def drive_forces(self, motion: AxisMotion, state: ModelState | None = None) -> AxisForces:
+        """Return the forces that the drive must apply for a motion.
+
+        Parameters
+        ----------
+        motion : AxisMotion
+        state : ModelState, optional
+            Carries effects with memory from call to call; see `DriveModel.drive_forces`.
+        """
+        mechanism: Any = AxisState(motion.position, motion.velocity, motion.acceleration,
+                                   motion.time, self.reversal)
+        state = self.initial_state() if state is None else state
+        parts = {RIGID_BODY: self.mass * (mechanism.acceleration - self.gravity)}
+        for effect in self.effects:
+            effect.check_memory(state.memories)
+            if not effect.is_measurement:
+                parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
+        return AxisForces(np.sum(list(parts.values()), axis=0), parts, mechanism)
+
+    def variables(self, state: AxisState) -> dict[str, Array]:
+        """Return nothing: an axis has its own motion alone."""
+        return {}

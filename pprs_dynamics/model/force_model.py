@@ -1,0 +1,158 @@
+"""What every model is: forces that drives must apply for a motion, as a sum over a list.
+
+The diagnosis works on any of them: it asks a model for its drives, its numbers, its forces and
+what its sensors say, never for what it moves.
+"""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+
+from pprs_dynamics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.mechanism.reversal import Reversal
+from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.mechanism.state import DriveStates
+from pprs_dynamics.model.keys import Key
+
+RIGID_BODY = 'rigid_body'
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Forces of N samples of D drives.
+
+    Parameters
+    ----------
+    total : (N, D) array
+        What the drives must apply [N], in drive order.
+    parts : dict of (N, D) arrays
+        `rigid_body`, the model's own friction, and one per added effect; they sum to `total`.
+    mechanism : DriveStates
+        What the forces were computed from.
+    """
+
+    total: Array
+    parts: dict[str, Array]
+    mechanism: DriveStates
+
+
+F = TypeVar('F', bound=Forces)
+
+
+class ModelState:
+    """What effects with memory keep between calls; made by `initial_state` of a model."""
+
+    def __init__(self, memories: dict[str, Any]) -> None:
+        self.memories = memories
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether any effect keeps anything."""
+        return any(memory is not None for memory in self.memories.values())
+
+    def copy(self) -> ModelState:
+        """Return an independent copy, to look ahead without advancing this one."""
+        return ModelState(copy.deepcopy(self.memories))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceModel(ABC):
+    """An inverse dynamic model: motion in, drive forces out.
+
+    Parameters
+    ----------
+    effects : tuple of Effect
+        What acts beside the rigid body; the model's own friction comes first.
+    reversal : Reversal
+    values : mapping
+        The flat keys and values that the model was built from, complete with defaults.
+    source : str
+        The file that it came from, if any.
+
+    Class attributes
+    ----------------
+    title : str
+        What it is a model of, for a sentence.
+    drives : tuple of D str
+    keys : dict of str to Key
+        Of its files.
+    """
+
+    title: ClassVar[str]
+    drives: ClassVar[tuple[str, ...]]
+    keys: ClassVar[dict[str, Key]]
+
+    effects: tuple[Effect, ...]
+    reversal: Reversal
+    values: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ''
+
+    @classmethod
+    @abstractmethod
+    def offers(cls, effect: type[CatalogueEffect]) -> bool:
+        """Return whether an effect of the catalogue can act in what this is a model of."""
+
+    @abstractmethod
+    def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
+        """Return the forces for a motion of this kind."""
+
+    @abstractmethod
+    def variables(self, state: Any) -> dict[str, Array]:
+        """Return what an error may depend on beside time and the drives' own motion.
+
+        By name in the interface: (N, D) where every drive has its own, (N,) where all share it.
+        """
+
+    def initial_state(self) -> ModelState:
+        """Return a fresh state for effects with memory."""
+        return ModelState({effect.name: effect.initial_memory() for effect in self.effects})
+
+    def continued_state(self, model: Self, state: ModelState) -> ModelState:
+        """Return a state that goes on from another model's for the effects that both have."""
+        fresh = self.initial_state()
+        for effect in self.effects:
+            if effect in model.effects:
+                fresh.memories[effect.name] = copy.deepcopy(state.memories[effect.name])
+        return fresh
+
+    def measured(self, forces: F, state: ModelState | None = None) -> F:
+        """Return what the sensors say where the drives apply `forces`.
+
+        Effects of measurement become parts of their own; without any, `forces` are returned.
+
+        Parameters
+        ----------
+        forces : Forces
+            Consecutive samples with times, of `drive_forces`.
+        state : ModelState, optional
+            As there.
+        """
+        sensors = [effect for effect in self.effects if effect.is_measurement]
+        if not sensors:
+            return forces
+        # Each effect gets the states that its kind of model makes.
+        mechanism: Any = forces.mechanism
+        parts, total = dict(forces.parts), forces.total
+        state = self.initial_state() if state is None else state
+        for effect in sensors:
+            memory = state.memories[effect.name]
+            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
+                     if isinstance(effect, MeasurementEffect)
+                     else total + effect.force(mechanism, memory))
+            parts[effect.name], total = after - total, after
+        return replace(forces, total=total, parts=parts)
+
+    @property
+    def position_error(self) -> Array:
+        """What must be taken off measured drive positions [m], (D,)."""
+        errors = [effect.position_error(self.drives) for effect in self.effects
+                  if isinstance(effect, MeasurementEffect)]
+        total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))
+        return total
