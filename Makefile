@@ -55,14 +55,15 @@ experiments: $(VENV)/.test
 
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python
-	@echo 'Installing the package with ROS 2 wheels (about a minute) ...'
+	@echo 'Installing the package with ROS 2 wheels and compiling its equations (about a minute) ...'
 	@$(BIN)/pip install -qq --upgrade pip
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast]'
+	@$(BIN)/python -m pprs_dynamics.model.preparation
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,test]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,test]'
 	@touch $@
 
 $(VENV)/bin/python:

@@ -27,6 +27,7 @@ setup(
                 'ros-diagnostic-msgs==5.5.1'],
         'report': ['rich>=13', 'matplotlib>=3.8', 'plotly>=5.20'],
         'sim': ['mujoco>=4.0'],
+        'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
         'test': ['pytest>=8', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3', 'ruff>=0.6', 'mypy>=1.11',
                  'pandas>=2', 'types-PyYAML', 'scipy-stubs',

@@ -7,7 +7,7 @@ A robot with a hidden effect, numbers off within the model file's tolerances and
 makes a short slow recording, weaker and weaker until the diagnosis is ambiguous with the truth
 among the candidates. Then one run of 20 s is added: the designed one, a random one that uses the
 same limits, or the old motion repeated for as long. Settled is a diagnosis of both together that
-names the truth, holds nothing against it and adopts nothing else.
+names the truth and holds nothing against it; open one that holds a rival, or names nothing.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from hidden_strength import changed_values, tolerated_numbers
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.next_experiment import experiment_of
 from pprs_dynamics.experiments.question import question_of
@@ -129,14 +130,16 @@ def ambiguous_start(name: str, seed: int) -> tuple[HiddenRobot, Recording, Any] 
     return None
 
 
-def verdict(robot: HiddenRobot, recordings: list[Recording]) -> str:
-    """Return settled, open or wrong."""
-    found = diagnose(robot.model, recordings)
-    names = {effect.name for effect in found.effects}
-    held = {one for group in found.indistinguishable for one in group}
-    if names == {robot.name} and robot.name not in held:
-        return 'settled'
-    return 'open' if robot.name in held | names or not names else 'wrong'
+def judged(robot: HiddenRobot, recordings: list[Recording]) -> dict[str, Any]:
+    """Return what a diagnosis says, and whether the question is settled by it."""
+    try:
+        found = diagnose(robot.model, recordings)
+    except PprsError as error:
+        return {'verdict': 'failed', 'said': str(error)}
+    names = [effect.name for effect in found.effects]
+    held = [name for group in found.indistinguishable if robot.name in group for name in group]
+    verdict = ('open' if held or not names else 'settled' if robot.name in names else 'wrong')
+    return {'verdict': verdict, 'names': names, 'held': held, 'said': found.verdict}
 
 
 def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
@@ -162,10 +165,10 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
         'expected_evidence': experiment.expected_evidence,
         'largest_use': max(experiment.limits.values()), **cost}
     grid = times(NEW)
-    result['designed'] = verdict(robot, [old, robot.record(found.path.motion(grid), 1)])
-    result['random'] = verdict(robot, [old, robot.record(random.motion(grid), 2)])
+    result['designed'] = judged(robot, [old, robot.record(found.path.motion(grid), 1)])
+    result['random'] = judged(robot, [old, robot.record(random.motion(grid), 2)])
     again = Excitation(duration=OLD, seed=seed, **SLOW).motion(times(OLD))
-    result['repeat'] = verdict(robot, [old, robot.record(again, 3), robot.record(again, 4)])
+    result['repeat'] = judged(robot, [old, robot.record(again, 3), robot.record(again, 4)])
     if follow:
         result['followed'] = robot.follow(found.path.motion(grid), limits)
     return result
@@ -178,9 +181,9 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
     for name in [*dict.fromkeys(row['effect'] for row in rows), 'all']:
         some = [row for row in rows if name in (row['effect'], 'all')]
         rivals = sorted({rival for row in some for rival in row['rivals']})
-        counts = [sum(row[how] == 'settled' for row in some)
+        counts = [sum(row[how]['verdict'] == 'settled' for row in some)
                   for how in ('designed', 'random', 'repeat')]
-        wrong = [sum(row[how] == 'wrong' for row in some)
+        wrong = [sum(row[how]['verdict'] in ('wrong', 'failed') for row in some)
                  for how in ('designed', 'random', 'repeat')]
         cells = [f'{count}' + (f' ({bad} wrong)' if bad else '')
                  for count, bad in zip(counts, wrong, strict=True)]
@@ -192,7 +195,7 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
         yield f'followed by the simulated robot {len(followed)} times, largest use: ' + ', '.join(
             f'{key} {value:.2f}' for key, value in worst.items())
     promised = [row for row in rows if row['probability'] >= 0.9]
-    kept = sum(row['designed'] == 'settled' for row in promised)
+    kept = sum(row['designed']['verdict'] == 'settled' for row in promised)
     yield f'promised with 0.9 or more: {len(promised)}, of which settled {kept}'
     yield f'CPU of a design: {np.median([row["design_cpu"] for row in rows]):.0f} s (median)'
 

@@ -51,7 +51,7 @@ def draw_before_after(
     for axis in axes.values():
         axis.grid(alpha=0.25)
         axis.spines[['top', 'right']].set_visible(False)
-    figure.suptitle(fill(sentence, 120), fontsize=12)
+    figure.suptitle(fill(sentence, 135), fontsize=11)
     return save(pyplot, figure, path)
 
 
@@ -86,7 +86,7 @@ def _draw_drive(upper: Any, lower: Any, curves: Curves, drive: int) -> None:
     upper.tick_params(labelbottom=False)
     upper.sharex(lower)
     lower.set(xlabel='time [s]', ylabel='measured\nminus model [N]')
-    upper.legend(frameon=False, fontsize=9, loc='lower center', bbox_to_anchor=(0.5, 1.0),
+    upper.legend(frameon=False, fontsize=9, loc='lower right', bbox_to_anchor=(1.0, 0.98),
                  ncols=3)
 
 

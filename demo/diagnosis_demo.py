@@ -117,8 +117,7 @@ def main() -> int:
     story.say(f'\nPicture: [b]{picture}[/]   pages: [b]{story.file("before.html")}[/], '
               f'[b]{story.file("why.html")}[/]' + (f', [b]{story.file("after.html")}[/]'
                                                   if added else ''))
-    story.say(f'[dim]{time.monotonic() - began:.0f} s; the same again: '
-              f'python demo/diagnosis_demo.py {folder} --seed {seed}[/]')
+    story.say(f'[dim]{time.monotonic() - began:.0f} s; the same again with --seed {seed}[/]')
     return 0
 
 
@@ -205,7 +204,7 @@ def reveal(story: Story, diagnosis: dict[str, Any], added: bool) -> str:
     table.add_row('parameters', _hidden_parameters(hidden['parameters']),
                   '\n'.join(f'{key} = {one["value"]:.4g} ± {2 * (one["std"] or 0):.2g} '
                             f'{one["unit"]}' for effect in found
-                            for key, one in effect['parameters'].items()) or '-')
+                            for key, one in effect['parameters'].items() if one['value']) or '-')
     story.console.print(table)
     sentence = _judged(hidden, diagnosis)
     if not added:
@@ -234,8 +233,13 @@ def _judged(hidden: dict[str, Any], diagnosis: dict[str, Any]) -> str:
     rivals = {rival for names in diagnosis['indistinguishable'] for rival in names}
     others = [one for one in found if one != name]
     if name in found:
+        mine = diagnosis['effects'][found.index(name)]
         return f'{name} was hidden, and {name} was found' + (
-            f'; {", ".join(others)} beside it is not in the robot.' if others else '.')
+            f', but on {_drives(mine)} instead of {_drives(hidden)}'
+            if set(mine['drives'] or ()) != set(hidden['drives'] or ()) else '') + (
+            f'; {", ".join(others)} beside it is not in the robot' if others else '') + (
+            '; that something unknown remains is wrong'
+            if diagnosis['verdict'] == 'unknown' else '') + '.'
     if name in rivals:
         return f'{name} was hidden; it is among those that this motion cannot tell apart.'
     if not known and diagnosis['verdict'] == 'unknown':

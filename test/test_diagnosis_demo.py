@@ -59,14 +59,18 @@ FOREIGN = {'name': 'vibration', 'drives': ['lift_1']}
 def answer(verdict: str, *effects: str, rivals: list[list[str]] | None = None,
            suspects: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the keys of why.json that the story reads."""
-    return {'verdict': verdict, 'effects': [{'name': name} for name in effects],
+    return {'verdict': verdict,
+            'effects': [{'name': name, 'drives': ['lift_1']} for name in effects],
             'indistinguishable': rivals or [], 'suspects': [{'name': name} for name in suspects]}
 
 
 @pytest.mark.parametrize(('hidden', 'diagnosis', 'said'), [
     (HIDDEN, answer('effect', 'viscous_friction'), 'and viscous_friction was found.'),
     (HIDDEN, answer('effect', 'viscous_friction', 'base_tilt'),
-     'base_tilt beside it is not in the robot'),
+     'base_tilt beside it is not in the robot.'),
+    ({**HIDDEN, 'drives': ['lift_1', 'lift_2']}, answer('effect', 'viscous_friction'),
+     'but on lift_1 instead of lift_1, lift_2.'),
+    (HIDDEN, answer('unknown', 'viscous_friction'), 'that something unknown remains is wrong.'),
     (HIDDEN, answer('ambiguous', 'platform_drag', rivals=[['platform_drag', 'viscous_friction']]),
      'among those that this motion cannot tell apart'),
     (HIDDEN, answer('effect', 'platform_drag'), 'platform_drag was named: that is wrong'),

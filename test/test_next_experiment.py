@@ -13,6 +13,7 @@ from ros_processes import executable
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.diagnose import _Stage
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
 from pprs_dynamics.effects.catalogue import CATALOGUE
@@ -23,6 +24,7 @@ from pprs_dynamics.experiments.fourier_path import FourierFamily
 from pprs_dynamics.experiments.information import Information, NoiseSpectra, block_index
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.experiments.next_experiment import PurposeError, experiment_of, next_experiment
+from pprs_dynamics.experiments.question import _Asker
 from pprs_dynamics.experiments.trajectory_search import (
     NoMotionError,
     TrajectorySearch,
@@ -279,6 +281,35 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     assert experiment_of(question, found).separates == (('coulomb_friction', 'load_friction'),)
 
 
+# From recordings to the question.
+
+def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np.ndarray) -> None:
+    """Coulomb friction on a drive: a freer form of it is no rival, another effect is one."""
+    robot = build_robot({**model.values, 'effects.active': ['coulomb_friction'],
+                         'effects.coulomb_friction.lift_1.force': 0.6})
+    time = np.arange(0.0, DURATION, 0.004)
+    path = FAMILY.path(parameters)
+    old = recorded(robot, path.motion(time), 1, 0.1)
+    stage = _Stage.of(model, [old], lambda share: None)
+    assert [one.candidate.name for one in stage.selection.adopted] == ['coulomb_friction']
+    stage.selection.rivals = {}
+    assert _Asker(stage).question().kind == 'estimate'
+    stage.selection.rivals = {'coulomb_friction': ['asymmetric_friction', 'load_friction']}
+    question = _Asker(stage).question()
+    assert question.kind == 'separate'
+    pairs = {(one.truth.name, one.rival.name) for one in question.contests}
+    assert ('coulomb_friction', 'load_friction') in pairs
+    assert ('load_friction', 'coulomb_friction') in pairs
+    assert ('coulomb_friction', 'asymmetric_friction') not in pairs
+    # What the same motion tells again doubles the misfit and leaves the priors as they are.
+    fine = np.arange(0.0, DURATION, 0.002)
+    columns = question.plan.on_motions(forces_of(model, [path], fine), fine, 5)[0]
+    again = question.known + question.information.of_motion(columns)
+    for contest in question.contests:
+        once = contest.misfit(question.known)
+        assert once < contest.misfit(again) < 2.6 * once + 1.0
+
+
 # The command.
 
 def pprs(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -304,6 +335,11 @@ def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
         one['label'] for one in result['accuracy']}
     for one in result['accuracy']:
         assert one['std_after'] <= (one['std_before'] or np.inf) * (1 + 1e-6)
+    known = {one['label']: one for one in result['accuracy']}
+    # Platform and payload weigh alike: their sum is told, their shares are not.
+    assert known['masses.payload']['std_after'] > 0.5 * known['masses.payload']['std_before']
+    assert known['masses.lifts[1]']['std_before'] == pytest.approx(0.5 * 0.1 / 2.5)
+    assert known['payload_mass.mass']['std_after'] < 0.1
     page = (tmp_path / 'first.html').read_text()
     assert 'The next experiment' in page
     assert 'http' not in page.split('plotly')[0]

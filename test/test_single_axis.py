@@ -284,6 +284,6 @@ def test_a_node_refuses_an_axis_in_one_sentence(node: str, ros_domain: int) -> N
         [executable(node), '--ros-args', '--params-file', str(FILE)],
         env=environment(ros_domain), capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
-    assert [line for line in done.stderr.splitlines() if 'axis.' in line][0].count(
+    assert next(line for line in done.stderr.splitlines() if 'axis.' in line).count(
         'needs a 3-PPRS') == 1
     assert 'Traceback' not in done.stderr

@@ -177,7 +177,8 @@ class CatalogueEffect(Effect):
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
         """Return the coefficients that belong to parameters."""
-        return {c.name: values[c.name] for c in cls.coefficients}
+        return {c.name: values[c.name] if c.default is None else values.get(c.name, c.default)
+                for c in cls.coefficients}
 
     @classmethod
     def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:

@@ -10,11 +10,13 @@ import numpy as np
 from scipy.stats import norm
 
 from pprs_dynamics.diagnosis.selection import FAR_SCORE
+from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.experiments.columns import Block
 from pprs_dynamics.experiments.commissioning import commissioning
-from pprs_dynamics.experiments.criteria import Contest, Precision
+from pprs_dynamics.experiments.criteria import Contest, Precision, index_of
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
-from pprs_dynamics.experiments.question import Question, question_of
+from pprs_dynamics.experiments.question import Question, block_scales, question_of
 from pprs_dynamics.experiments.trajectory_search import Found, TrajectorySearch, forces_of
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
@@ -97,6 +99,8 @@ class Experiment:
     expected_evidence : float
         The least of all contests that it decides; without contests, of all effects in question
         against their absence.
+    hidden : tuple of str
+        Effects in question that would not show at the size at which they matter.
     limits : dict of str to float
         Use of each limit, its margin taken off: at most 1.
     duration : float
@@ -111,6 +115,7 @@ class Experiment:
     bouts: tuple[Bout, ...]
     accuracies: tuple[Accuracy, ...]
     expected_evidence: float
+    hidden: tuple[str, ...]
     limits: dict[str, float]
     duration: float
     motion: Callable[[Array], PlatformMotion]
@@ -148,6 +153,8 @@ class Experiment:
                 found.append(f'It will hardly tell {", ".join(left)}: no motion within these '
                              'limits that was tried does so for sure.')
             return ' '.join(found)
+        last = (f' At the size at which they matter it would not show {", ".join(self.hidden)}: '
+                'a longer motion or wider limits would.' if self.hidden else '')
         return {
             'estimate': f'One explanation is left: {", ".join(self.subjects)}. This motion '
                         'measures its parameters best.',
@@ -156,14 +163,15 @@ class Experiment:
                       'Nothing is missing, and all is excited. This motion measures the model\'s '
                       'own numbers best.',
             'commission': 'This motion measures the model\'s numbers and shows all common '
-                          'effects.'}[self.kind]
+                          'effects.'}[self.kind] + last
 
     def as_data(self) -> dict[str, Any]:
         """Return the JSON of the interface, and what the documentation adds to it."""
         return {'separates': [list(pair) for pair in self.separates],
                 'does_not_separate': [list(pair) for pair in self.fails],
                 'expected_evidence': self.expected_evidence,
-                'question': self.kind, 'subjects': list(self.subjects), 'text': self.text,
+                'question': self.kind, 'subjects': list(self.subjects),
+                'hidden': list(self.hidden), 'text': self.text,
                 'contests': [one.as_data() for one in self.bouts],
                 'accuracy': [one.as_data() for one in self.accuracies],
                 'limits': self.limits, 'duration': self.duration}
@@ -238,13 +246,15 @@ def experiment_of(question: Question, found: Found) -> Experiment:
     known, after = question.known, question.known + found.gram
     bouts = tuple(_bout(one, known, after) for one in question.contests)
     decided = [one.expected for one in bouts if one.probability >= SURE]
+    evidences = _evidences(question, after)
     if bouts:
         expected = min(decided or [one.expected for one in bouts])
     else:
-        expected = _least_evidence(question, after)
+        expected = min(evidences.values(), default=0.0)
     return Experiment(
         question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), bouts,
-        _accuracies(question, known, after), expected,
+        tuple(_accuracies(question, known, after)), expected,
+        () if bouts else tuple(name for name, one in evidences.items() if one <= 0),
         dict(zip(limit_names(question.model), map(float, found.uses), strict=True)),
         found.path.duration, found.path.motion,
         lambda time: forces_of(question.model, [found.path], time), question.model)
@@ -257,32 +267,56 @@ def _bout(contest: Contest, known: Array, after: Array) -> Bout:
     return Bout(contest.truth.name, contest.rival.name, contest.evidence(known), expected, sure)
 
 
-def _least_evidence(question: Question, after: Array) -> float:
-    """Return the smallest evidence of a subject against its absence."""
+def _evidences(question: Question, after: Array) -> dict[str, float]:
+    """Return the evidence of each subject against its absence, the least of its drives."""
     base = tuple(range(len(question.plan.labels)))
-    found = []
+    found: dict[str, float] = {}
     for one in question.subjects:
         own = Precision(one.index, base, np.ones(len(one.index))).own(after)
-        found.append(float(one.truth @ own @ one.truth) - one.penalty)
-    return min(found, default=0.0)
+        evidence = float(one.truth @ own @ one.truth) - one.penalty
+        found[one.name] = min(evidence, found.get(one.name, np.inf))
+    return found
 
 
-def _accuracies(question: Question, known: Array, after: Array) -> tuple[Accuracy, ...]:
-    criterion = question.criterion
-    if not isinstance(criterion, Precision):
-        return ()
-    before, later = criterion.deviations(known), criterion.deviations(after)
-    labels: list[tuple[str, str]] = []
-    if not question.subjects or question.kind == 'commission':
-        labels += [(f'{number.label}', number.unit) for number in question.plan.numbers]
-    for one in question.subjects:
-        for block in one.blocks:
-            place = '' if block.drive is None else f'.{DRIVES[block.drive]}'
-            coefficients = [block.effect.coefficients[k] for k in block.chosen
-                            ] if block.effect.coefficients else []
-            labels += [(f'{block.effect.name}{place}.{c.name}', c.unit) for c in coefficients]
-            labels += [(f'{block.effect.name}{place}.{name}', 'relative')
-                       for name in list(block.shape)[0 if coefficients else -1:]]
-    return tuple(Accuracy(label, unit, float(scale), float(a), float(b))
-                 for (label, unit), scale, a, b in zip(
-                     labels, criterion.scales, before, later, strict=False))
+def _accuracies(question: Question, known: Array, after: Array) -> list[Accuracy]:
+    """Return how well numbers and effects would be known; effects that may be there each alone."""
+    if question.contests:
+        return []
+    labels = question.plan.labels
+    base = tuple(range(len(labels)))
+    found = []
+    if question.kind == 'commission' or not question.subjects:
+        numbers = tuple(k for k, (kind, _) in enumerate(labels) if kind == 'number')
+        scales = np.array([one.deviation for one in question.plan.numbers])
+        found += _known_to([(one.label, one.unit) for one in question.plan.numbers], scales,
+                           Precision(numbers, tuple(k for k in base if k not in numbers),
+                                     np.ones(len(numbers))), known, after)
+    groups = ([question.subjects] if question.kind == 'estimate' else
+              [(one,) for one in question.subjects])
+    for group in groups:
+        blocks = [block for one in group for block in one.blocks]
+        scales = np.concatenate([block_scales(block) for block in blocks])
+        found += _known_to([label for block in blocks for label in _labels(block)], scales,
+                           Precision(index_of(group), base, scales), known, after)
+    return found
+
+
+def _known_to(labels: list[tuple[str, str]], scales: Array, precision: Precision, known: Array,
+              after: Array) -> list[Accuracy]:
+    # Columns of numbers are per standard deviation of what is known beforehand.
+    unit = scales / precision.scales
+    return [Accuracy(label, what, float(scale), float(a), float(b))
+            for (label, what), scale, a, b in zip(
+                labels, scales, unit * precision.deviations(known),
+                unit * precision.deviations(after), strict=True)]
+
+
+def _labels(block: Block) -> list[tuple[str, str]]:
+    """Return name and unit of each of a block's columns."""
+    prefix = block.effect.name + ('' if block.drive is None else f'.{DRIVES[block.drive]}')
+    own = [(f'{prefix}.{c.name}', c.unit) for c in (
+        [block.effect.coefficients[k] for k in block.chosen] if block.effect.coefficients else ())]
+    shapes = [(f'{prefix}.{name}', 'ms' if block.effect is TimeDelay else 'relative')
+              for name in block.shape]
+    # The column of a delay as a whole says what its slope says.
+    return (own or [(f'{prefix} present', 'share')]) + shapes

@@ -30,7 +30,7 @@ def compiler() -> Callable[[Any], Callable[..., int]] | None:
     __pycache__ or the user's cache directory; NUMBA_CACHE_DIR names another one.
     """
     try:
-        import numba  # type: ignore[import-untyped, import-not-found, unused-ignore]  # noqa: F401
+        import numba  # noqa: F401
     except ImportError:
         return None
     try:

@@ -14,6 +14,7 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.margins import Margins, margins
+from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import answer_cdr
 from pprs_dynamics.nodes.answer import Answer, Feedforward
 from pprs_dynamics.nodes.conversions import NANOSECONDS
@@ -52,6 +53,8 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._failure: Exception | None = None
         own = declare_own(self, PARAMETERS)
         self._settings = ModelParameters(self, PARAMETERS, self._use_settings)
+        # Compiling or loading takes a second or more, for which no message should have to wait.
+        prepare(self._settings.model)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(CODES, 0)}

@@ -10,6 +10,7 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.diagnosis.live import Compared, LiveComparison
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
@@ -33,6 +34,7 @@ class MonitorNode(ExplainsRefusals):
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
         own = declare_own(self, PARAMETERS)
         self._settings = ModelParameters(self, PARAMETERS, self._use)
+        prepare(self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])
         self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}

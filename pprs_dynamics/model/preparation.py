@@ -1,0 +1,39 @@
+"""Compiles or loads what evaluations need, before anybody waits for an answer.
+
+`python -m pprs_dynamics.model.preparation` does it once after an installation.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.model.drive_model import DriveModel
+
+HEIGHT = 0.5  # [m], of the home pose
+SAMPLES = 3  # more than one, as for recordings
+
+
+def prepare(model: DriveModel) -> None:
+    """Evaluate a model once, both ways, alone and in a batch.
+
+    A robot that cannot be at the home pose refuses it, after what is needed has been compiled.
+    """
+    home = PlatformMotion.at_rest(np.tile([0.0, 0.0, HEIGHT], (SAMPLES, 1)),
+                                  np.tile([0.0, 0.0, 0.0, 1.0], (SAMPLES, 1)))
+    with suppress(PprsError):
+        forces = model.drive_forces(home)
+        model.drive_forces(home[:1])
+        position = forces.mechanism.position
+        solve_forward_motion(model.robot.geometry, position, np.zeros_like(position),
+                             np.zeros_like(position))
+        for effect in model.effects:
+            effect.force(forces.mechanism, effect.initial_memory())
+
+
+if __name__ == '__main__':
+    prepare(DriveModel.load())
