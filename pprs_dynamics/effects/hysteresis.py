@@ -25,7 +25,7 @@ class Hysteresis(DriveEffect):
     linear = (Parameter('force', 'F', 'N', 'friction force that builds up', -1e6, 1e6, 0.0, 0.5),
               Parameter('coefficient', 'mu', '1', 'friction per guide load that builds up', -1e3,
                         1e3, 0.0, 0.05))
-    variants = (('force',), ('coefficient',))
+    variants = (('force',), ('coefficient',), ('force', 'coefficient'))
     shape = (Parameter('distance', 'x_d', 'm', 'distance over which it builds up', 1e-7, 0.1,
                        scale=1e-4),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0, 'coefficient': 0.0}

@@ -38,11 +38,6 @@ def experiment_page(experiment: Experiment, motion: PlatformMotion) -> Page:
                   'diagnosis takes; the chance is that of the rival falling so far behind that '
                   'the diagnosis drops it.', 'note')
         page.table(BOUT_HEADINGS, bout_rows(experiment))
-    if experiment.accuracies:
-        page.heading('How well numbers would be known')
-        page.text('Standard deviations under the noise of the recordings. A number matters from '
-                  'the size in the fourth column.', 'note')
-        page.table(ACCURACY_HEADINGS, accuracy_rows(experiment))
     page.heading('The motion')
     page.figure(animate_robot(experiment.model, motion, 'The designed motion'))
     page.figure(_platform(motion))
@@ -50,6 +45,12 @@ def experiment_page(experiment: Experiment, motion: PlatformMotion) -> Page:
     page.heading('Use of the limits')
     page.text('Of what the margin leaves of each limit; checked at 500 Hz.', 'note')
     page.figure(_limits(experiment))
+    if experiment.accuracies:
+        page.heading('How well numbers would be known')
+        page.text('Standard deviations; effects that may or may not be there each beside the '
+                  'model alone. A number of an effect matters from the size in the fourth column; '
+                  'for a number of the model that is what its tolerance says.', 'note')
+        page.table(ACCURACY_HEADINGS, accuracy_rows(experiment))
     return page
 
 
