@@ -99,9 +99,9 @@ class Sensitivities(ABC):
 
         `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
         other widths of turning over would change in every drive, and `OF_JOINTS` in all passive
-        joints; `HOMING` per metre that each drive is measured too far; the coefficients of each effect of `absent` by
-        its name, and of those that the model has after `PRESENT`. What a kind of model does not
-        have is left out.
+        joints; `HOMING` per metre that each drive is measured too far; the coefficients of each
+        effect of `absent` by its name, and of those that the model has after `PRESENT`. What a
+        kind of model does not have is left out.
 
         Parameters
         ----------

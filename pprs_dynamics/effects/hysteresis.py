@@ -3,7 +3,8 @@
 With the drive moving by dq, the Dahl state z in [-1, 1] follows dz = (s - z) / x_d |dq|,
 s = sgn(dq), solved by z = s + (z_r - s) exp(-|q - q_r| / x_d) from a reversal at q_r, z_r on.
 The effect adds (F + mu N) (z - sgn q_dot): what presliding takes away from the Coulomb friction
-that the model already has, be it constant or in proportion to the guide's load N. Motion that reverses within a sample goes unseen.
+that the model already has, be it constant or in proportion to the guide's load N. Motion that
+reverses within a sample goes unseen.
 """
 
 from __future__ import annotations

@@ -67,7 +67,8 @@ class AxisState(AxisMotion):
     @cached_property
     def direction(self) -> Array:
         """sgn of the velocity, turning over within the reversal velocity, (N, 1)."""
-        return smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
+        direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
+        return direction
 
     @property
     def guide_load(self) -> Array:

@@ -27,5 +27,6 @@ class TimeDelay(SensorEffect):
     """Effort measured late (positive), or early because all encoders' values are late."""
 
     name: ClassVar[str] = 'time_delay'
-    form: ClassVar[str] = 'measured effort (t) = effort (t - delay), by late encoders where delay < 0'
+    form: ClassVar[str] = ('measured effort (t) = effort (t - delay), '
+                           'by late encoders where delay < 0')
     ranges: ClassVar[dict[str, Range]] = {'delay': Range('s', 0.003, 0.015, 'signed', scales=True)}
