@@ -36,7 +36,7 @@ def draw_before_after(
     noise : float
         rms of what neither model can know, over all drives [N].
     sentence : str
-        Heading.
+        Heading; it may have several lines.
     """
     pyplot = pyplot_module()
     figure, axes = pyplot.subplot_mosaic(
@@ -51,7 +51,7 @@ def draw_before_after(
     for axis in axes.values():
         axis.grid(alpha=0.25)
         axis.spines[['top', 'right']].set_visible(False)
-    figure.suptitle(fill(sentence, 135), fontsize=11)
+    figure.suptitle('\n'.join(fill(line, 135) for line in sentence.splitlines()), fontsize=11)
     return save(pyplot, figure, path)
 
 

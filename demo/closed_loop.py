@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.model_file import find_file
@@ -139,6 +140,16 @@ def run_case(
             _command('play_trajectory', player), domain, folder / 'player.log'))
         listener.spin_until(LEAD_IN + duration, PATIENCE)
     return listener.tracking()
+
+
+def commands_for(case: Case, path: HelicalPath | Excitation) -> np.ndarray:
+    """Return the commands that go over the topics for a path, (K, 19) as in `Tracking`."""
+    times = np.arange(0.0, path.duration + 1 / RATE, 1 / RATE)
+    motion = with_lead_in(path.motion(times), LEAD_IN, RATE)
+    forces = DriveModel.load(case.model).drive_forces(motion)
+    effort = forces.parts['rigid_body'] if case.feedforward == 'rigid_body' else forces.total
+    return np.column_stack((np.arange(len(motion)) / RATE, forces.mechanism.position,
+                            forces.mechanism.velocity, effort))
 
 
 def execute(case: Case, commands: np.ndarray) -> Tracking:

@@ -222,7 +222,7 @@ def draw(story: Story, added: bool, sentence: str) -> Path:
     if added:
         after, _ = measure_residuals(DriveModel.load(story.file('adopted.yaml')), [recording])
         fall = [float((one.error ** 2).mean() ** 0.5) for one in (before, after)]
-        sentence += (f' Error on a motion that was not fitted: {fall[0]:.3f} N before, '
+        sentence += (f'\nError on a motion that was not fitted: {fall[0]:.3f} N before, '
                      f'{fall[1]:.3f} N after.')
     return draw_before_after(story.folder / 'demo.png', before, after, noise, sentence)
 

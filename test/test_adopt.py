@@ -311,7 +311,7 @@ def test_the_node_starts_with_the_written_file(
             ros_domain, tmp_path / 'log', environment(ros_domain)) as process:
         part = f'/feedforward/effort/{HIDDEN}'
         assert running.spin_until(lambda: part in {
-            name for name, _ in running.probe.get_topic_names_and_types()}, 20), (
+            name for name, _ in running.probe.get_topic_names_and_types()}, 90), (
                 tmp_path / 'log').read_text()
         assert process.poll() is None
 

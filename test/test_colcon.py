@@ -24,7 +24,9 @@ def colcon_environment(domain: int) -> dict[str, str]:
     prefix = Path(sys.executable).parent
     # Where a ROS 2 is sourced, its own prefix path stays; else the wheels' environment is one.
     inherited.setdefault('AMENT_PREFIX_PATH', str(prefix.parent))
-    return {**inherited, 'PATH': f'{prefix}{os.pathsep}{inherited["PATH"]}'}
+    # A new folder would be compiled anew, for longer than the node is waited for here.
+    return {**inherited, 'PATH': f'{prefix}{os.pathsep}{inherited["PATH"]}',
+            'PPRS_DYNAMICS_PLAIN': '1'}
 
 
 @pytest.mark.parametrize('symlink', [False, True], ids=['copied', 'symlinked'])

@@ -42,7 +42,7 @@ BURST = 20  # messages that go out at once
 # window, and three bursts on the way.
 BEHIND = 50 + 30 + 3 * BURST
 SPAN = 0.8  # [s], of the running error
-LOAD_TIME = 20.0  # [s], for a parameter file on a busy machine
+PATIENCE = 90.0  # [s], on a busy machine, where a node's first answer may take long
 
 
 class Robot:
@@ -76,9 +76,21 @@ class Live:
     def __init__(self, running: Bench, robot: Robot) -> None:
         self.bench, self.robot = running, robot
         self.error = running.listen(Float64MultiArray, '/monitor/error', 1000)
+        running.follow_status('/monitor/status')
         self.judged = running.listen(JointState, '/monitor/residual', 5000)
         self.publisher = running.probe.create_publisher(JointState, '/joint_states', 1000)
         self.sent = 0
+
+    def knock(self) -> None:
+        """Publish single samples, long before the recording, until the node has got one."""
+        for seconds in range(60, 0, -1):
+            message = joint_state_of(self.robot.replayed, 0)
+            message.header.stamp.sec -= seconds
+            self.publisher.publish(message)
+            if self.bench.spin_until(lambda: self.bench.status and self.bench.status[-1][
+                    'counters']['received'] > 0, 1.5):
+                return
+        raise AssertionError('the monitor hears nothing')
 
     def replay(self, count: int) -> float:
         """Publish the next samples, and return the running error over all drives [N]."""
@@ -88,7 +100,7 @@ class Live:
             self.publisher.publish(message)
             # No faster than the node takes them: its queue is finite.
             if row % BURST == BURST - 1:
-                assert self.bench.spin_until(lambda row=row: len(self.judged) > row - BEHIND, 20)
+                assert self.bench.spin_until(lambda row=row: len(self.judged) > row - BEHIND, PATIENCE)
         self.sent += count
         before = -1
         while len(self.judged) > before:
@@ -102,7 +114,7 @@ class Live:
         assert self.bench.spin_until(client.service_is_ready)
         future = client.call_async(SetParameters.Request(
             parameters=[one.to_parameter_msg() for one in parameters]))
-        assert self.bench.spin_until(future.done, LOAD_TIME)
+        assert self.bench.spin_until(future.done, PATIENCE)
         return list(future.result().results)
 
     def load(self, node: str, file: Path) -> list[Any]:
@@ -110,7 +122,7 @@ class Live:
         client = AsyncParameterClient(self.bench.probe, node)
         assert self.bench.spin_until(client.services_are_ready)
         future = client.load_parameter_file(str(file), use_wildcard=True)
-        assert self.bench.spin_until(future.done, LOAD_TIME)
+        assert self.bench.spin_until(future.done, PATIENCE)
         return list(future.result().results)
 
     def topics(self) -> set[str]:
@@ -133,8 +145,9 @@ def live(robot: Robot, ros_domain: int, tmp_path: Path) -> Iterator[Live]:
         for name, more in (('monitor', ['-p', f'error_span:={SPAN}']), ('feedforward', [])):
             stack.enter_context(node_process([executable(name), *arguments, *more], ros_domain,
                                              tmp_path / f'{name}.log'))
-        assert running.spin_until(live.publisher.get_subscription_count, 20)
+        assert running.spin_until(live.publisher.get_subscription_count, PATIENCE)
         assert running.connected()
+        live.knock()
         yield live
 
 

@@ -47,6 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f'limit of every drive [m/s^2] (default {LIMITS.acceleration:g})')
     parser.add_argument('--tilt', type=positive, default=LIMITS.tilt,
                         help=f'limit of the platform [rad] (default {LIMITS.tilt:g})')
+    parser.add_argument('--condition', type=at_least(1.0), default=LIMITS.condition_number,
+                        help='limit of the condition number, where the model file allows more '
+                        f'(default {LIMITS.condition_number:g})')
     parser.add_argument('--margin', type=at_least(0.0), default=LIMITS.margin,
                         help='share of every limit, those of the model file included, that stays '
                         f'unused (default {LIMITS.margin:g})')
@@ -61,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     check_purpose(options.purpose, options.recordings)
     check_duration(options.duration)
-    limits = MotionLimits(options.velocity, options.acceleration, options.tilt, options.margin)
+    limits = MotionLimits(options.velocity, options.acceleration, options.tilt,
+                          options.condition, options.margin)
     model = DriveModel.load(check_output(options.output, options.model))
     recordings = read_all(options, screen, model.drives)
     show_findings(recordings, screen)

@@ -23,6 +23,9 @@ class MotionLimits:
         Of every drive [m/s, m/s^2].
     tilt : float
         Of the platform against the horizontal [rad].
+    condition_number : float
+        Of the drive Jacobian. Towards a singularity small errors of the model grow large, and a
+        few moments there would carry all the evidence.
     margin : float
         Share of every limit that is left unused, 0 to 0.9.
     effort_reserve : float
@@ -32,11 +35,12 @@ class MotionLimits:
     velocity: float = 0.5
     acceleration: float = 5.0
     tilt: float = 0.35
+    condition_number: float = 8.0
     margin: float = 0.1
     effort_reserve: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ('velocity', 'acceleration', 'tilt'):
+        for name in ('velocity', 'acceleration', 'tilt', 'condition_number'):
             if not getattr(self, name) > 0:
                 raise ModelError(name, getattr(self, name), 'be greater than 0')
         if not 0 <= self.margin <= 0.9:
@@ -69,7 +73,7 @@ class MotionLimits:
             ((1 - np.abs(state.chains.sin_u)) / (1 - sine)),
             (state.motion.tilt / (self.tilt * left))[:, None],
             (condition_number(model.robot.geometry, state.jacobians.J)
-             / (limits.condition_number * left))[:, None]]
+             / (min(limits.condition_number, self.condition_number) * left))[:, None]]
         if _needs_cosine(model):
             cosine = limits.rod_cosine + self.margin * (1 - limits.rod_cosine)
             columns.append((1 - np.abs(state.chains.cos_u)) / (1 - cosine))

@@ -54,6 +54,8 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         own = declare_own(self, PARAMETERS)
         self._settings = ModelParameters(self, PARAMETERS, self._use_settings)
         # Compiling or loading takes a second or more, for which no message should have to wait.
+        self.get_logger().info('loading the equations; the first time they are compiled, which '
+                               'takes some 15 s')
         prepare(self._settings.model)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
