@@ -10,7 +10,8 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 .PHONY: help demo demo-feedforward test reproduce feedforward localisation score benchmark reliability experiments lint clean
 
 help:
-	@echo 'make demo       install into $(VENV), run the nodes, show forces and a picture'
+	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
+	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
 	@echo 'make feedforward   the table and picture of docs/feedforward.md (4 minutes)'
@@ -22,6 +23,9 @@ help:
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
 demo: $(VENV)/.demo
+	@$(BIN)/python demo/diagnosis_demo.py output
+
+demo-feedforward: $(VENV)/.demo
 	@$(BIN)/python demo/feedforward_demo.py output
 
 test: $(VENV)/.test lint

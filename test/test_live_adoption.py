@@ -100,7 +100,8 @@ class Live:
             self.publisher.publish(message)
             # No faster than the node takes them: its queue is finite.
             if row % BURST == BURST - 1:
-                assert self.bench.spin_until(lambda row=row: len(self.judged) > row - BEHIND, PATIENCE)
+                assert self.bench.spin_until(
+                    lambda row=row: len(self.judged) > row - BEHIND, PATIENCE)
         self.sent += count
         before = -1
         while len(self.judged) > before:

@@ -207,8 +207,10 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(
     model: DriveModel, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Every limit in turn is made the one that stops the motion."""
-    for name, value in (('DRAWS', 4), ('STARTS', 1), ('HIGHEST_FREQUENCY', 0.5)):
-        monkeypatch.setattr(f'pprs_dynamics.experiments.trajectory_search.{name}', value)
+    for name, value in (('trajectory_search.DRAWS', 3), ('trajectory_search.STARTS', 1),
+                        ('trajectory_search.HIGHEST_FREQUENCY', 0.5), ('climbing.ROUNDS', 1),
+                        ('climbing.ITERATIONS', 1)):
+        monkeypatch.setattr(f'pprs_dynamics.experiments.{name}', value)
     tight = replace(model, limits=replace(model.limits, lift_stroke=(0.12, 0.30),
                                           effort=(9.0,) * 3 + (18.0,) * 3,
                                           condition_number=2.2, rod_sine=0.45))
