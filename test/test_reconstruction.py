@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.measurement import reconstruction
+from pprs_dynamics.measurement import followed_motion, reconstruction
 from pprs_dynamics.measurement.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
@@ -216,8 +216,8 @@ def test_a_jump_between_two_chunks_is_told(monkeypatch):
             motion.position + np.array([0.01, 0, 0]), motion.orientation, motion.linear_velocity,
             motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
 
-    monkeypatch.setattr(reconstruction, 'solve_forward_motion', hopping)
-    monkeypatch.setattr(reconstruction, 'CHUNK', 3000)
+    monkeypatch.setattr(followed_motion, 'solve_forward_motion', hopping)
+    monkeypatch.setattr(followed_motion, 'CHUNK', 3000)
     found = reconstruct(geometry, recording_of(real))
     assert found.jumps.tolist() == [3000]
     assert any(f'first at {found.time[3000]:.6g} s' in note for note in found.notes)
