@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.measurement import followed_motion, reconstruction
+from pprs_dynamics.measurement import followed_motion
 from pprs_dynamics.measurement.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
