@@ -14,6 +14,7 @@ from pprs_dynamics.diagnosis.scan import OWN_SHARE
 from pprs_dynamics.diagnosis.selection import FIRST_ERRORS, FURTHER_ERRORS
 from pprs_dynamics.diagnosis.trial import Offer, Trial
 from pprs_dynamics.effects.active_friction import ActiveFriction
+from pprs_dynamics.effects.axis_friction import AxisFriction
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.passive_friction import PassiveFriction
@@ -144,7 +145,7 @@ def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]
         part = residuals.parts.get(effect.name)
         if part is None:
             continue
-        if isinstance(effect, ActiveFriction):
+        if isinstance(effect, (ActiveFriction, AxisFriction)):
             own += part
         elif isinstance(effect, PassiveFriction):
             passive += part
