@@ -28,8 +28,10 @@ demo: $(VENV)/.demo
 demo-feedforward: $(VENV)/.demo
 	@$(BIN)/python demo/feedforward_demo.py output
 
+# Nodes run in real time: alone, after everything else has used both cores.
 test: $(VENV)/.test lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not nodes'
+	$(BIN)/python -m pytest -m nodes
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -303,6 +303,7 @@ def test_a_killed_adoption_leaves_no_half_file(files: Files, tmp_path: Path) -> 
     assert list(tmp_path.iterdir()) == [old]
 
 
+@pytest.mark.nodes
 def test_the_node_starts_with_the_written_file(
     files: Files, ros_domain: int, tmp_path: Path,
 ) -> None:

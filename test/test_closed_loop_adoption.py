@@ -15,6 +15,8 @@ from ros_processes import executable
 
 from pprs_dynamics.measurement.recording import write_recording
 
+pytestmark = pytest.mark.nodes
+
 HIDDEN = 'coulomb_friction'
 DURATION = 6.0  # [s]
 PATH = ['source:=excitation', f'duration:={DURATION}', 'seed:=1']

@@ -12,6 +12,8 @@ import pytest
 from node_bench import bench
 from ros_processes import environment, node_process
 
+pytestmark = pytest.mark.nodes
+
 PROJECT = Path(__file__).parents[1]
 PACKAGED = ('pprs_dynamics', 'config', 'resource', 'package.xml', 'setup.py', 'setup.cfg')
 

@@ -15,6 +15,8 @@ from std_msgs.msg import String
 
 from pprs_dynamics.nodes.executor import PromptExecutor
 
+pytestmark = pytest.mark.nodes
+
 PATIENCE = 10.0  # [s]
 
 

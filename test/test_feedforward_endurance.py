@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
-sys.path.append(str(Path(__file__).parents[1] / 'benchmarks'))
-
 import fuzz
 import parameter_storm
+import pytest
 import soak
+
+pytestmark = pytest.mark.nodes
 
 
 def test_no_damage_to_a_message_harms_the_node(ros_domain: int) -> None:

@@ -22,6 +22,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.nodes.feedforward import FeedforwardNode
 
+pytestmark = pytest.mark.nodes
+
 MOTION = random_motion(np.random.default_rng(3), 1)
 MESSAGE = message_of(MOTION)
 

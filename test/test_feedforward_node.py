@@ -25,6 +25,8 @@ from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.rejection import CODES
 
+pytestmark = pytest.mark.nodes
+
 
 @pytest.fixture
 def feedforward() -> Iterator[FeedforwardBench]:

@@ -23,6 +23,8 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.model.model_file import build_model
 
+pytestmark = pytest.mark.nodes
+
 MOTION = random_motion(np.random.default_rng(21), 1)
 MESSAGE = message_of(MOTION)
 

@@ -11,6 +11,8 @@ from sensor_msgs.msg import JointState
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.nodes import conversions
 
+pytestmark = pytest.mark.nodes
+
 TIMEOUT = 0.15  # [s]
 MOTION = random_motion(np.random.default_rng(11), 3)
 FORCES = DriveModel.load().drive_forces(MOTION)

@@ -32,6 +32,8 @@ from pprs_dynamics.model.model_file import read_parameters
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.nodes import conversions
 
+pytestmark = pytest.mark.nodes
+
 BENCHMARKS = Path(__file__).parents[1] / 'benchmarks'
 MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'adoption_score')
 HIDDEN = 'coulomb_friction'

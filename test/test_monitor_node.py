@@ -17,6 +17,8 @@ from pprs_dynamics.mechanism.robot import DRIVES, Array
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.monitor import MonitorNode
 
+pytestmark = pytest.mark.nodes
+
 RATE = 500
 ORDER = (3, 0, 5, 1, 4, 2)  # drives are matched by name, in any order
 START = 1_700_000_000_000_000_000  # [ns]; stamps since 1970, as on a robot

@@ -21,6 +21,8 @@ from pprs_dynamics.measurement.pose_files import read_poses, write_poses
 from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.nodes.trajectory_request import read_trajectory
 
+pytestmark = pytest.mark.nodes
+
 PAPER = Path(__file__).parents[1] / 'config' / 'paper.yaml'
 EQUAL = 1e-12
 

@@ -19,6 +19,8 @@ from pprs_dynamics.mechanism.robot import DRIVES, Array
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.simulated_robot import SimulatedRobotNode
 
+pytestmark = pytest.mark.nodes
+
 HOME = DriveModel.load().drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
 REST = HOME.mechanism.position[0]
 WEIGHT = HOME.parts['rigid_body'][0]

@@ -21,6 +21,8 @@ from pprs_dynamics.nodes.rejection import Rejection
 from pprs_dynamics.nodes.trajectory_cdr import is_whole, read_points
 from pprs_dynamics.nodes.trajectory_request import read_serialised, read_trajectory
 
+pytestmark = pytest.mark.nodes
+
 POINTS = st.integers(1, 30)
 SEEDS = st.integers(0, 2**32 - 1)
 

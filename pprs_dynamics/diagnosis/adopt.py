@@ -172,11 +172,12 @@ def adopt(
         held_out, gains = case.validated(trial.plain, trial.model, noises, period)
     else:
         held_out, gains = (trial.held_out_before, trial.held_out_after), trial.block_gains
-    found += objections.of_held_out_error(*held_out, gains, model, case.held_out)
+    floor = floor_of(trial.regression, trial.fit.rest)
+    found += [*objections.of_linearity(floor, rms(after)),
+              *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
     report(1.0)
     return case.answer(trial.model, trial.drives, found, remarks, rivals, trial.parameters,
-                       tuple(trial.calibrated), before, after, held_out,
-                       floor_of(trial.regression, trial.fit.rest))
+                       tuple(trial.calibrated), before, after, held_out, floor)
 
 
 def original(model: ForceModel) -> ForceModel:
@@ -270,6 +271,7 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     except ModelError as error:
         return case.without_model(str(error))
     before, after = case.residuals(regression, fitted)
+    floor = floor_of(regression, fit.rest)
     gains = block_gains(before, after, fit.noises, design.residuals.period)
     free = sum(column.kind == 'present' for column in design.base)
     evidence = float(gains.sum() - free * np.log(regression.samples)) - MARGIN
@@ -281,13 +283,14 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     if case.validate:
         held_out, gains = case.validated(case.model, fitted, fit.noises, design.residuals.period)
     if not found:
-        found = objections.of_held_out_error(*held_out, gains, case.model, case.held_out)
+        found = [*objections.of_linearity(floor, rms(after)),
+                 *objections.of_held_out_error(*held_out, gains, case.model, case.held_out)]
     report(1.0)
     effect = next(one for one in fitted.effects if one.name == name)
     return case.answer(
         fitted, tuple(effect.drives) if isinstance(effect, DriveEffect) else None, found, [], (),
         _present_parameters(regression, fit, fitted, case.offer), (), before, after, held_out,
-        floor_of(regression, fit.rest))
+        floor)
 
 
 def _present_parameters(regression: Regression, fit: JointFit, fitted: ForceModel,

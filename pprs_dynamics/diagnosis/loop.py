@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ class Walk:
     Parameters
     ----------
     steps : tuple of Adoption
-        The last of them is the refused one where that ended the walk.
+        Those that were refused are among them.
     ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
     reason : str
     model : ForceModel
@@ -58,7 +58,8 @@ def adopt_all(
     """Adopt what recordings call for, until a diagnosis finds nothing, or cannot tell.
 
     Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
-    error, and which of them it is another recording must show.
+    error, and which of them it is another recording must show. What is refused is left out
+    until something else has been adopted, and the walk goes on with what else was found.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def adopt_all(
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
-        Never fitted: an effect with which the error on them does not fall ends the walk.
+        Never fitted: an effect with which the error on them does not fall is refused.
     record : callable, optional
         Returns the model of an adoption with its entry in the ledger.
     progress : callable, optional
@@ -82,13 +83,17 @@ def adopt_all(
     report = progress or (lambda what, share: None)
     steps: list[Adoption] = []
     taken: list[FoundEffect] = []
+    refused: list[Adoption] = []
     if diagnosis is not None and original(model) is not model:
         diagnosis = None
     while True:
         if diagnosis is None:
             diagnosis = diagnose(original(model), recordings, (),
                                  lambda share: report('diagnosing', share))
-        found = _next(diagnosis, taken)
+        found = _next(diagnosis, taken, {step.offer.effect.name for step in refused})
+        if found is None and refused:
+            reasons = '; '.join(f'{step.offer.effect.name}: {step.reason}' for step in refused)
+            return Walk(tuple(steps), REFUSED, reasons, model, diagnosis)
         if found is None or len(taken) == MOST_STEPS:
             ended = 'unknown' if diagnosis.depends_on else 'adequate'
             reason = (f'what remains no effect of the catalogue explains: '
@@ -101,9 +106,11 @@ def adopt_all(
                      diagnosis=diagnosis)
         steps.append(step)
         if not step.adopted:
-            return Walk(tuple(steps), REFUSED, f'{name}: {step.reason}', model, diagnosis)
+            refused.append(step)
+            continue
         model = record(step)
         taken.append(found)
+        refused.clear()
         if step.rivals:
             return Walk(tuple(steps), AMBIGUOUS, f'{", ".join(step.rivals)} would explain these '
                         f'recordings as well as {name}: pprs next-experiment tells which motion '
@@ -111,9 +118,11 @@ def adopt_all(
         diagnosis = None
 
 
-def _next(diagnosis: Diagnosis, taken: Sequence[FoundEffect]) -> FoundEffect | None:
+def _next(diagnosis: Diagnosis, taken: Sequence[FoundEffect], refused: Set[str],
+          ) -> FoundEffect | None:
     """Return what to adopt: those that are certain first, an ambiguous one as the last."""
-    new = [one for one in diagnosis.effects if not _is_form(one, taken)]
+    new = [one for one in diagnosis.effects
+           if one.name not in refused and not _is_form(one, taken)]
     ambiguous = {name for names in diagnosis.indistinguishable for name in names}
     certain = [one for one in new if one.name not in ambiguous]
     return next(iter(certain or new), None)

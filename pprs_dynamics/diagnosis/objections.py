@@ -23,6 +23,7 @@ from pprs_dynamics.model.force_model import ForceModel
 
 SURE = 2.0  # standard deviations
 MOVING = 5.0  # widths in which friction turns over
+BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
 # Not friction: what they do below the bound no other force makes good.
 NOT_FRICTION = ('drive_inertia', 'revolute_stiffness')
@@ -90,6 +91,22 @@ def of_held_out_error(before: float, after: float, gains: Array, model: ForceMod
         return [f'the error on {where} does not fall: {before:.4g} N before, {after:.4g} N after']
     return [f'the error on {where} falls from {before:.4g} to {after:.4g} N, which is '
             f'{sure:.2g} standard errors over blocks, but it must be more than {asked:g}']
+
+
+def of_linearity(promised: float, found: float) -> list[str]:
+    """Return whether a fitted model is far from the linear fit that it was made of.
+
+    Columns of shapes and of numbers that bend forces hold near the model only.
+
+    Parameters
+    ----------
+    promised, found : float
+        Error on the recordings, of the linear fit and of the model [N].
+    """
+    if found <= BENT * promised:
+        return []
+    return [f'fitted with it, the model would leave {found:.4g} N where the fit promises '
+            f'{promised:.4g} N: its parameters are too far from where they started']
 
 
 def of_identifiability(trial: Trial) -> list[str]:

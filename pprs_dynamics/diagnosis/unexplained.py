@@ -60,20 +60,19 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
         Mean square of what effects in the model explain on each drive already [N^2].
     """
     regression = selector.regression
-    for _ in range(2):
+    while True:
         found = _search(regression, selection, explained)
-        dropped = [one for one in selection.adopted if (
+        # One at a time, the weakest first: without it, others may no longer look needless.
+        dropped = next((one for one in sorted(selection.adopted, key=lambda one: one.evidence) if (
             found.statements and _is_needless(one, selector, selection, found.statements,
                                               found.where))
-            or _is_stopgap(one, selector, selection)]
-        if not dropped:
-            break
-        selection.adopted = [one for one in selection.adopted if one not in dropped]
+            or _is_stopgap(one, selector, selection)), None)
+        if dropped is None:
+            return found
+        selection.adopted.remove(dropped)
         active = tuple(a for one in selection.adopted for a in one.candidate.active)
         selection.fit = regression.fit(active, selection.fit.noises)
-        for one in dropped:
-            selection.rivals.pop(one.candidate.name, None)
-    return found
+        selection.rivals.pop(dropped.candidate.name, None)
 
 
 def _search(regression: Regression, selection: Selection, before: Array) -> Unexplained:
@@ -117,17 +116,18 @@ def _explained(regression: Regression, selection: Selection) -> Array:
 
 
 def _is_stopgap(one: Judged, selector: Selector, selection: Selection) -> bool:
-    """Return whether an effect leaves most of its drives' error, and a free curve would not.
+    """Return whether most of its drives' error is left with an effect, and not with a free curve.
 
     The noise beside a poor explanation swallows the rest of the error. So the search goes over the
-    error as it was before the effect.
+    error as it was before the effect. Where all adopted effects together leave little of a drive's
+    error, none of them is a stopgap, however little each adds to the others.
     """
     regression, residuals = selector.regression, selector.regression.design.residuals
     others = tuple(a for other in selection.adopted if other is not one
                    for a in other.candidate.active)
     before = regression.at(others, selection.start.noises)
     poor = [d for d in one.candidate.drives or () if float(np.mean(
-        selection.fit.rest[d] ** 2)) > MOST_LEFT * float(np.mean(before.rest[d] ** 2))]
+        selection.fit.rest[d] ** 2)) > MOST_LEFT * float(np.mean(selection.start.rest[d] ** 2))]
     if not poor:
         return False
     measured = np.full(residuals.measured.shape, np.nan)
