@@ -47,24 +47,26 @@ CANDIDATES = 6
 Diagnose = Callable[..., Any]
 
 
-def cases(rows: Iterable[str], seeds: int, nothing: int, snrs: Iterable[float]) -> list[Case]:
-    """Return the cases of rows of the table, those of one seed together."""
+def cases(rows: Iterable[str], seeds: int, nothing: int, snrs: Iterable[float],
+          first: int = 0) -> list[Case]:
+    """Return the cases of rows of the table from a first seed on, those of one seed together."""
     levels = tuple(snrs)
+    drawn, empty = range(first, first + seeds), range(first, first + nothing)
     found: list[Case] = []
     for row in rows:
         if row == 'nothing':
-            found += [Case(row, (), s, noise=n) for s in range(nothing) for n in NOISES]
+            found += [Case(row, (), s, noise=n) for s in empty for n in NOISES]
         elif row == 'width':
-            found += [Case(row, (), s, width=WIDTHS[s % len(WIDTHS)]) for s in range(nothing)]
+            found += [Case(row, (), s, width=WIDTHS[s % len(WIDTHS)]) for s in empty]
         elif row == 'pairs':
-            found += [Case(row, names, s, 0.0) for s in range(seeds) for names in _sets(s)]
+            found += [Case(row, names, s, 0.0) for s in drawn for names in _sets(s)]
         elif row == 'slow':
-            found += [Case(row, (name,), s, snr, noise) for s in range(seeds)
+            found += [Case(row, (name,), s, snr, noise) for s in drawn
                       for name in IN_CATALOGUE for snr in levels if snr == 1
                       for noise in SLOW_NOISES]
         else:
             names = IN_CATALOGUE if row == 'effects' else NOT_IN_CATALOGUE
-            found += [Case(row, (name,), s, snr) for s in range(seeds) for name in names
+            found += [Case(row, (name,), s, snr) for s in drawn for name in names
                       for snr in levels if row == 'effects' or snr >= 1]
     return sorted(found, key=lambda case: (case.seed, case.width))
 
@@ -181,6 +183,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument('--development', action='store_true',
                         help='three seeds at SNR 1 and 3, and 12 of nothing, afresh')
     parser.add_argument('--seeds', type=int, default=20, help='per effect and level (default 20)')
+    parser.add_argument('--first', type=int, default=0, help='first seed (default 0); the first '
+                        'three are those that the diagnosis was developed on')
     parser.add_argument('--nothing', type=int, default=200,
                         help='recordings per row with nothing missing (default 200)')
     parser.add_argument('--snr', type=float, nargs='+', default=SNRS)
@@ -201,7 +205,7 @@ def main() -> int:
     options = _arguments()
     small = options.quick or options.development
     todo = (quick_cases() if options.quick else development_cases() if options.development
-            else cases(options.only, options.seeds, options.nothing, options.snr))
+            else cases(options.only, options.seeds, options.nothing, options.snr, options.first))
     if options.effect:
         todo = [case for case in todo if set(case.effects) & set(options.effect)]
     recordings = options.recordings or (OUTPUT / 'recordings' if small else None)

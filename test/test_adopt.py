@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from node_bench import bench
 from ros_processes import environment, executable, node_process
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.diagnosis import loop, objections
 from pprs_dynamics.diagnosis.adopt import Adoption, adopt
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.diagnosis.measuring import measure_residuals
@@ -336,6 +337,39 @@ def test_the_loop_walks_by_itself_until_nothing_is_left(
     assert [step['effect'] for step in walk['steps']] == [step.effect for step in steps]
     assert steps[1].error_before == pytest.approx(steps[0].error_after, rel=1e-5)
     assert error_on(new, second) < 1.1 * robot.best_error(first, second)
+
+
+def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is offered once more after something else was adopted, and told in the end."""
+    effects = [SimpleNamespace(name=name, effect=SimpleNamespace(name=name), drives=('slide_1',),
+                               evidence=100.0) for name in ('force_ripple', 'coulomb_friction')]
+    offered: list[str] = []
+
+    def found(model: tuple[str, ...], *_: object) -> SimpleNamespace:
+        left = tuple(one for one in effects if one.name not in model)
+        return SimpleNamespace(effects=left, indistinguishable=(), depends_on=())
+
+    def answer(model: tuple[str, ...], offer: Offer, *_: object, **__: object) -> SimpleNamespace:
+        name = offer.effect.name
+        offered.append(name)
+        good = name != 'force_ripple'
+        return SimpleNamespace(offer=offer, adopted=good, reason='it does not fall', rivals=(),
+                               after=(*model, name) if good else model)
+
+    for name, fake in (('diagnose', found), ('adopt', answer), ('original', lambda model: model),
+                       ('Offer', lambda effect, _: SimpleNamespace(effect=effect))):
+        monkeypatch.setattr(loop, name, fake)
+    walk: Any = loop.adopt_all((), [])  # type: ignore[arg-type]
+    assert offered == ['force_ripple', 'coulomb_friction', 'force_ripple']
+    assert walk.model == ('coulomb_friction',)
+    assert (walk.ended, walk.reason) == ('refused', 'force_ripple: it does not fall')
+
+
+def test_a_model_that_is_not_what_was_fitted_is_refused() -> None:
+    assert objections.of_linearity(1.2, 1.7) == []
+    said, = objections.of_linearity(1.2, 26.8)
+    assert '26.8 N' in said
+    assert '1.2 N' in said
 
 
 def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> None:
