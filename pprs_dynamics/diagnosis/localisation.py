@@ -9,7 +9,7 @@ that its variable can carry, and the search goes on; then the scatter of what re
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -95,7 +95,8 @@ class _Open:
 
 def localise(
     residuals: Residuals, *, false_alarms: float = FALSE_ALARMS, seed: int = 0,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | None = None, known: Localisation | None = None,
+    changed: Collection[str] = (),
 ) -> Localisation:
     """Return where the error of each drive lies, as far as noise would not do the same.
 
@@ -109,6 +110,9 @@ def localise(
         Of the draws that the threshold comes from.
     progress : callable, optional
         Called with the share of the work that is done.
+    known : Localisation, optional
+        Of residuals that differ on the `changed` drives only: the others keep their findings.
+    changed : collection of str
     """
     thin = residuals.thinned(MOST_SAMPLES)
     rng = np.random.default_rng(seed)
@@ -116,18 +120,22 @@ def localise(
     seeds = rng.spawn(len(thin.drives))
 
     def open_drive(drive: int) -> _Open | None:
-        if np.isfinite(thin.measured[:, drive]).sum() < LEAST_SAMPLES:
+        if (np.isfinite(thin.measured[:, drive]).sum() < LEAST_SAMPLES
+                or (known and thin.drives[drive] not in changed)):
             return None
         search = DriveSearch(thin, drive)
         return _open(search, seeds[drive]) if _has_error(search) else None
 
     opened = each(open_drive, range(len(thin.drives)))
     report(0.4)
-    threshold = _threshold([state.null for state in opened if state], false_alarms)
+    threshold = known.threshold if known else _threshold(
+        [state.null for state in opened if state], false_alarms)
     done: list[str] = []
 
     def search_drive(drive: int) -> DriveFindings:
         name, state = thin.drives[drive], opened[drive]
+        if known and name not in changed:
+            return known.drives[name]
         found = (DriveFindings((), None, np.zeros(0), np.zeros(0, dtype=int)) if state is None
                  else _search(name, state, threshold))
         done.append(name)

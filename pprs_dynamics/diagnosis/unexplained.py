@@ -7,6 +7,7 @@ variable explains far better than the effect adopted for it, was never that effe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,8 +61,8 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
         Mean square of what effects in the model explain on each drive already [N^2].
     """
     regression = selector.regression
+    found = _search(regression, selection, explained)
     while True:
-        found = _search(regression, selection, explained)
         # One at a time, the weakest first: without it, others may no longer look needless.
         dropped = next((one for one in sorted(selection.adopted, key=lambda one: one.evidence) if (
             found.statements and _is_needless(one, selector, selection, found.statements,
@@ -73,14 +74,18 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
         active = tuple(a for one in selection.adopted for a in one.candidate.active)
         selection.fit = regression.fit(active, selection.fit.noises)
         selection.rivals.pop(dropped.candidate.name, None)
+        found = _search(regression, selection, explained, found.where,
+                        dropped.candidate.drives or tuple(regression.series))
 
 
-def _search(regression: Regression, selection: Selection, before: Array) -> Unexplained:
+def _search(regression: Regression, selection: Selection, before: Array,
+            known: Localisation | None = None, changed: Sequence[int] = ()) -> Unexplained:
     residuals = regression.design.residuals
     remaining = np.full(residuals.measured.shape, np.nan)
     for d, series in regression.series.items():
         remaining[series.index, d] = np.where(series.known, selection.fit.rest[d], np.nan)
-    where = localise(replace(residuals, measured=residuals.model + remaining, parts={}))
+    where = localise(replace(residuals, measured=residuals.model + remaining, parts={}),
+                     known=known, changed=[residuals.drives[d] for d in changed])
     explained = before + _explained(regression, selection)
     statements: list[Statement] = []
     of_form: list[Statement] = []
