@@ -7,7 +7,8 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
 	&& echo $$p && break; done)
 
-.PHONY: help demo demo-feedforward test reproduce feedforward localisation score benchmark reliability experiments lint clean
+.PHONY: help demo demo-feedforward test reproduce feedforward localisation score adoption benchmark \
+	reliability reliability-full experiments lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
@@ -17,8 +18,10 @@ help:
 	@echo 'make feedforward   the table and picture of docs/feedforward.md (4 minutes)'
 	@echo 'make localisation  how often compare is right about where the model fails (long)'
 	@echo 'make score      how often diagnose is right about hidden effects (hours; it can be stopped)'
+	@echo 'make adoption   how good a model gets by what is found and added, from files to files (long)'
 	@echo 'make benchmark  speed against Pinocchio and MuJoCo, latency against an echo node'
 	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
+	@echo 'make reliability-full   the same at full size (an hour or two)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
@@ -49,12 +52,18 @@ localisation: $(VENV)/.demo
 score: $(VENV)/.test
 	$(BIN)/python benchmarks/score.py --jobs 2 --table docs/diagnosis_table.md
 
+adoption: $(VENV)/.test
+	$(BIN)/python benchmarks/adoption_score.py 24
+
 benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/speed.py
 	$(BIN)/python benchmarks/latency.py 10
 
 reliability: $(VENV)/.test
 	$(BIN)/python benchmarks/reliability.py
+
+reliability-full: $(VENV)/.test
+	$(BIN)/python benchmarks/reliability.py --full
 
 experiments: $(VENV)/.test
 	$(BIN)/python benchmarks/experiments_score.py
