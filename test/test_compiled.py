@@ -6,9 +6,12 @@ are kept, and nothing is lost where Numba is absent or has nowhere to keep what 
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,7 @@ from pprs_dynamics.errors import MotionError, SingularityError, WorkspaceError
 from pprs_dynamics.mechanism import compilation, evaluation
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.mechanism.forward_motion import platform_rates
+from pprs_dynamics.model.one_pass import SHORT
 
 # Compiled, sums may be associated otherwise; forces of up to 40 N then differ by some 1e-14.
 AGREEMENT = 1e-12
@@ -91,6 +95,89 @@ def test_one_pass_equals_the_steps_that_are_kept(variant):
     assert list(in_one.parts) == list(in_steps.parts)
     for name, part in in_steps.parts.items():
         assert_allclose(in_one.parts[name], part, rtol=AGREEMENT, atol=AGREEMENT, err_msg=name)
+
+
+@pytest.mark.parametrize('plain', [False, True])
+@pytest.mark.parametrize('samples', [1, 20, SHORT, SHORT + 1])
+def test_the_drives_motion_that_comes_with_the_forces_is_the_mechanisms(plainly, plain, samples):
+    model, motion = paper_model(), random_motion(np.random.default_rng(7), samples)
+    run = plainly if plain else (lambda function: function())
+    forces, state = run(lambda: (model.drive_forces(motion), model.mechanism(motion)))
+    expected = state.chains.position, state.chains.velocity, state.chains.acceleration
+    for kept, built, value in zip(run(lambda: forces.drive_motion),
+                                  run(lambda: forces.mechanism.kinematics.drive_motion),
+                                  expected, strict=True):
+        assert kept.flags.c_contiguous
+        assert_array_equal(kept, built)
+        assert_allclose(kept, value, rtol=AGREEMENT, atol=AGREEMENT)
+
+
+def test_forces_that_are_made_when_looked_at_are_forces_like_others():
+    model, motion = paper_model(), random_motion(np.random.default_rng(7), 3)
+    forces = model.drive_forces(motion)
+    for same in (copy.deepcopy(forces), pickle.loads(pickle.dumps(forces)),
+                 replace(forces, total=forces.total)):
+        assert_array_equal(sum(same.parts.values()), forces.total)
+        assert_array_equal(same.mechanism.position, forces.mechanism.position)
+    assert model.drive_forces(motion).mechanism.motion is motion
+    with pytest.raises(AttributeError, match='torque'):
+        forces.torque  # noqa: B018
+
+
+@pytest.mark.parametrize('plain', [False, True])
+@pytest.mark.parametrize('samples', [1, 3, 20])
+def test_what_is_allowed_is_what_no_check_objects_to(plainly, plain, samples):
+    limits, rng = paper_model().limits, np.random.default_rng(11)
+    run = plainly if plain else (lambda function: function())
+    lower, upper = limits.strokes
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+
+    def allowed(table, row=None, drive=None, which=None, value=None):
+        changed = table.copy()
+        if row is not None:
+            changed[which, row, drive] = value
+        return run(lambda: limits.allow(changed[0], tuple(changed[1:])))
+
+    shape = (samples, 6)
+    table = np.stack((rng.uniform(-1, 1, shape) * limits.efforts,
+                      middle + half * rng.uniform(-1, 1, shape),
+                      rng.normal(size=shape), rng.normal(size=shape)))
+    assert allowed(table)
+    limits.check_strokes(table[1])
+    limits.check_efforts(table[0])
+    row = samples - 1
+    for drive in range(6):
+        for which in range(4):
+            for value in (np.nan, np.inf, -np.inf):
+                assert not allowed(table, row, drive, which, value)
+        effort = limits.efforts[drive]
+        for value, fine in ((effort, True), (-effort, True), (np.nextafter(effort, np.inf), False),
+                            (-np.nextafter(effort, np.inf), False)):
+            assert allowed(table, row, drive, 0, value) is fine
+        for value, fine in ((lower[drive], True), (upper[drive], True),
+                            (np.nextafter(lower[drive], -np.inf), False),
+                            (np.nextafter(upper[drive], np.inf), False)):
+            assert allowed(table, row, drive, 1, value) is fine
+
+
+def test_a_motion_of_rows_is_checked_like_one_of_arrays():
+    motion = random_motion(np.random.default_rng(12), 5)
+    table = motion.rows.copy()
+    table[:, 3:7] *= 1.0005
+    given = table.copy()
+    rows = PlatformMotion.from_rows(table, np.arange(5.0))
+    assert_allclose(rows.rows, motion.rows, rtol=AGREEMENT, atol=AGREEMENT)
+    assert_array_equal(table, given)
+    for wrong, word in ((1.1, 'length'), (np.nan, 'finite')):
+        table = given.copy()
+        table[3, 3:7] *= wrong
+        with pytest.raises(MotionError, match=word):
+            PlatformMotion.from_rows(table)
+    with pytest.raises(MotionError, match='shape'):
+        PlatformMotion.from_rows(given[:0])
+    for time in ([np.nan], [0.0, 1.0]):
+        with pytest.raises(MotionError, match='time'):
+            PlatformMotion.from_rows(given[:1], time)
 
 
 def test_blocks_give_what_the_whole_gives(plainly, monkeypatch):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
@@ -112,3 +115,20 @@ def test_the_node_answers_a_pose_trajectory_as_a_whole_and_its_first_point() -> 
         np.testing.assert_allclose(effort, expected.total, rtol=0, atol=1e-4)
         node.send(without(SMOOTH[:1], 'velocities'))
         assert node.counters['SIZE'] == 1
+
+
+@pytest.mark.parametrize('missing', ['reject', 'spline'])
+def test_splines_are_loaded_before_messages_and_only_where_they_are_asked_for(missing: str) -> None:
+    code = (
+        'import sys\n'
+        'from pprs_dynamics import DriveModel\n'
+        'from pprs_dynamics.model.preparation import prepare\n'
+        'from pprs_dynamics.nodes.answer import Feedforward\n'
+        'from pprs_dynamics.nodes.feedforward_settings import PARAMETERS\n'
+        'model = DriveModel.load()\n'
+        'prepare(model)\n'
+        'own = {each.name: each.default for each in PARAMETERS}\n'
+        f'Feedforward(model, own | {{"missing_derivatives": {missing!r}}})\n'
+        'print("scipy.interpolate" in sys.modules)\n')
+    found = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == [str(missing == 'spline')]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from node_bench import Bench, bench
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -138,6 +139,18 @@ def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survive
     monitor.node._counters['received'] = monitor.sent
     monitor.send(300)
     assert monitor.bench.status[-1]['code'] == 'OK'
+
+
+def test_a_message_that_arrives_cut_off_is_counted_and_survived(monitor: MonitorBench) -> None:
+    message = conversions.joint_state(
+        START, monitor.effort[0], monitor.position[0], monitor.position[0])
+    data = bytes(serialize_message(message))
+    for length in (30, len(data) - 60, len(data) - 9):
+        monitor.publisher.publish(data[:length])
+    assert monitor.arrived(3)
+    assert monitor.node._counters['SIZE'] == 3
+    monitor.send(250)
+    assert monitor.node._counters['compared'] > 0
 
 
 def test_positions_that_no_platform_has_are_told_and_survived(monitor: MonitorBench) -> None:

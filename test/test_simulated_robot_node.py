@@ -10,6 +10,7 @@ import pytest
 from closed_loop import CASES, RATE, Case, Tracking, execute, run_case
 from node_bench import Bench, bench
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -135,6 +136,32 @@ def test_wrong_efforts_are_refused(robot: RobotBench) -> None:
     for data in ([1.0] * 5, [float('inf')] * 6, []):
         robot.efforts.publish(Float64MultiArray(data=data))
     assert robot.bench.spin_until(lambda: robot.node._counters['refused'] == 3)
+
+
+def test_commands_that_arrive_cut_off_are_refused(robot: RobotBench) -> None:
+    for message, publisher in ((robot.command(REST), robot.setpoint),
+                               (Float64MultiArray(data=WEIGHT.tolist()), robot.efforts)):
+        before = dict(robot.node._counters)
+        publisher.publish(bytes(serialize_message(message))[:-9])
+        assert robot.bench.spin_until(robot.says('REFUSED'))
+        assert robot.bench.spin_until(
+            lambda before=before: robot.node._counters['refused'] > before['refused'])
+        assert 'no whole' in robot.bench.status[-1]['message']
+    robot.bench.spin_for(0.1)
+    np.testing.assert_allclose(robot.position, REST, atol=1e-4)
+
+
+def test_without_a_timeout_the_last_setpoint_stays_in_force() -> None:
+    goal = REST + np.array([0, 0, 0, 0.01, 0.01, 0.01])
+    with bench() as running:
+        robot = RobotBench(running, command_timeout=0.0)
+        robot.setpoint.publish(robot.command(goal))
+        assert running.spin_until(robot.says('OK'))
+        assert running.spin_until(lambda: np.allclose(robot.position, goal, rtol=0, atol=5e-4), 20)
+        running.spin_for(0.5)
+        codes = [status['code'] for status in running.status]
+        assert 'HOLD' not in codes[codes.index('OK'):]
+        np.testing.assert_allclose(robot.position, goal, atol=5e-4)
 
 
 def test_a_hidden_effect_acts() -> None:

@@ -11,15 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.nodes import answer_cdr, conversions
 from pprs_dynamics.nodes.rejection import Rejection
-from pprs_dynamics.nodes.trajectory_cdr import is_whole, read_points
+from pprs_dynamics.nodes.trajectory_cdr import read_points
 from pprs_dynamics.nodes.trajectory_request import read_serialised, read_trajectory
+from pprs_dynamics.nodes.whole import is_whole, message_in
 
 pytestmark = pytest.mark.nodes
 
@@ -178,3 +179,34 @@ def test_every_whole_message_is_taken_for_one(points: int, seed: int) -> None:
     message = random_message(points, seed)
     alter(message, np.random.default_rng(seed))
     assert is_whole(serialize_message(message))
+
+
+def joint_state(frame: str, names: list[str], values: list[float]) -> JointState:
+    message = JointState(name=names, position=values, effort=values)
+    message.header.frame_id = frame
+    return message
+
+
+@pytest.mark.parametrize('message', [
+    joint_state('', list(DRIVES), [1.0] * 6), joint_state('base', ['a'], [2.0]),
+    joint_state('b', [], []), Float64MultiArray(data=[1.0] * 6), Float64MultiArray()])
+def test_other_messages_are_taken_whole_or_not_at_all(message: object) -> None:
+    data = bytes(serialize_message(message))
+    assert message_in(data, type(message)) == message
+    # What is serialised may be followed by up to 8 bytes that mean nothing.
+    whole = next(length for length in range(len(data) + 1)
+                 if is_whole(data[:length], type(message)))
+    assert whole >= len(data) - 8
+    assert message_in(data[:whole], type(message)) == message
+    for length in range(whole):
+        with pytest.raises(Rejection, match=r'^SIZE: .* no whole (sensor|std)_msgs/'):
+            message_in(data[:length], type(message))
+
+
+def test_an_array_with_dimensions_is_whole() -> None:
+    message = Float64MultiArray(data=[1.0, 2.0])
+    message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)
+                          for label in ('drive', 'x', 'four')]
+    data = bytes(serialize_message(message))
+    assert message_in(data, Float64MultiArray) == message
+    assert not is_whole(data[:-9], Float64MultiArray)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ UNIT_LENGTH_TOLERANCE = 1e-3
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
               'linear_acceleration', 'angular_acceleration')
 WIDTHS = [3, 4, 3, 3, 3, 3]
+ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
 OTHERS = (0, 1, 2, *range(7, 19))  # columns that are not orientations
 _NONE = np.empty(0)
 FLOAT = np.dtype(np.float64)
@@ -181,6 +183,18 @@ class PlatformMotion:
         return turn
 
     @classmethod
+    def from_rows(cls, rows: Array, time: ArrayLike | None = None) -> PlatformMotion:
+        """Return the motion in a table such as `rows`, an (N, 19) array of floats."""
+        checked = np.array(rows)
+        if not len(rows) or evaluate_if_ready(_motion_kernel, _NONE, checked) >= 0:
+            # What is wrong is said there.
+            P, q, v, omega, a, epsilon = np.split(rows, ENDS, axis=1)
+            return cls(P, q, v, omega, a, epsilon, time)
+        motion = object.__new__(cls)
+        motion._set(checked, None if time is None else _times(time, len(checked)))
+        return motion
+
+    @classmethod
     def at_rest(cls, position: ArrayLike, orientation: ArrayLike | None = None) -> PlatformMotion:
         """Return poses held still.
 
@@ -248,7 +262,7 @@ def _joined(columns: Sequence[Any]) -> Array | None:
     """Return columns as one table where they are floats of the right shapes, else None."""
     try:
         widths = [column.shape[1] for column in columns]
-        rows = np.concatenate(columns, axis=1)
+        rows = np.concatenate(columns, 1)
     except (AttributeError, IndexError, ValueError):
         return None
     right = widths == WIDTHS and type(rows) is np.ndarray and rows.dtype is FLOAT and len(rows)
@@ -324,6 +338,8 @@ def _times(time: ArrayLike, samples: int) -> Array:
     if times.shape != (samples,):
         raise MotionError('time', f'its shape is {np.shape(time)}', f'be ({samples},), as position',
                           'shape')
+    if samples == 1 and isfinite(times[0]):
+        return times  # of a stream's message, where the rest would take longer than the model
     if not np.all(np.isfinite(times)):
         raise MotionError('time', f'sample {int(np.argmax(~np.isfinite(times)))} is not finite',
                           'be finite', 'finite')

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import make_interp_spline
 
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.mechanism.motion import PlatformMotion
@@ -20,6 +19,11 @@ from pprs_dynamics.mechanism.robot import Array
 
 FEWEST_POSES = 4
 QUINTIC_FROM = 6  # poses; below, the splines are cubic
+
+
+def load_splines() -> None:
+    """Load what `spline_derivatives` needs: half a second, that nobody else should wait for."""
+    import scipy.interpolate  # noqa: F401
 
 
 def spline_derivatives(
@@ -47,6 +51,8 @@ def spline_derivatives(
     MotionError
         For poses or times that are none, or fewer than four.
     """
+    from scipy.interpolate import make_interp_spline
+
     zero = np.zeros((len(np.atleast_2d(position)), 3))
     poses = PlatformMotion(position, orientation, zero, zero, zero, zero, time)
     if poses.time is None or len(poses) < FEWEST_POSES:

@@ -77,6 +77,12 @@ class Kinematics:
         return inverse_table(self.geometry, self.chain_table, self.condition_limit)
 
     @cached_property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the drives [m, m/s, m/s^2], (N, 6) each."""
+        chains = self.chains
+        return chains.position, chains.velocity, chains.acceleration
+
+    @cached_property
     def chains(self) -> ChainKinematics:
         """Motion of the chains."""
         return ChainKinematics.from_table(self.chain_table)
@@ -156,17 +162,17 @@ class MechanismState:
     @property
     def position(self) -> Array:
         """Drive positions q [m]."""
-        return self.chains.position
+        return self.kinematics.drive_motion[0]
 
     @property
     def velocity(self) -> Array:
         """Drive velocities [m/s]."""
-        return self.chains.velocity
+        return self.kinematics.drive_motion[1]
 
     @property
     def acceleration(self) -> Array:
         """Drive accelerations [m/s^2]."""
-        return self.chains.acceleration
+        return self.kinematics.drive_motion[2]
 
     @property
     def guide_load(self) -> Array:

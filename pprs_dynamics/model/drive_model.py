@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
 from pprs_dynamics.model.keys import KEYS
 from pprs_dynamics.model.limits import Limits
-from pprs_dynamics.model.one_pass import OnePass
+from pprs_dynamics.model.one_pass import FORCES, OnePass
 
 __all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
 
@@ -41,6 +41,42 @@ class DriveForces(Forces):
     """
 
     mechanism: MechanismState
+
+    @classmethod
+    def of_one_pass(
+        cls, one_pass: OnePass, motion: PlatformMotion, table: Array,
+    ) -> DriveForces:
+        """Return the forces in a table of `OnePass.forces`.
+
+        Of one sample, parts and mechanism would take as long as the calculation: they are made
+        when somebody looks at them.
+        """
+        forces = object.__new__(cls)
+        own = forces.__dict__
+        own['total'], own['_origin'] = table[0], (one_pass, motion, table)
+        return forces
+
+    @cached_property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the drives [m, m/s, m/s^2], (N, 6) each."""
+        if '_origin' in self.__dict__:
+            table = self.__dict__['_origin'][2]
+            if len(table) > FORCES:
+                return tuple(table[FORCES:])
+        return self.mechanism.kinematics.drive_motion
+
+    def __getattr__(self, name: str) -> Any:
+        origin = self.__dict__.get('_origin')
+        if origin is None or name not in ('parts', 'mechanism'):
+            raise AttributeError(f'{type(self).__name__!r} object has no attribute {name!r}')
+        one_pass, motion, table = origin
+        made = _parts(table) if name == 'parts' else one_pass.mechanism(motion, table)
+        return self.__dict__.setdefault(name, made)
+
+
+def _parts(table: Array) -> dict[str, Array]:
+    """Return the parts in a table of `OnePass.forces` by name."""
+    return {RIGID_BODY: table[1], ActiveFriction.name: table[2], PassiveFriction.name: table[3]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,15 +165,13 @@ class DriveModel(ForceModel):
             that recordings beyond them can still be compared.
         """
         one_pass = self._one_pass
-        forces = None if one_pass is None else one_pass.forces(motion)
-        if one_pass is None or forces is None:
+        table = None if one_pass is None else one_pass.forces(motion)
+        if one_pass is None or table is None:
             return self.forces_at(self.mechanism(motion), state)
-        total, body, active, passive = forces
-        parts = {RIGID_BODY: body, ActiveFriction.name: active, PassiveFriction.name: passive}
-        mechanism, added = one_pass.mechanism(motion), self.effects[2:]
+        added = self.effects[2:]
         if not added:
-            return DriveForces(total, parts, mechanism)
-        return self._with_effects(added, parts, mechanism, state)
+            return DriveForces.of_one_pass(one_pass, motion, table)
+        return self._with_effects(added, _parts(table), one_pass.mechanism(motion, table), state)
 
     @cached_property
     def _one_pass(self) -> OnePass | None:

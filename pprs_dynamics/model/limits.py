@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.errors import LimitError, WorkspaceError
+from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.robot import DRIVES, Array
+
+COUNT = len(DRIVES)
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,26 @@ class Limits:
         clamped: Array = np.clip(forces, -self.efforts, self.efforts)
         return clamped
 
+    @cached_property
+    def _numbers(self) -> Array:
+        return np.concatenate((*self.strokes, self.efforts))
+
+    def allow(
+        self, forces: Array, drive_motion: tuple[Array, ...],
+    ) -> bool:
+        """Return whether all is finite, and neither a stroke nor an effort is exceeded.
+
+        In a tenth of the time that `check_strokes` and `check_efforts` need to say what is.
+
+        Parameters
+        ----------
+        forces : (N, 6) array
+            [N].
+        drive_motion : three (N, 6) arrays
+            Position, velocity and acceleration [m, m/s, m/s^2]; all of it C-contiguous.
+        """
+        return evaluate(allowed_kernel, self._numbers, forces, *drive_motion) < 0
+
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, 6), outside its stroke."""
         lower, upper = self.strokes
@@ -76,3 +100,17 @@ class Limits:
             sample, drive = (int(i) for i in np.argwhere(over)[0])
             raise LimitError(sample, DRIVES[drive], float(forces[sample, drive]),
                              self.effort[drive])
+
+
+def allowed_kernel(
+    p: Any, s: Any, forces: Any, position: Any, velocity: Any, acceleration: Any,
+) -> Any:
+    """Return whether a sample is allowed; p is the ends of the strokes, then the efforts."""
+    # 0 times infinity or NaN is NaN.
+    allowed = 0.0 * forces[s, 0] == 0.0
+    for i in range(COUNT):
+        force, q = forces[s, i], position[s, i]
+        finite = 0.0 * force + 0.0 * velocity[s, i] + 0.0 * acceleration[s, i] == 0.0
+        within = (q >= p[i]) & (q <= p[COUNT + i]) & (abs(force) <= p[2 * COUNT + i])
+        allowed = allowed & finite & within
+    return allowed

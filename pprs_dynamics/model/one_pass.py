@@ -57,6 +57,10 @@ class Settings(NamedTuple):
 
 JOINTS = ROBOT_NUMBERS + len(Settings._fields)
 DRIVES = JOINTS + len(Joints._fields)
+FORCES = 4  # total and three parts
+# Samples up to which the drives' motion is kept with the forces: a node checks it before it
+# answers; of a recording, writing it would take longer than calculating it where it is needed.
+SHORT = 2048
 
 
 class OnePass:
@@ -89,18 +93,22 @@ class OnePass:
     def forces(self, motion: PlatformMotion) -> Array | None:
         """Return total, rigid body, active and passive friction, (4, N, 6) [N].
 
-        None where a sample may be out of reach or too near a singularity: whoever asks must look
-        closely then.
+        For up to `SHORT` samples (7, N, 6): position, velocity and acceleration of the drives
+        follow [m, m/s, m/s^2]. None where a sample may be out of reach or too near a singularity:
+        whoever asks must look closely then.
         """
         rows = motion.rows
-        parts = np.empty((4, len(rows), 6))
-        doubtful = evaluate(forces_kernel, self.numbers, rows, parts)
-        return parts if doubtful < 0 else None
+        samples = len(rows)
+        table = np.empty((7 if samples <= SHORT else FORCES, samples, 6))
+        doubtful = evaluate(forces_kernel, self.numbers, rows, table)
+        return table if doubtful < 0 else None
 
-    def mechanism(self, motion: PlatformMotion) -> MechanismState:
-        """Return the state of the mechanism, not yet solved, for a motion without doubts."""
-        return MechanismState.unsolved(
-            self._fields, motion, Kinematics(self._geometry, motion, *self._bounds))
+    def mechanism(self, motion: PlatformMotion, table: Array) -> MechanismState:
+        """Return the state of the mechanism, not yet solved, for a motion and its forces."""
+        kinematics = Kinematics(self._geometry, motion, *self._bounds)
+        if len(table) > FORCES:
+            kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
+        return MechanismState.unsolved(self._fields, motion, kinematics)
 
 
 def settings_of(p: Any) -> Settings:
@@ -110,11 +118,15 @@ def settings_of(p: Any) -> Settings:
 
 
 def forces_kernel(p: Any, s: Any, motion: Any, parts: Any) -> Any:
-    """Fill tables of forces from one of motions; p as in `OnePass`."""
+    """Fill tables of forces from one of motions; p and tables as in `OnePass`."""
     m, size, settings = motion_sample(motion, s), lengths(p), settings_of(p)
     k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
     one, two = chain_motion(size, k1, m), chain_motion(size, k2, m)
     three = chain_motion(size, k3, m)
+    if len(parts) > FORCES:
+        _write_motion(parts, s, 0, one)
+        _write_motion(parts, s, 1, two)
+        _write_motion(parts, s, 2, three)
     rows_1 = closure_rows(k1, one.arm, one.cos_u, one.sin_u)
     rows_2 = closure_rows(k2, two.arm, two.cos_u, two.sin_u)
     rows_3 = closure_rows(k3, three.arm, three.cos_u, three.sin_u)
@@ -166,3 +178,11 @@ def _write_drives(
         smooth_sign(c.lift_velocity, p[lift + 12]))
     parts[0, s, i] = parts[1, s, i] + parts[2, s, i] + parts[3, s, i]          # Eq. (14)
     parts[0, s, 3 + i] = parts[1, s, 3 + i] + parts[2, s, 3 + i] + parts[3, s, 3 + i]  # Eq. (14)
+
+
+def _write_motion(parts: Any, s: Any, i: int, c: ChainSample) -> None:
+    """Write the motion of a chain's two drives."""
+    parts[FORCES, s, i], parts[FORCES, s, 3 + i] = c.slide, c.lift
+    parts[FORCES + 1, s, i], parts[FORCES + 1, s, 3 + i] = c.slide_velocity, c.lift_velocity
+    parts[FORCES + 2, s, i] = c.slide_acceleration
+    parts[FORCES + 2, s, 3 + i] = c.lift_acceleration

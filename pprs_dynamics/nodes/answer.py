@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.errors import LimitError
 from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.pose_spline import load_splines
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import RIGID_BODY, DriveForces, DriveModel
 from pprs_dynamics.model.limits import Limits
 from pprs_dynamics.nodes.conversions import NANOSECONDS
 from pprs_dynamics.nodes.feedforward_settings import CLAMP
 from pprs_dynamics.nodes.rejection import Rejection
-from pprs_dynamics.nodes.trajectory_request import TrajectoryRequest
+from pprs_dynamics.nodes.trajectory_request import SPLINE, TrajectoryRequest
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What goes out for a request.
 
     Parameters
@@ -66,6 +65,8 @@ class Feedforward:
         self._memory = model.continued_state(self._model, self._memory)
         self._model, self._scale = model, own['feedforward_scale']
         self._remembers = self._memory.has_memory
+        if own['missing_derivatives'] == SPLINE:
+            load_splines()
         self._clamps = own['limit_policy'] == CLAMP
         self._limits: Limits = model.limits
         if own['effort_limits']:
@@ -123,14 +124,19 @@ class Feedforward:
         return Answer(self._last, forces, effort)
 
     def _checked(self, request: TrajectoryRequest, forces: DriveForces) -> Answer:
-        mechanism, effort = forces.mechanism, forces.total
-        for name, quantity in (('force', effort), ('drive velocity', mechanism.velocity),
-                               ('drive acceleration', mechanism.acceleration)):
+        effort = forces.total if self._scale == 1 else self._scale * forces.total
+        if self._limits.allow(effort, forces.drive_motion):
+            return Answer(request, forces, effort)
+        return self._looked_at(request, forces, effort)
+
+    def _looked_at(self, request: TrajectoryRequest, forces: DriveForces, effort: Array) -> Answer:
+        """Return what goes out where something is not allowed, or raise what is wrong."""
+        position, velocity, acceleration = forces.drive_motion
+        for name, quantity in (('force', forces.total), ('drive velocity', velocity),
+                               ('drive acceleration', acceleration)):
             if not np.isfinite(quantity).all():
                 raise Rejection('OUTPUT', f'the model gave a {name} that is not finite')
-        self._limits.check_strokes(mechanism.position)
-        if self._scale != 1:
-            effort = self._scale * effort
+        self._limits.check_strokes(position)
         try:
             self._limits.check_efforts(effort)
         except LimitError as error:

@@ -54,9 +54,9 @@ def joint_trajectory(start: int, offsets: Indices, forces: DriveForces, effort: 
         [N].
     """
     points = np.zeros(len(offsets), _POINT)
-    mechanism = forces.mechanism
-    for name, values in (('positions', mechanism.position), ('velocities', mechanism.velocity),
-                         ('accelerations', mechanism.acceleration), ('effort', effort)):
+    position, velocity, acceleration = forces.drive_motion
+    for name, values in (('positions', position), ('velocities', velocity),
+                         ('accelerations', acceleration), ('effort', effort)):
         points[name]['count'][:, 0] = COUNT
         points[name]['values'] = values
     seconds, nanoseconds = np.divmod(offsets, NANOSECONDS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import signal
 import sys
@@ -31,6 +32,8 @@ def simulated_robot() -> int:
 
 def _run(module: str, node: str) -> int:
     use_one_thread()
+    # Libraries make objects that stay, which looking for garbage among them only delays.
+    gc.disable()
     # From here on a signal waits until the node can end properly, also while libraries load.
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:

@@ -196,11 +196,10 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
 
     def _publish_rest(self, answer: Answer) -> None:
         request, forces = answer.request, answer.forces
-        mechanism = forces.mechanism
         if self._joint_command.get_subscription_count():
+            position, velocity, _ = forces.drive_motion
             self._joint_command.publish(answer_cdr.joint_state(
-                request.first_stamp, answer.effort[0], mechanism.position[0],
-                mechanism.velocity[0]))
+                request.first_stamp, answer.effort[0], position[0], velocity[0]))
         if self._joint_trajectory.get_subscription_count():
             self._joint_trajectory.publish(answer_cdr.joint_trajectory(
                 request.start, request.offsets, forces, answer.effort))

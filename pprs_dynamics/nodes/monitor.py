@@ -17,6 +17,7 @@ from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
+from pprs_dynamics.nodes.whole import message_in
 
 PARAMETERS = (
     NodeParameter('window', 0.12, 'of the smoothing that gives velocity and acceleration; '
@@ -43,16 +44,18 @@ class MonitorNode(ExplainsRefusals):
         self._model_effort = self.create_publisher(JointState, '~/model_effort', EVERY_MESSAGE)
         self._residual = self.create_publisher(JointState, '~/residual', EVERY_MESSAGE)
         self._error = self.create_publisher(Float64MultiArray, '~/error', EVERY_MESSAGE)
-        self.create_subscription(JointState, 'joint_states', self._on_state, EVERY_MESSAGE)
+        self.create_subscription(JointState, 'joint_states', self._on_state, EVERY_MESSAGE,
+                                 raw=True)
         self.create_timer(1.0 / own['update_rate'], self._judge)
         self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
 
     def _use(self) -> None:
         self._comparison.use_model(self._settings.model)
 
-    def _on_state(self, message: JointState) -> None:
+    def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
+            message = message_in(data, JointState)
             position = conversions.read_drives(message, 'position')
             effort = conversions.read_drives(message, 'effort', may_be_nan=True)
         except Rejection as rejection:

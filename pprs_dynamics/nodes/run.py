@@ -45,9 +45,9 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
         node = factory()
         executor.add_node(node)
         # What stands now stays: the garbage collector need not walk through a quarter of a
-        # million objects in the middle of a control cycle.
-        gc.collect()
+        # million objects in the middle of a control cycle, nor now.
         gc.freeze()
+        gc.enable()
         executor.spin()
     except PprsError as error:
         return _complain(str(error))

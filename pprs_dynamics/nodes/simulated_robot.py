@@ -21,6 +21,7 @@ from pprs_dynamics.nodes.parameters import (
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.setpoints import SetpointQueue
 from pprs_dynamics.nodes.status import StatusReporter
+from pprs_dynamics.nodes.whole import message_in
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.robot import SimulatedRobot
@@ -32,8 +33,8 @@ PARAMETERS = (
     NodeParameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0),
     NodeParameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
                   'false: it is ignored, and the PD loop compensates gravity by itself'),
-    NodeParameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]',
-                  lower=0.001),
+    NodeParameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
+                  '0: never', lower=0, upper=3600),
     NodeParameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
     NodeParameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
     NodeParameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
@@ -73,8 +74,9 @@ class SimulatedRobotNode(Node):
         # What is hidden is told to nobody who only listens: the log is the robot's own.
         self._status = StatusReporter(self, {}, self._counters)
         self._states = self.create_publisher(JointState, 'joint_states', EVERY_MESSAGE)
-        self.create_subscription(JointState, '~/joint_command', self._on_setpoint, EVERY_MESSAGE)
-        self.create_subscription(Float64MultiArray, '~/commands', self._on_efforts, EVERY_MESSAGE)
+        for kind, topic, callback in ((JointState, '~/joint_command', self._on_setpoint),
+                                      (Float64MultiArray, '~/commands', self._on_efforts)):
+            self.create_subscription(kind, topic, callback, EVERY_MESSAGE, raw=True)
         self.get_logger().info(
             f'{own["rate"]:g} Hz, PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m, '
             f'hidden effects: {", ".join(hidden) or "none"}; holding at home')
@@ -117,9 +119,10 @@ class SimulatedRobotNode(Node):
             self.get_logger().warning(f'{note.code}: {note.message}', throttle_duration_sec=1.0)
         robot.notes.clear()
 
-    def _on_setpoint(self, message: JointState) -> None:
+    def _on_setpoint(self, data: bytes) -> None:
         self._counters['commands'] += 1
         try:
+            message = message_in(data, JointState)
             fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
             setpoint = Setpoint(*(conversions.read_drives(message, field) for field in fields))
         except PprsError as error:
@@ -129,8 +132,13 @@ class SimulatedRobotNode(Node):
         time = (stamp - self._start) / conversions.NANOSECONDS if stamp else self._now()
         self._queue.add(time, setpoint)
 
-    def _on_efforts(self, message: Float64MultiArray) -> None:
+    def _on_efforts(self, data: bytes) -> None:
         self._counters['commands'] += 1
+        try:
+            message = message_in(data, Float64MultiArray)
+        except PprsError as error:
+            self._refuse(str(error))
+            return
         efforts = np.array(message.data)
         if efforts.shape != (6,) or not np.all(np.isfinite(efforts)):
             self._refuse(f'data holds {len(efforts)} values, but it must be six finite efforts')
@@ -165,7 +173,7 @@ def _robot(values: Any, own: dict[str, Any]) -> SimulatedRobot:
         values, effects, seed=own['seed'], rate=own['rate'],
         control=ControlSettings(
             own['stiffness'], own['damping'], gravity_compensation=not own['use_effort'],
-            command_timeout=own['command_timeout'],
+            command_timeout=own['command_timeout'] or np.inf,
             actuation_delay=own['actuation_delay']),
         sensors=SensorSettings.with_effort_noise(
             own['effort_noise'], own['encoder_resolution']))

@@ -32,6 +32,8 @@ _HEADS = {
 _FRAMES = {1: '', 5: 'base'}
 # The first number of the first point stands here for both heads, as numbers are aligned to 8.
 _FIRST = 52
+# One point: 7 numbers, 6 velocities and 6 accelerations with their length words, and the time.
+_ONE = struct.Struct('<7dI4x6dI4x6diI')
 _POINT = np.dtype([
     # Of the first point, the length word may stand after the padding instead of before it.
     ('transforms', '<u4', 2), ('pose', '<f8', 7),
@@ -66,8 +68,12 @@ def read_points(data: bytes) -> tuple[int, Array, Indices] | None:
     # The first point's own word of the transforms follows the count at once.
     if WORD.unpack_from(data, head[1] + 4)[0] != 1:
         return None
+    seconds, nanoseconds = STAMP.unpack_from(data, 4)
+    stamp = seconds * NANOSECONDS + nanoseconds
+    if count == 1:
+        return _read_one(data, stamp)
     points = np.frombuffer(data, _POINT, count, _FIRST - 8)
-    if count > 1 and not (points['transforms'][1:, 0] == 1).all():
+    if not (points['transforms'][1:, 0] == 1).all():
         return None
     if not ((points['velocities'][:, 0] == 1).all() and (points['accelerations'][:, 0] == 1).all()):
         return None
@@ -75,53 +81,14 @@ def read_points(data: bytes) -> tuple[int, Array, Indices] | None:
     numbers[:, :7], numbers[:, 7:13] = points['pose'], points['velocity']
     numbers[:, 13:] = points['acceleration']
     times = points['time']
-    seconds, nanoseconds = STAMP.unpack_from(data, 4)
     offsets = times['sec'].astype(np.int64) * NANOSECONDS + times['nanosec']
-    return seconds * NANOSECONDS + nanoseconds, numbers, offsets
+    return stamp, numbers, offsets
 
 
-def is_whole(data: bytes) -> bool:
-    """Return whether the bytes hold every element that their length words promise.
-
-    The deserialiser of rmw_fastrtps does not notice where a message is cut off within padding
-    before a number, and reads on in foreign memory.
-    """
-    if len(data) < HEADER or data[0] or data[1] > 1:
-        # Another encoding: its deserialiser has to know.
-        return len(data) >= HEADER
-    word = WORD if data[1] else struct.Struct('>I')
-    try:
-        at = _after_text(data, word, HEADER + STAMP.size)
-        count, at = _count(data, word, at)
-        for _ in range(count):
-            at = _after_text(data, word, at)
-        count, at = _count(data, word, at)
-        for _ in range(count):
-            for numbers in (7, 6, 6):
-                elements, at = _count(data, word, at)
-                if elements:
-                    at = _aligned(at, 8) + 8 * numbers * elements
-            at = _aligned(at, 4) + STAMP.size
-    except struct.error:
-        return False
-    return at <= len(data)
-
-
-def _count(data: bytes, word: struct.Struct, at: int) -> tuple[int, int]:
-    """Return the length word at a place, and the place after it."""
-    at = _aligned(at, 4)
-    count: int = word.unpack_from(data, at)[0]
-    # Every element takes a byte at least: more than that is garbage, and would loop for ever.
-    if count > len(data):
-        raise struct.error
-    return count, at + word.size
-
-
-def _after_text(data: bytes, word: struct.Struct, at: int) -> int:
-    length, at = _count(data, word, at)
-    return at + length
-
-
-def _aligned(at: int, size: int) -> int:
-    """Return the next place that values of a size may start at, counted after the header."""
-    return at + (HEADER - at) % size
+def _read_one(data: bytes, stamp: int) -> tuple[int, Array, Indices] | None:
+    """Return the same of a message with one point: a stream's, where every microsecond counts."""
+    point = _ONE.unpack_from(data, _FIRST)
+    if point[7] != 1 or point[14] != 1:
+        return None
+    return stamp, np.array([point[:7] + point[8:14] + point[15:21]]), np.array(
+        [point[21] * NANOSECONDS + point[22]], np.int64)

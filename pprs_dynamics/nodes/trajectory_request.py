@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from rclpy._rclpy_pybind11 import RMWError
-from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from pprs_dynamics.measurement.samples import Indices, Mask
@@ -17,14 +14,14 @@ from pprs_dynamics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.nodes.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
 from pprs_dynamics.nodes.rejection import Rejection
-from pprs_dynamics.nodes.trajectory_cdr import is_whole, read_points
+from pprs_dynamics.nodes.trajectory_cdr import read_points
+from pprs_dynamics.nodes.whole import message_in
 
 REJECT, SPLINE = 'reject', 'spline'
 VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)
 
 
-@dataclass(frozen=True)
-class TrajectoryRequest:
+class TrajectoryRequest(NamedTuple):
     """What a trajectory message asks for.
 
     Parameters
@@ -60,14 +57,7 @@ def read_serialised(
     if points is not None:
         stamp, numbers, offsets = points
         return _request(_start(stamp, now, max_age), numbers, offsets)
-    try:
-        message = deserialize_message(data, MultiDOFJointTrajectory) if is_whole(data) else None
-    except (RMWError, UnicodeDecodeError):
-        message = None
-    if message is None:
-        raise Rejection('SIZE', f'{len(data)} bytes arrived that are no '
-                        'whole trajectory_msgs/MultiDOFJointTrajectory')
-    return read_trajectory(message, now, max_age, missing)
+    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing)
 
 
 def read_trajectory(
@@ -113,10 +103,8 @@ def _request(start: int, numbers: Array, offsets: Indices) -> TrajectoryRequest:
     if offsets[0] < 0:
         raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s, '
                         'but it must not be negative')
-    motion = PlatformMotion(
-        numbers[:, :3], numbers[:, 3:7], numbers[:, 7:10], numbers[:, 10:13], numbers[:, 13:16],
-        numbers[:, 16:], offsets / NANOSECONDS)
-    return TrajectoryRequest(motion, start, offsets)
+    return TrajectoryRequest(
+        PlatformMotion.from_rows(numbers, offsets / NANOSECONDS), start, offsets)
 
 
 def _start(stamp: int, now: int, max_age: float) -> int:
