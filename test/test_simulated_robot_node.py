@@ -25,7 +25,7 @@ pytestmark = pytest.mark.nodes
 HOME = DriveModel.load().drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
 REST = HOME.mechanism.position[0]
 WEIGHT = HOME.parts['rigid_body'][0]
-DURATION = 4.0  # [s]
+DURATION = 3.0  # [s]
 PATH = ['source:=excitation', f'duration:={DURATION}', 'seed:=2']
 
 

@@ -23,7 +23,7 @@ from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.selection import Judged, Selection, Selector
-from pprs_dynamics.diagnosis.unexplained import Unexplained, find_unexplained
+from pprs_dynamics.diagnosis.unexplained import Unexplained, explained_by, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
@@ -198,7 +198,7 @@ def diagnose(
         model_with = _model_with(stage, bent)
         stage = _Stage.of(model_with, recordings, lambda share: report(0.5 + 0.4 * share), bent)
     early = _effects_of(first, bent, validate) if bent else []
-    explained = sum((np.var(one.force, axis=0) for one in early), _explained_by(model, first))
+    explained = sum((np.var(one.force, axis=0) for one in early), explained_by(first.design))
     unexplained = find_unexplained(stage.selector, stage.selection, explained)
     report(0.95)
     return _answer(first, bent, early, stage, unexplained, validate)
@@ -223,17 +223,6 @@ class _Stage:
         selection = selector.select()
         regression.tell_widths(list(estimate_widths(regression, selection.fit)))
         return cls(design, regression, selector, selection)
-
-
-def _explained_by(model: ForceModel, stage: _Stage) -> Array:
-    """Return the mean square of what effects in the model explain on each drive, (D,) [N^2].
-
-    Their form leaves something over, as that of effects which are found now.
-    """
-    parts = stage.design.residuals.parts
-    return sum((np.nanvar(parts[effect.name], axis=0) for effect in model.effects
-                if isinstance(effect, CatalogueEffect) and effect.name in parts),
-               np.zeros(len(stage.design.drives)))
 
 
 def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> ForceModel:

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.diagnosis.regression import orthonormal
 from pprs_dynamics.diagnosis.selection import MARGIN, Judged, Selection, Selector
 from pprs_dynamics.diagnosis.wording import Statement
+from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.mechanism.robot import Array
 
 # Of the mean square that adopted effects explain on a drive: less is their form.
@@ -76,6 +78,17 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
         selection.rivals.pop(dropped.candidate.name, None)
         found = _search(regression, selection, explained, found.where,
                         dropped.candidate.drives or tuple(regression.series))
+
+
+def explained_by(design: Design) -> Array:
+    """Return the mean square of what effects in the model explain on each drive, (D,) [N^2].
+
+    Their form leaves something over, as that of effects which are found now.
+    """
+    parts = design.residuals.parts
+    return sum((np.nanvar(parts[effect.name], axis=0) for effect in design.model.effects
+                if isinstance(effect, CatalogueEffect) and effect.name in parts),
+               np.zeros(len(design.drives)))
 
 
 def _search(regression: Regression, selection: Selection, before: Array,

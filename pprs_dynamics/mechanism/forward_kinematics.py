@@ -131,6 +131,9 @@ def solve_forward_kinematics(
         count += found.steps
         relative = found.determinant / home_determinant
         good &= relative > 0
+        if moves == 1 and good.all():
+            pose, determinant, steps = moved, relative, count
+            break
         done = pending[good]
         pose[done], determinant[done] = moved[good], relative[good]
         steps[pending] += count

@@ -218,9 +218,8 @@ class PlatformMotion:
     ) -> PlatformMotion:
         """Return the motion of a spline through poses, differentiated analytically.
 
-        Positions by a quintic spline (cubic below six poses), orientations by a cubic spline of
-        rotation vectors on SO(3), so that angular velocity and acceleration are continuous and
-        no Euler angle wraps.
+        See `mechanism.pose_spline`: angular velocity and acceleration are continuous, no Euler
+        angle wraps, and the ends are as good as the middle.
 
         Parameters
         ----------
@@ -231,13 +230,8 @@ class PlatformMotion:
         at : (K,) array_like, optional
             Times at which to evaluate [s], in any order; the poses' own by default. The result
             carries times only without it.
-
-        References
-        ----------
-        scipy.interpolate.make_interp_spline, scipy.spatial.transform.RotationSpline.
         """
-        from scipy.interpolate import make_interp_spline
-        from scipy.spatial.transform import Rotation, RotationSpline
+        from pprs_dynamics.mechanism.pose_spline import spline_rows
 
         position = checked_matrix('position', position, 3)
         orientation = _normalised(checked_matrix('orientation', orientation, 4, len(position)))
@@ -248,14 +242,8 @@ class PlatformMotion:
         moments = knots if at is None else np.asarray(at, dtype=float)
         if not np.all(np.isfinite(moments)):
             raise MotionError('at', 'a time is not finite', 'be finite', 'finite')
-        path = make_interp_spline(knots, position, k=5 if len(knots) >= 6 else 3)
-        turn = RotationSpline(knots, Rotation.from_quat(orientation))
-        rotation = turn(moments)
-        # The spline's rates are in the turning frame; omega and its derivative turn alike.
-        return cls(
-            path(moments), rotation.as_quat(), path.derivative(1)(moments),
-            rotation.apply(turn(moments, 1)), path.derivative(2)(moments),
-            rotation.apply(turn(moments, 2)), knots if at is None else None)
+        rows = spline_rows(knots, position, orientation, moments)
+        return cls.from_rows(rows, knots if at is None else None)
 
 
 def _joined(columns: Sequence[Any]) -> Array | None:

@@ -1,9 +1,9 @@
-"""Velocities and accelerations of poses that come without, by splines through them.
+"""Motions of splines through poses, for poses that come without velocities and accelerations.
 
-Orientations are unit quaternions q, made continuous in sign, with a spline through each of
-their components. At the poses themselves |q| = 1, and there omega = 2 Im(q_dot q*) and
-epsilon = 2 Im(q_ddot q*): what the spline has along q is real and drops out. No Euler angle
-wraps, and the ends are as good as those of the positions: a spline of rotation vectors
+Orientations are unit quaternions, made continuous in sign, with a spline through each of their
+components. Between the poses its length n is not 1; the orientation is s / n, and
+omega = 2 Im(s_dot s*) / n^2, epsilon = 2 Im(s_ddot s*) / n^2 - 2 (s . s_dot) / n^2 omega. No Euler
+angle wraps, and the ends are as good as those of the positions: a spline of rotation vectors
 (scipy.spatial.transform.RotationSpline) has angular accelerations of its own choice there, and
 the first point is the one that is executed.
 """
@@ -51,25 +51,60 @@ def spline_derivatives(
     MotionError
         For poses or times that are none, or fewer than four.
     """
-    from scipy.interpolate import make_interp_spline
-
     zero = np.zeros((len(np.atleast_2d(position)), 3))
     poses = PlatformMotion(position, orientation, zero, zero, zero, zero, time)
     if poses.time is None or len(poses) < FEWEST_POSES:
         raise MotionError('poses', f'{len(poses)} were given', f'be at least {FEWEST_POSES} for '
                           'velocities and accelerations', 'shape')
-    quaternion = _continuous(poses.orientation)
-    coordinates = np.hstack((poses.position, quaternion))
     try:
         # Absurd poses overflow, and are told by what is not finite.
         with np.errstate(all='ignore'):
-            spline = make_interp_spline(
-                poses.time, coordinates, k=5 if len(poses) >= QUINTIC_FROM else 3)
-            first, second = (spline.derivative(order)(poses.time) for order in (1, 2))
-            return _twists(first, quaternion), _twists(second, quaternion)
+            rows = spline_rows(poses.time, poses.position, poses.orientation, poses.time)
+        return rows[:, 7:13], rows[:, 13:]
     except (ValueError, ArithmeticError, np.linalg.LinAlgError):
         unknown = np.full((len(poses), 6), np.nan)
         return unknown, unknown
+
+
+def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) -> Array:
+    """Return poses, velocities and accelerations of splines at any times, (K, 19).
+
+    Quintic from six poses on, below that cubic.
+
+    Parameters
+    ----------
+    knots : (N,) array
+        Strictly increasing times of the poses [s].
+    position : (N, 3) array
+        [m].
+    orientation : (N, 4) array
+        Unit quaternions x, y, z, w.
+    at : (K,) array
+        [s].
+
+    Returns
+    -------
+    (K, 19) array
+        Columns of `PlatformMotion.rows`.
+
+    Raises
+    ------
+    ValueError, ArithmeticError, numpy.linalg.LinAlgError
+        Where poses or times are so far apart that no spline can be computed.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(knots, np.hstack((position, _continuous(orientation))),
+                                k=5 if len(knots) >= QUINTIC_FROM else 3)
+    place, first, second = spline(at), spline.derivative(1)(at), spline.derivative(2)(at)
+    s = place[:, 3:]
+    square = np.sum(s * s, axis=1, keepdims=True)
+    omega = 2 * _vector_part(first[:, 3:], s) / square
+    growth = 2 * np.sum(s * first[:, 3:], axis=1, keepdims=True) / square
+    epsilon = 2 * _vector_part(second[:, 3:], s) / square - growth * omega
+    rows: Array = np.hstack((place[:, :3], s / np.sqrt(square), first[:, :3], omega,
+                             second[:, :3], epsilon))
+    return rows
 
 
 def _continuous(quaternion: Array) -> Array:
@@ -80,9 +115,7 @@ def _continuous(quaternion: Array) -> Array:
     return continuous
 
 
-def _twists(rates: Array, quaternion: Array) -> Array:
-    """Return linear rates, and twice the vector part of quaternion rate times conjugate."""
-    linear, rate, rate_w = rates[:, :3], rates[:, 3:6], rates[:, 6:]
-    vector, scalar = quaternion[:, :3], quaternion[:, 3:]
-    angular = 2 * (scalar * rate - rate_w * vector - np.cross(rate, vector))
-    return np.hstack((linear, angular))
+def _vector_part(a: Array, b: Array) -> Array:
+    """Return the vector part of quaternion a times the conjugate of b, (N, 3)."""
+    part: Array = b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
+    return part
