@@ -221,16 +221,15 @@ class _Listener:
         self.node = Node('listener', context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
-        self.commands: list[list[float]] = []
-        self.states: list[list[float]] = []
+        # Bytes, to be looked at when all is over: the nodes need the processor now.
+        self.commands: list[bytes] = []
+        self.states: list[bytes] = []
         self.status = '{}'
         self.subscriptions = [
-            self.node.create_subscription(
-                JointState, '/simulated_robot/joint_command',
-                lambda message: self.commands.append(_row(message)), 1000),
-            self.node.create_subscription(
-                JointState, '/joint_states',
-                lambda message: self.states.append(_row(message)), 1000),
+            self.node.create_subscription(JointState, topic, kept.append, 1000, raw=True)
+            for topic, kept in (('/simulated_robot/joint_command', self.commands),
+                                ('/joint_states', self.states))]
+        self.subscriptions += [
             self.node.create_subscription(String, '/simulated_robot/status', self._keep, LATCHED)]
         return self
 
@@ -262,7 +261,7 @@ class _Listener:
         while time.monotonic() < deadline:
             self.executor.spin_once(timeout_sec=0.05)
             if self.commands and self.states and (
-                    self.states[-1][0] > self.commands[0][0] + path_time):
+                    _row(self.states[-1])[0] > _row(self.commands[0])[0] + path_time):
                 return
         raise TimeoutError(f'{len(self.commands)} commands and {len(self.states)} states came')
 
@@ -271,8 +270,9 @@ class _Listener:
         import json
 
         counters = json.loads(self.status)['counters']
-        return _tracking(np.array(self.commands), np.array(self.states),
-                         counters['late'] / max(counters['cycles'], 1))
+        commands, states = (np.array([_row(data) for data in kept])
+                            for kept in (self.commands, self.states))
+        return _tracking(commands, states, counters['late'] / max(counters['cycles'], 1))
 
 
 def _tracking(commands: np.ndarray, states: np.ndarray, late_share: float) -> Tracking:
@@ -297,7 +297,11 @@ def _columns(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     return time_s[:, 0], position, velocity, effort
 
 
-def _row(message: Any) -> list[float]:
+def _row(data: bytes) -> list[float]:
+    from rclpy.serialization import deserialize_message
+    from sensor_msgs.msg import JointState
+
+    message = deserialize_message(data, JointState)
     stamp = message.header.stamp
     return [stamp.sec % 1_000_000 + stamp.nanosec * 1e-9, *message.position, *message.velocity,
             *message.effort]
