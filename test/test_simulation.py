@@ -16,7 +16,7 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MissingLibraryError, MotionError
 from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
 from pprs_dynamics.model.model_file import build_model
-from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
+from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Setpoint
 from pprs_dynamics.simulation.hidden_effect import DRIVES, HiddenEffectError
 from pprs_dynamics.simulation.hidden_effects import (
     HIDDEN_EFFECTS,
@@ -232,6 +232,20 @@ def drawn(name: str, seed: int = 5) -> object:
     if name == 'payload_pick_up':
         effect.parameters['time'] = 0.1
     return effect
+
+
+def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
+    """Setpoints every 5 ms fall between ticks every 2 ms: up to one tick passes before the next."""
+    speed, period, step = 0.2, 0.005, 0.0005
+    control = DriveControl(DriveModel.load().values, ControlSettings(), step)
+
+    def setpoint(time: float) -> Setpoint:
+        return Setpoint(np.full(6, 0.1 + speed * time), np.full(6, speed))
+
+    control.command(0.0, setpoint(0.0), setpoint(period), period)
+    for time in np.arange(0.0, period + 0.0015, step):
+        effort = control.effort(time, np.full(6, 0.1 + speed * time), np.full(6, speed))
+        np.testing.assert_allclose(effort, 0.0, atol=1e-9)  # a goal at rest costs up to 1.2 N
 
 
 def test_every_effect_of_the_interface_is_there() -> None:

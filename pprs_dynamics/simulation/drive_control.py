@@ -146,8 +146,8 @@ class DriveControl:
         setpoint : Setpoint
         following : Setpoint, optional
             The next one where it is known already: the drives then interpolate (positions by a
-            cubic, efforts by a straight line); else they go on with the velocity, and keep the
-            effort.
+            cubic, efforts by a straight line). Else, and beyond it, they go on with the velocity,
+            and keep the effort.
         after : float
             How long until then [s].
         """
@@ -195,7 +195,10 @@ class DriveControl:
         following, T = self._following, self._after
         if following is None or following.position is None or following.velocity is None or T <= 0:
             return position + age * velocity, velocity
-        s = min(age / T, 1.0)
+        if age > T:
+            # The next one is taken at the next tick: until then the goal must not stand still.
+            return following.position + (age - T) * following.velocity, following.velocity
+        s = age / T
         move = following.position - position
         bend_0, bend_1 = T * velocity - move, move - T * following.velocity
         goal = position + s * move + s * (1 - s) * ((1 - s) * bend_0 + s * bend_1)
