@@ -104,18 +104,9 @@ def _search(regression: Regression, selection: Selection, before: Array,
     of_form: list[Statement] = []
     for statement in where.statements:
         d = residuals.drives.index(statement.drive)
-        left = _size(statement, float(np.nanmean(remaining[:, d] ** 2)))
-        (of_form if left < FORM_SHARE * explained[d] else statements).append(statement)
+        small = statement.mean_square < FORM_SHARE * explained[d]
+        (of_form if small else statements).append(statement)
     return Unexplained(tuple(statements), tuple(of_form), where, remaining)
-
-
-def _size(statement: Statement, mean_square: float) -> float:
-    """Return the mean square of the pattern of a statement [N^2]."""
-    if statement.kind == 'scatter':
-        return mean_square * max(statement.share_of_error - statement.share_of_time, 0.0)
-    if statement.range is None or statement.kind == 'line':
-        return mean_square * statement.share_of_error
-    return statement.amplitude ** 2 * statement.share_of_time
 
 
 def _explained(regression: Regression, selection: Selection) -> Array:

@@ -44,6 +44,8 @@ class Statement:
         Of pattern, see `hypotheses.Pattern`; 'scatter' for a changed variance.
     amplitude : float
         Size of the pattern [N].
+    mean_square : float
+        Of the pattern over the record [N^2]; of a scatter what it is beyond the rest's.
     rivals : tuple of str
         Other variables that do nearly as well.
     """
@@ -57,6 +59,7 @@ class Statement:
     evidence: float
     kind: str
     amplitude: float
+    mean_square: float
     rivals: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -93,11 +96,18 @@ def word_statement(
     amplitude = float(np.abs(own).max()) if candidate.family.paired is False else float(
         np.hypot(*own))
     signed = float(own[0]) if len(own) else 0.0
+    if pattern.kind == 'fading':
+        # Its coefficient belongs to a standstill, which hardly any sample is as near as.
+        amplitude = float(np.abs(shape).max())
+        signed = float(np.copysign(amplitude, signed))
+    mean_square = float(np.mean(shape ** 2))
+    if pattern.kind == 'scatter':
+        mean_square = total / len(error) * max(share - time, 0.0)
     sentence = _sentence(candidate, search, signed, amplitude, share, time, shape)
     if rivals:
         sentence += f'; {_listed([_words(name) for name in rivals])} would explain it about as well'
     return Statement(drive, variable, limits, share, time, f'{drive}: {sentence}',
-                     candidate.score, pattern.kind, amplitude, rivals)
+                     candidate.score, pattern.kind, amplitude, mean_square, rivals)
 
 
 def _sentence(
