@@ -52,17 +52,36 @@ def judge(outcome: Outcome) -> dict[str, Any]:
         'suspected': name in [suspect['name'] for suspect in said['suspects']],
         'set_size': max([len(s) for s in sets if name in s], default=1),
         'good': first or in_set}
-    drives = truth['effects'][0]['drives']
-    if drives is not None and name in adopted:
-        judged['drives'] = set(said['effects'][adopted.index(name)]['drives']) == set(drives)
+    if truth['effects'][0]['drives'] is not None and name in adopted:
+        found = said['effects'][adopted.index(name)]
+        judged['drives'] = set(found['drives']) == set(
+            as_told(truth['effects'][0], found['drives'])['drives'])
     if adopted and name in SAME_FORM:
         judged['over_floor'] = said['effects'][-1]['error_after'] / truth['noise_floor']
     if name in adopted and name in SAME_FORM:
-        judged['covered'] = _covered(truth['effects'][0], said['effects'][adopted.index(name)])
+        found = said['effects'][adopted.index(name)]
+        judged['covered'] = _covered(
+            as_told(truth['effects'][0], found['drives'] or ()), found)
     best = best_fit_error(outcome)
     if best is not None and adopted:
         judged['over_best'] = said['effects'][-1]['error_after'] / best
     return judged
+
+
+def as_told(true: Mapping[str, Any], drives: Sequence[str]) -> dict[str, Any]:
+    """Return a true effect in the terms of an answer on some drives.
+
+    A common shift of all three lifts' zeros moves the whole robot up and changes no force: the
+    zeros of lifts can be told only against each other, and an answer may name two of them.
+    """
+    silent = [lift for lift in DRIVES[3:] if lift not in drives]
+    if true['name'] != 'homing_error' or not silent:
+        return dict(true)
+    shift = true['parameters'].get(silent[0], {}).get('zero', 0.0)
+    zeros = {drive: true['parameters'].get(drive, {}).get('zero', 0.0)
+             - (shift if drive in DRIVES[3:] else 0.0) for drive in DRIVES}
+    return {**true, 'drives': [drive for drive in DRIVES if zeros[drive]],
+            'parameters': {drive: {'zero': zero} for drive, zero in zeros.items() if zero}}
 
 
 def separable(outcome: Outcome) -> bool:

@@ -34,7 +34,7 @@ COEFFICIENT_PENALTY = 4.0
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 10, 12)
 # Least reach of data per lag: with fewer samples a coefficient cannot be estimated.
 SAMPLES_PER_REACH = 8
-LEAST_FOR_FFT = 6  # coefficients, from which on transforms are faster than sums
+LEAST_FOR_FFT = 12  # coefficients, from which on transforms are faster than sums
 ROUNDING = 1e-6  # innovations are at least this share of the noise
 
 
@@ -116,9 +116,10 @@ class NoiseModel:
                 white[..., start:] = self._filtered(y)[..., start:]
                 continue
             ahead = y[..., start:stop].copy()
-            for weight, (first, last) in zip(c, self.windows, strict=False):
+            # Python's floats leave single precision single.
+            for weight, (first, last) in zip(c.tolist(), self.windows, strict=False):
                 ahead -= weight * _window_mean(y, total, start, stop, first, last)
-            white[..., start:stop] = ahead / self.deviations[k]
+            white[..., start:stop] = ahead / float(self.deviations[k])
         return white
 
     def _filtered(self, y: Array) -> Array:

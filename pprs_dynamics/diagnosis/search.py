@@ -38,6 +38,7 @@ LEAST_INNOVATION = 1e-4
 # Limits move by up to a bin, then by shares of it: a step in time has to be met to the sample.
 REFINEMENT_PRICE = 3.0  # for the best of limits that the threshold's draws do not try
 COARSE, FINE = (1.0, 0.2), (0.04, 0.008)
+MOST_KEPT = 8000  # samples of which whitened columns are kept: some 20 MB per drive
 LOWEST_LINE = 3  # periods within the record, below which a line is a drift
 BACKGROUND_WIDTH = 41  # frequencies over which a line's background is taken
 
@@ -112,6 +113,7 @@ class DriveSearch:
             {name: values[self.index] for name, values in residuals.variables.items()},
             residuals.period)
         self.drive = drive
+        self._kept: dict[int, tuple[Array, Array]] = {}
 
     @cached_property
     def families(self) -> list[Family]:
@@ -192,16 +194,16 @@ class DriveSearch:
         sides = np.stack((white, *(draws.T if draws is not None else ()))).T
         sides[~self.known] = 0.0
         sides = (sides - basis.T @ (basis @ sides)).astype(np.float32)
+        narrow = basis.astype(np.float32)
         largest = np.full(sides.shape[1] - 1, -np.inf)
         candidates = []
-        for family in self.families:
+        for number, family in enumerate(self.families):
             if family.variable == 'time' and len(family.columns) == 1 and len(adopted) and np.ptp(
                     adopted, axis=1).min() == 0:
                 continue
-            x = self.whiten(noise, family.columns).astype(np.float32)
-            cross = x @ basis.T.astype(np.float32)
-            gains = pattern_gains(family, x @ sides, x @ x.T - cross @ cross.T,
-                           np.einsum('ij,ij->i', x, x))
+            x, gram = self._scanned(noise, number)
+            cross = x @ narrow.T
+            gains = pattern_gains(family, x @ sides, gram - cross @ cross.T, gram.diagonal())
             largest = np.maximum(largest, gains[:, 1:].max(axis=0) - family.penalty)
             best = int(np.argmax(gains[:, 0]))
             candidates.append(Candidate(family, family.patterns[best],
@@ -215,6 +217,16 @@ class DriveSearch:
             largest = np.maximum(largest, one_degree(highest) - line.family.penalty)
         candidates.sort(key=lambda candidate: -candidate.proposal)
         return candidates, largest
+
+    def _scanned(self, noise: NoiseModel, number: int) -> tuple[Array, Array]:
+        """Return a family's whitened columns and their Gram matrix, in single precision."""
+        # Those under the rich noise are asked for again and again.
+        keep = noise is self.rich_noise and len(self.error) <= MOST_KEPT
+        if keep and number in self._kept:
+            return self._kept[number]
+        x = self.whiten(noise, self.families[number].columns.astype(np.float32))
+        found = x, x @ x.T
+        return self._kept.setdefault(number, found) if keep else found
 
     def line(self, series: Array) -> Candidate | None:
         """Return the strongest spectral line of a series above its neighbourhood."""
