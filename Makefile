@@ -7,6 +7,9 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
 	&& echo $$p && break; done)
 
+# Side by side, processes with several threads each for linear algebra only wait for each other.
+export OPENBLAS_NUM_THREADS ?= 1
+
 .PHONY: help demo demo-feedforward test reproduce feedforward localisation score adoption benchmark \
 	reliability reliability-full experiments lint clean
 

@@ -8,6 +8,9 @@ from collections.abc import Iterator
 import pytest
 from ros_processes import environment, reserve_domain
 
+from pprs_dynamics.threads import use_one_thread
+
+use_one_thread()
 _DOMAIN, _HOLDER = reserve_domain()
 os.environ.update({name: value for name, value in environment(_DOMAIN).items()
                    if name.startswith('ROS_')})
