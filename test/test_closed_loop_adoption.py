@@ -58,5 +58,5 @@ def test_the_platform_follows_as_if_nothing_were_hidden(runs: Runs) -> None:
         known, hidden, adopted = (
             getattr(one, error) for one in (runs.known, runs.hidden, runs.adopted))
         assert hidden > 2 * known
-        # What is left over the error with nothing hidden is told in docs/feedforward.md.
-        assert adopted < hidden, error
+        # What is left, a few micrometres of encoders that count them, is in docs/feedforward.md.
+        assert hidden - adopted > 0.9 * (hidden - known), error
