@@ -1,7 +1,8 @@
-"""Runs the commands of docs/tutorial.md and draws its pictures: python docs/tutorial.py [FOLDER].
+"""Makes docs/tutorial.md and its pictures: python docs/tutorial.py [FOLDER].
 
 The recordings stand in for a user's own: the simulated robot with a hidden effect. Everything
-that the commands write and say goes to the folder (by default output/tutorial).
+that the commands write and say goes to the folder (by default output/tutorial); what of it a
+reader should look at goes into the text, docs/tutorial_text.md, in place of @NAME@.
 """
 
 from __future__ import annotations
@@ -44,6 +45,14 @@ COMMANDS = {
     'history': 'history adopted.yaml --report history.png',
 }
 
+# Of what a command says: from the first line that begins so to the next that begins so.
+EXCERPTS = {
+    'COMPARE': ('compare', ' ', '1. '), 'WHERE': ('compare', '1. ', 'page'),
+    'DIAGNOSE': ('diagnose', '╭', 'Within'), 'ADOPT': ('adopt', '╭', 'page'),
+    'WRONG': ('wrong', '╭', 'Error'), 'AGAIN': ('again', ' ', '1. '),
+    'HISTORY': ('history', 'Error', 'picture'),
+}
+
 
 def main() -> None:
     """Run all commands that have not run yet, and draw the pictures."""
@@ -67,6 +76,19 @@ def main() -> None:
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
         f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
         f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
+    write_page(folder)
+
+
+def write_page(folder: Path) -> None:
+    """Write the tutorial with what the commands have said."""
+    text = (DOCS / 'tutorial_text.md').read_text()
+    for name, (command, first, last) in EXCERPTS.items():
+        lines = (folder / f'{command}.txt').read_text().splitlines()[1:]
+        start = next(k for k, line in enumerate(lines) if line.strip() and line.startswith(first))
+        end = next(k for k in range(start + 1, len(lines)) if lines[k].startswith(last))
+        shown = '\n'.join(line.rstrip() for line in lines[start:end]).rstrip()
+        text = text.replace(f'@{name}@', f'```text\n{shown}\n```')
+    (DOCS / 'tutorial.md').write_text(text)
 
 
 def draw_where(residuals: Residuals) -> None:

@@ -104,3 +104,12 @@ def test_modules_are_short() -> None:
     lengths = {str(file.relative_to(PACKAGE)): len(file.read_text().splitlines())
                for file in files()}
     assert {name: length for name, length in lengths.items() if length > 350} == {}
+
+
+def test_no_page_is_left_with_a_gap_where_a_figure_belongs() -> None:
+    """Scripts fill in @NAME@; the texts that they fill are called ..._text.md."""
+    pages = [PACKAGE.parent / 'README.md', *(PACKAGE.parent / 'docs').glob('*.md')]
+    assert len(pages) > 8
+    gaps = {page.name: re.findall(r'@[A-Z]+@', page.read_text(encoding='utf-8'))
+            for page in pages if not page.stem.endswith('_text')}
+    assert not {name: found for name, found in gaps.items() if found}
