@@ -197,3 +197,18 @@ def test_what_no_effect_explains_is_told_with_its_variable(name: str, variable: 
     assert found.verdict == 'unknown'
     assert found.depends_on[0].drive in truth['effects'][0]['drives']
     assert found.depends_on[0].variable.startswith(variable)
+
+
+def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
+    effect = 'effects.stribeck_friction.slide_1.'
+    true = build_model({
+        **MODEL.values, 'friction.reversal_velocities': (0.0015, 0.0, 0.0, 0.0, 0.0, 0.0),
+        'effects.active': ['stribeck_friction'],
+        effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
+    recording = record(true, noise=0.05)
+    found = diagnose(MODEL, [recording])
+    widths = found.adopted.values['friction.reversal_velocities']
+    assert widths[0] == pytest.approx(0.0015, rel=0.05)
+    # What the linear fit promises is what the model does.
+    error = measure_residuals(found.adopted, [recording])[0].error
+    assert np.sqrt(np.nanmean(error ** 2)) < 1.02 * found.noise_floor

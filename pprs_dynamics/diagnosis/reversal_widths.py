@@ -7,6 +7,10 @@ it becomes one number per drive.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeAlias
+
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -14,11 +18,14 @@ from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.axis_friction import AxisFriction
+from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.mechanism.robot import Array
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
 TRIALS = 13
+# An effect on a drive, its shape and its coefficients.
+_Turning: TypeAlias = tuple[type[DriveEffect], Mapping[str, float], Array]
 LEAST_GAIN = 15.0  # twice the log-likelihood, for which a width is told
 KEY, COMMON_KEY = 'friction.reversal_velocities', 'friction.reversal_velocity'
 
@@ -51,13 +58,13 @@ def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
         if not columns:
             continue
         width = float(np.broadcast_to(design.model.reversal.velocity, len(design.drives))[d])
-        constant = _constant_friction(regression, fit, d)
+        turning = _turning(regression, fit, d)
         rest = fit.rest[d] + sum(fit.coefficients[k] * row for k, row in columns)
         white = series.whiten(fit.noises[d], rest)
 
         def gain(logarithm: float, d: int = d, width: float = width, white: Array = white,
-                 constant: float = constant) -> float:
-            column = _column(regression, d, friction, constant, width * float(np.exp(logarithm)))
+                 turning: list[_Turning] = turning) -> float:
+            column = _column(regression, d, friction, turning, width * float(np.exp(logarithm)))
             own = regression.series[d].whiten(fit.noises[d], column)
             return float(2 * own @ white - own @ own)
 
@@ -71,23 +78,45 @@ def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
     return found
 
 
-def _constant_friction(regression: Regression, fit: JointFit, d: int) -> float:
-    """Return the constant dry friction that the fit adds on a drive [N]."""
-    place, force = len(regression.design.base), 0.0
+def _turning(regression: Regression, fit: JointFit, d: int) -> list[_Turning]:
+    """Return the effects on a drive, fitted and in the model already, as they are in the fit."""
+    design = regression.design
+    found: list[_Turning] = []
+    place = len(design.base)
     for one in fit.active:
-        if isinstance(one, Active) and one.term.drive == d and (
-                one.term.effect.name == 'coulomb_friction'):
-            force += float(fit.coefficients[place])
+        if isinstance(one, Active) and one.term.drive == d and _may_turn(one.term.effect):
+            kind: Any = one.term.effect
+            coefficients = np.zeros(len(kind.coefficients))
+            coefficients[one.chosen] = fit.coefficients[place:place + one.size]
+            found.append((kind, one.term.shape, coefficients))
         place += one.size
-    return force
+    for effect in design.model.effects:
+        drives = effect.drives if isinstance(effect, DriveEffect) else {}
+        if _may_turn(type(effect)) and design.drives[d] in drives:
+            kind, block = type(effect), drives[design.drives[d]]
+            values = kind.to_coefficients(block)
+            found.append((kind, {p.name: block[p.name] for p in kind.shape},
+                          np.array([values[c.name] for c in kind.coefficients])))
+    return found
+
+
+def _may_turn(effect: type) -> bool:
+    """Return whether an effect is a force on a drive that knows no past."""
+    return (issubclass(effect, DriveEffect) and not issubclass(effect, MeasurementEffect)
+            and effect.drive_memory() is None)
 
 
 def _column(regression: Regression, d: int, friction: ActiveFriction | AxisFriction,
-            constant: float, width: float) -> Array:
+            turning: list[_Turning], width: float) -> Array:
+    """Return what all friction on a drive changes by when it turns over in another width."""
     parts = []
     for one in regression.design.recordings:
-        turned = smooth_sign(one.velocity[:, d], width) - one.direction[:, d]
-        dry = friction.dry(one.guide_load)[:, d] + constant
-        parts.append(one.treat((dry * turned)[:, None])[:, 0])
+        now = one.samples(slice(None), d)
+        then = replace(now, direction=smooth_sign(now.velocity, width))
+        change = friction.dry(one.guide_load)[:, d] * (then.direction - now.direction)
+        for effect, shape, coefficients in turning:
+            change += coefficients @ (np.stack(effect.columns(then, **shape))
+                                      - np.stack(effect.columns(now, **shape)))
+        parts.append(one.treat(change[:, None])[:, 0])
     column: Array = np.concatenate(parts)[regression.series[d].index]
     return column
