@@ -86,8 +86,8 @@ def _draw_drive(upper: Any, lower: Any, curves: Curves, drive: int) -> None:
     upper.tick_params(labelbottom=False)
     upper.sharex(lower)
     lower.set(xlabel='time [s]', ylabel='measured\nminus model [N]')
-    upper.legend(frameon=False, fontsize=9, loc='lower right', bbox_to_anchor=(1.0, 0.98),
-                 ncols=3)
+    upper.legend(frameon=False, fontsize=8, handlelength=1.2, columnspacing=1.0,
+                 loc='lower right', bbox_to_anchor=(1.0, 0.98), ncols=3)
 
 
 def _worst(residuals: Residuals, drive: int) -> slice:
