@@ -10,10 +10,12 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.design import SHAPE_STEP, BaseColumn, Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, JointFit, Regression
+from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, place_of
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.time_delay import TimeDelay
+from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import build_model
@@ -276,3 +278,21 @@ def _update_present(values: dict[str, Any], design: Design, fit: JointFit) -> No
             prefix = f'effects.{name}.{drive}.' if drive else f'effects.{name}.'
             for parameter in kind.parameters:
                 values[prefix + parameter.name] = _within(parameter, every[parameter.name])
+
+
+def contributed_force(design: Design, active: Sequence[Active], coefficients: Array) -> Array:
+    """Return what active terms contribute, (M, D) [N]."""
+    force, place = np.zeros(design.residuals.measured.shape), 0
+    for one in active:
+        for d in one.term.rows:
+            rows = one.on(d)
+            assert rows is not None
+            force[:, d] += rows[0] if one.fixed else coefficients[place:place + one.size] @ rows
+        place += one.size
+    return force
+
+
+def error_on(model: ForceModel, recordings: Sequence[Recording]) -> float:
+    """Return the error of a model on recordings, rms over samples and drives [N]."""
+    residuals, _ = measure_residuals(model, recordings)
+    return float(np.sqrt(np.nanmean(residuals.error ** 2)))

@@ -12,6 +12,8 @@ from pprs_dynamics.diagnosis.adoption import (
     Calibration,
     Estimate,
     calibrations,
+    contributed_force,
+    error_on,
     estimate_all,
     estimate_present,
     fitted_model,
@@ -19,7 +21,6 @@ from pprs_dynamics.diagnosis.adoption import (
 from pprs_dynamics.diagnosis.cautions import find_cautions
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
-from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.selection import Judged, Selection, Selector
@@ -242,14 +243,16 @@ def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> ForceModel:
 
 def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], stage: _Stage,
             unexplained: Unexplained, validate: Sequence[Recording]) -> Diagnosis:
-    late = _effects_of(stage, stage.selection.adopted, validate)
+    known = {one.candidate.name for one in bent}
+    late = _effects_of(stage, sorted(
+        stage.selection.adopted, key=lambda one: one.candidate.name not in known), validate)
     for k, one in enumerate(early):
-        known = estimate_present(stage.regression, stage.selection.fit, one.name)
-        early[k] = replace(one, parameters=known.parameters)
+        present = estimate_present(stage.regression, stage.selection.fit, one.name)
+        early[k] = replace(one, parameters=present.parameters)
     if early and late:
         late[0] = replace(late[0], error_before=early[-1].error_after,
                           held_out_before=early[-1].held_out_after)
-    effects = [*early, *late]
+    effects = _joined(early, late, first.design.drives)
     rivals = {**{one.candidate.name: first.selection.rivals.get(one.candidate.name, [])
                  for one in bent}, **stage.selection.rivals}
     sets = tuple((name, *others) for name, others in rivals.items() if others)
@@ -271,6 +274,25 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
         'validation' if validate else 'blocks', first.selector)
 
 
+def _joined(early: list[FoundEffect], late: list[FoundEffect], order: tuple[str, ...],
+            ) -> list[FoundEffect]:
+    """Return all effects; what comes late on further drives is the same effect."""
+    effects = list(early)
+    for one in late:
+        k = next((k for k, other in enumerate(early) if other.name == one.name), None)
+        if k is None:
+            effects.append(one)
+            continue
+        old, last = effects[k], len(early) - 1
+        effects[k] = replace(
+            old, drives=tuple(sorted({*(old.drives or ()), *(one.drives or ())}, key=order.index)),
+            parameters={**old.parameters, **one.parameters}, evidence=old.evidence + one.evidence,
+            force=old.force + one.force, at_bound=(*old.at_bound, *one.at_bound))
+        effects[last] = replace(effects[last], error_after=one.error_after,
+                                held_out_after=one.held_out_after)
+    return effects
+
+
 def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Recording],
                 ) -> list[FoundEffect]:
     """Return what a stage adopted, with the errors as one after the other is added."""
@@ -281,7 +303,7 @@ def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Rec
               *(regression.error(step.active, step.coefficients) for step in steps[1:])]
     if validate:
         models = [design.model, *(fitted_model(regression, step) for step in steps[1:])]
-        held_out = [_error_on(one, validate) for one in models]
+        held_out = [error_on(one, validate) for one in models]
     else:
         held_out = [regression.held_out_error(step.active, step.noises) for step in steps]
     places: dict[int, tuple[int, int]] = {}
@@ -299,7 +321,7 @@ def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Rec
             one.candidate.effect, _names(one, drives),
             {key: value for found in mine for key, value in found.parameters.items()},
             one.evidence, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-            _force(design, one.candidate.active, own),
+            contributed_force(design, one.candidate.active, own),
             tuple(key for found in mine for key in found.at_bound)))
     return effects
 
@@ -312,23 +334,6 @@ def _fit_of_first(stage: _Stage, adopted: Sequence[Judged], count: int) -> Joint
     active: tuple[Active, ...] = tuple(
         a for one in adopted[:count] for a in one.candidate.active)
     return stage.regression.fit(active, selection.fit.noises, iterations=1)
-
-
-def _error_on(model: ForceModel, recordings: Sequence[Recording]) -> float:
-    residuals, _ = measure_residuals(model, recordings)
-    return float(np.sqrt(np.nanmean(residuals.error ** 2)))
-
-
-def _force(design: Design, active: Sequence[Active], coefficients: Array) -> Array:
-    """Return what active terms contribute, (M, D) [N]."""
-    force, place = np.zeros(design.residuals.measured.shape), 0
-    for one in active:
-        for d in one.term.rows:
-            rows = one.on(d)
-            assert rows is not None
-            force[:, d] += rows[0] if one.fixed else coefficients[place:place + one.size] @ rows
-        place += one.size
-    return force
 
 
 def _ranked(one: Judged, drives: tuple[str, ...], regression: Regression) -> RankedEffect:
