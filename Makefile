@@ -18,7 +18,7 @@ help:
 	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
-	@echo 'make feedforward   the table and picture of docs/feedforward.md (4 minutes)'
+	@echo 'make feedforward   the table and picture of docs/feedforward.md (15 minutes)'
 	@echo 'make localisation  how often compare is right about where the model fails (long)'
 	@echo 'make score      how often diagnose is right about hidden effects (hours; it can be stopped)'
 	@echo 'make adoption   how good a model gets by what is found and added, from files to files (long)'
