@@ -52,16 +52,15 @@ def judge(outcome: Outcome) -> dict[str, Any]:
         'suspected': name in [suspect['name'] for suspect in said['suspects']],
         'set_size': max([len(s) for s in sets if name in s], default=1),
         'good': first or in_set}
-    if truth['effects'][0]['drives'] is not None and name in adopted:
-        found = said['effects'][adopted.index(name)]
-        judged['drives'] = set(found['drives']) == set(
-            as_told(truth['effects'][0], found['drives'])['drives'])
     if adopted and name in SAME_FORM:
         judged['over_floor'] = said['effects'][-1]['error_after'] / truth['noise_floor']
-    if name in adopted and name in SAME_FORM:
+    if name in adopted:
         found = said['effects'][adopted.index(name)]
-        judged['covered'] = _covered(
-            as_told(truth['effects'][0], found['drives'] or ()), found)
+        told = as_told(truth['effects'][0], found['drives'] or ())
+        if told['drives'] is not None:
+            judged['drives'] = set(found['drives']) == set(told['drives'])
+        if name in SAME_FORM:
+            judged['covered'] = _covered(told, found)
     best = best_fit_error(outcome)
     if best is not None and adopted:
         judged['over_best'] = said['effects'][-1]['error_after'] / best

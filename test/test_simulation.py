@@ -225,15 +225,6 @@ def test_the_lag_of_differentiated_velocities_is_no_tracking_error(
     assert tracking_error(needed['total']) < 1e-5
 
 
-# Hidden effects.
-
-def drawn(name: str, seed: int = 5) -> object:
-    effect = draw_effect(name, np.random.default_rng(seed))
-    if name == 'payload_pick_up':
-        effect.parameters['time'] = 0.1
-    return effect
-
-
 def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
     """Setpoints every 5 ms fall between ticks every 2 ms: up to one tick passes before the next."""
     speed, period, step = 0.2, 0.005, 0.0005
@@ -246,6 +237,15 @@ def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
     for time in np.arange(0.0, period + 0.0015, step):
         effort = control.effort(time, np.full(6, 0.1 + speed * time), np.full(6, speed))
         np.testing.assert_allclose(effort, 0.0, atol=1e-9)  # a goal at rest costs up to 1.2 N
+
+
+# Hidden effects.
+
+def drawn(name: str, seed: int = 5) -> object:
+    effect = draw_effect(name, np.random.default_rng(seed))
+    if name == 'payload_pick_up':
+        effect.parameters['time'] = 0.1
+    return effect
 
 
 def test_every_effect_of_the_interface_is_there() -> None:

@@ -10,12 +10,10 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.design import SHAPE_STEP, BaseColumn, Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, JointFit, Regression
-from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, place_of
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.time_delay import TimeDelay
-from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import build_model
@@ -290,9 +288,3 @@ def contributed_force(design: Design, active: Sequence[Active], coefficients: Ar
             force[:, d] += rows[0] if one.fixed else coefficients[place:place + one.size] @ rows
         place += one.size
     return force
-
-
-def error_on(model: ForceModel, recordings: Sequence[Recording]) -> float:
-    """Return the error of a model on recordings, rms over samples and drives [N]."""
-    residuals, _ = measure_residuals(model, recordings)
-    return float(np.sqrt(np.nanmean(residuals.error ** 2)))

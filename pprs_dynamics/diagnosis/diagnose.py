@@ -13,7 +13,6 @@ from pprs_dynamics.diagnosis.adoption import (
     Estimate,
     calibrations,
     contributed_force,
-    error_on,
     estimate_all,
     estimate_present,
     fitted_model,
@@ -21,6 +20,8 @@ from pprs_dynamics.diagnosis.adoption import (
 from pprs_dynamics.diagnosis.cautions import find_cautions
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.diagnosis.paired_errors import rms
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.selection import Judged, Selection, Selector
@@ -243,12 +244,12 @@ def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> ForceModel:
 
 def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], stage: _Stage,
             unexplained: Unexplained, validate: Sequence[Recording]) -> Diagnosis:
+    regression, fit = stage.regression, stage.selection.fit
     known = {one.candidate.name for one in bent}
     late = _effects_of(stage, sorted(
         stage.selection.adopted, key=lambda one: one.candidate.name not in known), validate)
     for k, one in enumerate(early):
-        present = estimate_present(stage.regression, stage.selection.fit, one.name)
-        early[k] = replace(one, parameters=present.parameters)
+        early[k] = replace(one, parameters=estimate_present(regression, fit, one.name).parameters)
     if early and late:
         late[0] = replace(late[0], error_before=early[-1].error_after,
                           held_out_before=early[-1].held_out_after)
@@ -258,7 +259,6 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
     sets = tuple((name, *others) for name, others in rivals.items() if others)
     verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
                else 'effect' if effects else 'adequate')
-    regression, fit = stage.regression, stage.selection.fit
     moved = [one for one in calibrations(regression, fit)
              if abs(one.after - one.before) > 2 * one.std]
     noise = np.concatenate([rest[regression.series[d].known] for d, rest in fit.rest.items()])
@@ -303,7 +303,7 @@ def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Rec
               *(regression.error(step.active, step.coefficients) for step in steps[1:])]
     if validate:
         models = [design.model, *(fitted_model(regression, step) for step in steps[1:])]
-        held_out = [error_on(one, validate) for one in models]
+        held_out = [rms(measure_residuals(one, validate)[0]) for one in models]
     else:
         held_out = [regression.held_out_error(step.active, step.noises) for step in steps]
     places: dict[int, tuple[int, int]] = {}

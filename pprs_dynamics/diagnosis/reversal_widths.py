@@ -18,7 +18,7 @@ from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.axis_friction import AxisFriction
-from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
+from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples, MeasurementEffect
 from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.mechanism.robot import Array
 
@@ -59,12 +59,15 @@ def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
             continue
         width = float(np.broadcast_to(design.model.reversal.velocity, len(design.drives))[d])
         turning = _turning(regression, fit, d)
+        known = [_dry_force(one.samples(slice(None), d), friction.dry(one.guide_load)[:, d],
+                            turning) for one in design.recordings]
         rest = fit.rest[d] + sum(fit.coefficients[k] * row for k, row in columns)
         white = series.whiten(fit.noises[d], rest)
 
         def gain(logarithm: float, d: int = d, width: float = width, white: Array = white,
-                 turning: list[_Turning] = turning) -> float:
-            column = _column(regression, d, friction, turning, width * float(np.exp(logarithm)))
+                 turning: list[_Turning] = turning, known: list[Array] = known) -> float:
+            column = _column(regression, d, friction, turning, known,
+                             width * float(np.exp(logarithm)))
             own = regression.series[d].whiten(fit.noises[d], column)
             return float(2 * own @ white - own @ own)
 
@@ -79,7 +82,7 @@ def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
 
 
 def _turning(regression: Regression, fit: JointFit, d: int) -> list[_Turning]:
-    """Return the effects on a drive, fitted and in the model already, as they are in the fit."""
+    """Return the effects on a drive: those of the fit, and those in the model as it has them."""
     design = regression.design
     found: list[_Turning] = []
     place = len(design.base)
@@ -106,17 +109,25 @@ def _may_turn(effect: type) -> bool:
             and effect.drive_memory() is None)
 
 
+def _dry_force(drive: DriveSamples, dry: Array, turning: list[_Turning]) -> Array:
+    """Return all of a drive's force that may turn over with its direction, (N,) [N]."""
+    force = dry * drive.direction
+    for effect, shape, coefficients in turning:
+        force += coefficients @ np.stack(effect.columns(drive, **shape))
+    return force
+
+
 def _column(regression: Regression, d: int, friction: ActiveFriction | AxisFriction,
-            turning: list[_Turning], width: float) -> Array:
-    """Return what all friction on a drive changes by when it turns over in another width."""
+            turning: list[_Turning], known: list[Array], width: float) -> Array:
+    """Return what all friction on a drive changes by when it turns over in another width.
+
+    `known` is the force in the model's own width, recording by recording.
+    """
     parts = []
-    for one in regression.design.recordings:
-        now = one.samples(slice(None), d)
-        then = replace(now, direction=smooth_sign(now.velocity, width))
-        change = friction.dry(one.guide_load)[:, d] * (then.direction - now.direction)
-        for effect, shape, coefficients in turning:
-            change += coefficients @ (np.stack(effect.columns(then, **shape))
-                                      - np.stack(effect.columns(now, **shape)))
+    for one, now in zip(regression.design.recordings, known, strict=True):
+        drive = one.samples(slice(None), d)
+        drive = replace(drive, direction=smooth_sign(drive.velocity, width))
+        change = _dry_force(drive, friction.dry(one.guide_load)[:, d], turning) - now
         parts.append(one.treat(change[:, None])[:, 0])
     column: Array = np.concatenate(parts)[regression.series[d].index]
     return column
