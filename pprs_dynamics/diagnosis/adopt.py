@@ -22,11 +22,11 @@ from pprs_dynamics.diagnosis.adoption import (
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
+from pprs_dynamics.diagnosis.judging import MARGIN
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.paired_errors import block_gains, rms
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.diagnosis.selection import MARGIN
 from pprs_dynamics.diagnosis.trial import Offer, try_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.errors import ModelError

@@ -14,7 +14,7 @@ from pprs_dynamics.diagnosis.scan import Scan
 from pprs_dynamics.diagnosis.selection import Selection, Selector
 
 if TYPE_CHECKING:
-    from pprs_dynamics.diagnosis.diagnose import FoundEffect
+    from pprs_dynamics.diagnosis.found_effects import FoundEffect
 
 SHORT = 8.0  # [s]
 FEW_SAMPLES = 60.0  # independent ones, per drive

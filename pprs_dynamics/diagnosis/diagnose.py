@@ -10,7 +10,6 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.adoption import (
     Calibration,
-    Estimate,
     calibrations,
     contributed_force,
     estimate_all,
@@ -19,15 +18,16 @@ from pprs_dynamics.diagnosis.adoption import (
 )
 from pprs_dynamics.diagnosis.cautions import find_cautions
 from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, joined, listed
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.paired_errors import rms
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
-from pprs_dynamics.diagnosis.selection import Judged, Selection, Selector
+from pprs_dynamics.diagnosis.selection import Selection, Selector
 from pprs_dynamics.diagnosis.unexplained import Unexplained, explained_by, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
-from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
@@ -37,66 +37,6 @@ DESIGN, SELECTION = 0.4, 0.3
 # Effects that change how all others show, or that their columns describe only nearby.
 NOT_LINEAR = frozenset({'time_delay', 'homing_error', 'effort_gain', 'payload_offset',
                         'base_tilt'})
-
-
-@dataclass(frozen=True)
-class FoundEffect:
-    """An effect that the recordings call for.
-
-    Parameters
-    ----------
-    effect : type of CatalogueEffect
-    drives : tuple of str or None
-        On which it sits; None for the structure.
-    parameters : dict of str to Estimate
-    evidence : float
-        Twice the gain in log-likelihood, less penalty and margin.
-    error_before, error_after, held_out_before, held_out_after : float
-        [N], with the effects before it, and with it as well.
-    force : (M, D) array
-        What it contributes [N].
-    at_bound : tuple of str
-        Parameters that stand at a bound.
-    """
-
-    effect: type[CatalogueEffect]
-    drives: tuple[str, ...] | None
-    parameters: dict[str, Estimate]
-    evidence: float
-    error_before: float
-    error_after: float
-    held_out_before: float
-    held_out_after: float
-    force: Array
-    at_bound: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Name in the catalogue."""
-        return self.effect.name
-
-    def as_data(self) -> dict[str, Any]:
-        """Return the keys of the interface."""
-        return {'name': self.name, 'drives': _listed(self.drives),
-                'parameters': {key: one.as_data() for key, one in self.parameters.items()},
-                'evidence': self.evidence,
-                'error_before': self.error_before, 'error_after': self.error_after,
-                'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
-
-
-@dataclass(frozen=True)
-class RankedEffect:
-    """A candidate for the first place, or a suspect."""
-
-    name: str
-    drives: tuple[str, ...] | None
-    evidence: float
-    error_after: float
-
-    def as_data(self) -> dict[str, Any]:
-        """Return the keys of the interface."""
-        return {'name': self.name, 'drives': _listed(self.drives), 'evidence': self.evidence,
-                'error_after': self.error_after}
 
 
 @dataclass(frozen=True)
@@ -162,7 +102,7 @@ class Diagnosis:
                 {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
                  'range': None if s.range is None else list(s.range), 'text': s.text}
                 for s in self.depends_on],
-            'suspects': [{'name': s.name, 'drives': _listed(s.drives), 'evidence': s.evidence}
+            'suspects': [{'name': s.name, 'drives': listed(s.drives), 'evidence': s.evidence}
                          for s in self.suspects],
             'calibrated': [{'key': c.label, 'before': c.before, 'after': c.after, 'std': c.std,
                             'unit': c.unit} for c in self.calibrated],
@@ -220,8 +160,8 @@ class _Stage:
            report: Callable[[float], None], earlier: Sequence[Judged] = ()) -> _Stage:
         design = Design.of(model, recordings, lambda share: report(DESIGN * share))
         regression = Regression(design)
-        selector = Selector(regression, lambda share: report(DESIGN + SELECTION * share),
-                            earlier)
+        selector = Selector(
+            regression, lambda share: report(DESIGN + SELECTION * share), earlier)
         selection = selector.select()
         regression.tell_widths(list(estimate_widths(regression, selection.fit)))
         return cls(design, regression, selector, selection)
@@ -231,7 +171,8 @@ def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> ForceModel:
     """Return the model with some of what a stage adopted, its own numbers as they were."""
     fit = stage.selection.fit
     kept = {id(active) for one in adopted for active in one.candidate.active}
-    active, places, place = [], list(range(len(stage.design.base))), len(stage.design.base)
+    place = len(stage.design.base)
+    active, places = [], list(range(place))
     for one in fit.active:
         if id(one) in kept:
             active.append(one)
@@ -253,16 +194,15 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
     if early and late:
         late[0] = replace(late[0], error_before=early[-1].error_after,
                           held_out_before=early[-1].held_out_after)
-    effects = _joined(early, late, first.design.drives)
+    drives = first.design.drives
+    effects = joined(early, late, drives)
     rivals = {**{one.candidate.name: first.selection.rivals.get(one.candidate.name, [])
                  for one in bent}, **stage.selection.rivals}
     sets = tuple((name, *others) for name, others in rivals.items() if others)
     verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
                else 'effect' if effects else 'adequate')
-    moved = [one for one in calibrations(regression, fit)
-             if abs(one.after - one.before) > 2 * one.std]
+    moved = [c for c in calibrations(regression, fit) if abs(c.after - c.before) > 2 * c.std]
     noise = np.concatenate([rest[regression.series[d].known] for d, rest in fit.rest.items()])
-    drives = first.design.drives
     return Diagnosis(
         verdict, tuple(effects), sets,
         tuple(_ranked(one, drives, first.regression) for one in first.selection.candidates),
@@ -272,25 +212,6 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
         first.design.notes, first.design.model, fitted_model(regression, fit),
         first.design.residuals, unexplained.remaining, float(np.sqrt(np.mean(noise ** 2))),
         'validation' if validate else 'blocks', first.selector)
-
-
-def _joined(early: list[FoundEffect], late: list[FoundEffect], order: tuple[str, ...],
-            ) -> list[FoundEffect]:
-    """Return all effects; what comes late on further drives is the same effect."""
-    effects = list(early)
-    for one in late:
-        k = next((k for k, other in enumerate(early) if other.name == one.name), None)
-        if k is None:
-            effects.append(one)
-            continue
-        old, last = effects[k], len(early) - 1
-        effects[k] = replace(
-            old, drives=tuple(sorted({*(old.drives or ()), *(one.drives or ())}, key=order.index)),
-            parameters={**old.parameters, **one.parameters}, evidence=old.evidence + one.evidence,
-            force=old.force + one.force, at_bound=(*old.at_bound, *one.at_bound))
-        effects[last] = replace(effects[last], error_after=one.error_after,
-                                held_out_after=one.held_out_after)
-    return effects
 
 
 def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Recording],
@@ -344,7 +265,3 @@ def _ranked(one: Judged, drives: tuple[str, ...], regression: Regression) -> Ran
 def _names(one: Judged, drives: tuple[str, ...]) -> tuple[str, ...] | None:
     found = one.candidate.drives
     return None if found is None else tuple(drives[d] for d in sorted(found))
-
-
-def _listed(drives: tuple[str, ...] | None) -> list[str] | None:
-    return None if drives is None else list(drives)

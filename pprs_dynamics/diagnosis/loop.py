@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from pprs_dynamics.diagnosis.adopt import Adoption, adopt, original
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, FoundEffect, diagnose
-from pprs_dynamics.diagnosis.selection import FORM_SHARE
+from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.diagnosis.form import FORM_SHARE
+from pprs_dynamics.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.diagnosis.trial import Offer
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel

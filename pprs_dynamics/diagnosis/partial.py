@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, FoundEffect
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.diagnosis.hypotheses import bin_edges
 from pprs_dynamics.diagnosis.noise import fit_noise
 from pprs_dynamics.diagnosis.profiles import Profile, error_profile

@@ -177,24 +177,6 @@ class Scan:
         return Candidate(tuple(found[k] for k in chosen), gain,
                          sum(prices[k] for k in chosen) + self.library.name_penalty)
 
-    def holds(self, larger: Candidate, smaller: Candidate) -> bool:
-        """Return whether an effect with more coefficients can be all that another one is."""
-        if sum(one.size for one in larger.active) <= sum(one.size for one in smaller.active):
-            return False
-        reached: dict[int | None, Active] = {one.term.drive: one for one in larger.active}
-        for one in smaller.active:
-            other = reached.get(one.term.drive)
-            if other is None:
-                return False
-            for d in one.term.rows:
-                theirs, mine = other.on(d), one.on(d)
-                if theirs is None or mine is None:
-                    return False
-                rest = mine - np.linalg.lstsq(theirs.T, mine.T, rcond=None)[0].T @ theirs
-                if np.sum(rest ** 2) > HELD * np.sum(mine ** 2):
-                    return False
-        return True
-
     def refined(self, candidate: Candidate, evaluations: int = COARSE) -> Candidate:
         """Return the candidate with its shape parameters between the grid's values."""
         found = []
@@ -250,6 +232,25 @@ class Scan:
             if gain > best_gain:
                 shape[name], best_gain = trial, gain
         return Active(design.term(effect, d, shape), active.variant)
+
+
+def holds(larger: Candidate, smaller: Candidate) -> bool:
+    """Return whether an effect with more coefficients can be all that another one is."""
+    if sum(one.size for one in larger.active) <= sum(one.size for one in smaller.active):
+        return False
+    reached: dict[int | None, Active] = {one.term.drive: one for one in larger.active}
+    for one in smaller.active:
+        other = reached.get(one.term.drive)
+        if other is None:
+            return False
+        for d in one.term.rows:
+            theirs, mine = other.on(d), one.on(d)
+            if theirs is None or mine is None:
+                return False
+            rest = mine - np.linalg.lstsq(theirs.T, mine.T, rcond=None)[0].T @ theirs
+            if np.sum(rest ** 2) > HELD * np.sum(mine ** 2):
+                return False
+    return True
 
 
 def _best_between(low: float, high: float, gain: Callable[[float], float], evaluations: int,

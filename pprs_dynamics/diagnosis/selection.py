@@ -11,48 +11,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.diagnosis.form import is_form, within_form
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
-from pprs_dynamics.diagnosis.library import Candidate, Library
-from pprs_dynamics.diagnosis.noise import NoiseModel
-from pprs_dynamics.diagnosis.parallel import each
-from pprs_dynamics.diagnosis.regression import solve
-from pprs_dynamics.diagnosis.scan import FINE, Scan
+from pprs_dynamics.diagnosis.judging import MARGIN, Judge, Judged
+from pprs_dynamics.diagnosis.library import Candidate
+from pprs_dynamics.diagnosis.scan import Scan, holds
 
 MOST_EFFECTS = 6
-MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
 FURTHER_MARGIN = 10.0  # more, for an effect that lives on what others have left
 LEAST_SUSPECT = -20.0  # evidence; further below, slow noise is the better explanation by far
 PROPOSALS = 4  # of each scan
-# What an adopted effect leaves may be its form, which is an idealisation: a further effect on
-# the same drives has to gain this share of what it gained.
-FORM_SHARE = 0.08
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0  # standard errors of the blocks' losses
 # A rival explains as well that is this near in score, or a little further and as near as one
 # standard error of the blocks' losses.
 NEAR_SCORE, FAR_SCORE = 10.0, 30.0
 MOST_RIVALS = 8  # looked at
 SWAP = 4.0  # in score, for which an adopted effect gives way to another
-
-
-@dataclass(frozen=True)
-class Judged:
-    """A candidate beside what is adopted, with the noise refitted.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    fit : JointFit
-        With it.
-    evidence : float
-        Gain less penalty and margin.
-    """
-
-    candidate: Candidate
-    fit: JointFit
-    evidence: float
 
 
 @dataclass
@@ -98,9 +76,8 @@ class Selector:
                  earlier: Sequence[Judged] = ()) -> None:
         self.regression, self.earlier = regression, tuple(earlier)
         self._report = progress or (lambda share: None)
-        self.library = Library(regression)
-        self.rich = dict(zip(regression.series, each(self._rich_noise, regression.series),
-                             strict=True))
+        self.judge = Judge(regression)
+        self.library, self.rich = self.judge.library, self.judge.rich
 
     def select(self) -> Selection:
         """Return the effects that the errors call for."""
@@ -115,32 +92,14 @@ class Selector:
             if winner is None:
                 selection.suspects = [one for one in judged if self._is_suspect(one, selection)]
                 break
-            _add(selection, self._polished(winner, selection))
+            winner = self.judge.polished(self._simplest(winner, judged, selection),
+                                         selection.fit, self._actives(selection.adopted))
+            _add(selection, winner)
             self._prune(selection)
         self._swap(selection)
         selection.rivals = self._find_rivals(selection)
         self._report(1.0)
         return selection
-
-    def _rich_noise(self, d: int) -> NoiseModel:
-        """Noise of what a drive's regression on nearly all effects leaves."""
-        series = self.regression.series[d]
-        rows = [self.regression.base_rows[d]]
-        rows += [term.rows[d][:, series.index] for term in self.library.structure
-                 if d in term.rows]
-        seen: dict[str, int] = {}
-        for term in self.library.local[d]:
-            name = term.effect.name
-            seen[name] = seen.get(name, 0) + 1
-            every = max(1, self.library.trials[name, d] // 3)
-            if name != 'force_ripple' and not term.fixed and seen[name] % every == every // 2:
-                rows.append(term.rows[d][:, series.index])
-        stacked = np.concatenate(rows)
-        stacked = stacked[np.any(stacked, axis=1)]
-        rest = series.error - solve(stacked, series.error) @ stacked
-        noise = series.fit_noise(rest)
-        white = series.whiten(noise, np.concatenate((stacked, series.error[None])))
-        return series.fit_noise(series.error - solve(white[:-1], white[-1]) @ stacked)
 
     def _actives(self, adopted: Sequence[Judged]) -> tuple[Active, ...]:
         return tuple(active for one in adopted for active in one.candidate.active)
@@ -148,41 +107,23 @@ class Selector:
     def _judge_proposals(self, selection: Selection) -> list[Judged]:
         """Return proposals of two scans, each judged, best first."""
         active = self._actives(selection.adopted)
-        chosen: dict[tuple[str, tuple[int, ...] | None, int], Candidate] = {}
+        chosen: dict[tuple[Any, ...], Candidate] = {}
         for noises in (selection.fit.noises, self.rich):
             scan = Scan(self.library, active, noises)
             for candidate in scan.candidates()[:PROPOSALS]:
                 if candidate.score > -MARGIN:
                     refined = scan.refined(candidate)
                     for number, shaped in enumerate([refined, *scan.alternatives(refined)]):
-                        chosen.setdefault((shaped.name, shaped.drives, number), shaped)
-        judged = [self.judge(candidate, selection.fit, active) for candidate in chosen.values()]
+                        variants = tuple(one.variant for one in shaped.active)
+                        chosen.setdefault((shaped.name, shaped.drives, variants, number), shaped)
+        judged = [self.judge.of(candidate, selection.fit, active) for candidate in chosen.values()]
         best: dict[str, Judged] = {}
         for one in sorted(judged, key=lambda one: -one.evidence):
             best.setdefault(one.candidate.name, one)
-        return list(best.values())
-
-    def judge(self, candidate: Candidate, without: JointFit,
-              active: tuple[Active, ...]) -> Judged:
-        """Return a candidate's evidence beside active terms, the noise refitted."""
-        spans = candidate.drives is None or any(
-            len(one.term.rows) > 1 for one in candidate.active)
-        touched = list(self.regression.series) if spans else list(candidate.drives or ())
-        starts = {**without.noises, **{d: self.rich[d] for d in touched}}
-        fit = self.regression.fit((*active, *candidate.active), starts, touched)
-        gain = without.deviance - fit.deviance
-        if gain > candidate.penalty:
-            gain = min(gain, self.regression.guarded_gain(fit, active))
-        return Judged(candidate, fit, gain - candidate.penalty - MARGIN)
-
-    def _polished(self, winner: Judged, selection: Selection) -> Judged:
-        """Return a winner with its shapes as exact as they can be had, if that is better."""
-        if not any(one.term.shape for one in winner.candidate.active):
-            return winner
-        active = self._actives(selection.adopted)
-        scan = Scan(self.library, active, winner.fit.noises)
-        exact = self.judge(scan.refined(winner.candidate, FINE), selection.fit, active)
-        return exact if exact.evidence > winner.evidence else winner
+        near = max((one.evidence for one in best.values()), default=0.0) / 2
+        front = [self.judge.completed(one, selection.fit, active) if one.evidence > near else one
+                 for one in best.values()]
+        return sorted(front, key=lambda one: -one.evidence)
 
     def _stands(self, one: Judged, selection: Selection) -> bool:
         before_it = [*self.earlier, *selection.adopted]
@@ -196,12 +137,24 @@ class Selector:
         if change.mean() <= errors * change.std(ddof=1) / np.sqrt(len(change)):
             return False
         mine = one.candidate.drives
+        under = self.regression.at(active, one.fit.noises)
         for other in before_it:
             theirs = other.candidate.drives
             shared = mine is None or theirs is None or set(mine) & set(theirs)
-            if shared and one.evidence < FORM_SHARE * other.evidence:
+            if shared and is_form(one, other, under):
                 return False
         return True
+
+    def _simplest(self, winner: Judged, judged: Sequence[Judged],
+                  selection: Selection) -> Judged:
+        """Return an effect that the winner holds, where the rest may be the form of that one."""
+        for one in judged:
+            if one is not winner and holds(winner.candidate, one.candidate) and within_form(
+                    one.fit.deviance - winner.fit.deviance,
+                    self.regression.at(one.fit.active, winner.fit.noises), one.candidate) and (
+                    self._stands(one, selection)):
+                return one
+        return winner
 
     def _is_suspect(self, one: Judged, selection: Selection) -> bool:
         """Return whether an effect would stand if the noise were as a rich regression says."""
@@ -234,7 +187,7 @@ class Selector:
             scan = Scan(self.library, active, selection.fit.noises)
             without = self.regression.fit(active, selection.fit.noises)
             found = [scan.refined(one) for one in scan.candidates()[:2]]
-            judged = [self.judge(one, without, active) for one in found]
+            judged = [self.judge.of(one, without, active) for one in found]
             own = next((one for one in judged
                         if one.candidate.name == selection.adopted[k].candidate.name), None)
             current = without.deviance - selection.fit.deviance - (
@@ -263,9 +216,11 @@ class Selector:
                     continue
                 refined = scan.refined(candidate)
                 behind = mine.score - refined.score
-                if scan.holds(refined, mine):
+                if holds(refined, mine):
                     # It can do all that the adopted effect does: a rival only where it uses more.
-                    if behind < NEAR_SCORE / 2:
+                    if behind < NEAR_SCORE / 2 and not within_form(
+                            refined.gain - mine.gain,
+                            self.regression.at((*active, *mine.active), noises), mine):
                         near.append(refined.name)
                     continue
                 change = self.regression.block_losses(

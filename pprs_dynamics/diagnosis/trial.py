@@ -13,10 +13,11 @@ from pprs_dynamics.diagnosis.adoption import fitted_model as model_of
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.diagnose import NOT_LINEAR
 from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
+from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.library import Candidate
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.scan import Scan
-from pprs_dynamics.diagnosis.selection import Judged, Selector
+from pprs_dynamics.diagnosis.selection import Selector
 from pprs_dynamics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
@@ -226,7 +227,7 @@ def _best_fit(selector: Selector, without: JointFit, offer: Offer) -> Judged | N
         scan = Scan(selector.library, (), noises)
         candidate = _candidate(scan, offer)
         if candidate is not None:
-            found.append(selector.judge(scan.refined(candidate), without, ()))
+            found.append(selector.judge.of(scan.refined(candidate), without, ()))
     return max(found, key=lambda one: one.evidence, default=None)
 
 

@@ -14,9 +14,10 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
+from pprs_dynamics.diagnosis.judging import MARGIN, Judged
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.diagnosis.regression import orthonormal
-from pprs_dynamics.diagnosis.selection import MARGIN, Judged, Selection, Selector
+from pprs_dynamics.diagnosis.selection import Selection, Selector
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.mechanism.robot import Array

@@ -11,7 +11,7 @@ import numpy as np
 from pprs_dynamics.diagnosis.diagnose import NOT_LINEAR, _model_with, _Stage
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.library import Candidate
-from pprs_dynamics.diagnosis.scan import Scan
+from pprs_dynamics.diagnosis.scan import Scan, holds
 from pprs_dynamics.experiments.columns import Block, ColumnPlan, plan_for
 from pprs_dynamics.experiments.criteria import (
     Contest,
@@ -138,7 +138,7 @@ class _Asker:
             beside = tuple(other for j, other in enumerate(mains) if j != k)
             # An effect that can be all that another one is fits it on any motion.
             pairs += [(truth, rival, beside) for (small, truth), (large, rival)
-                      in permutations(group, 2) if not scan.holds(large, small)]
+                      in permutations(group, 2) if not holds(large, small)]
         plan = plan_for(self.regression.design, self.blocks)
         base = tuple(range(len(plan.labels)))
         contests = []

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, FoundEffect
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import ErrorStep
+from pprs_dynamics.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.diagnosis.partial import (
     partial_residual,
     remaining_profile,

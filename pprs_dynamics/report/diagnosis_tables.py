@@ -12,7 +12,8 @@ from rich.padding import Padding
 from rich.panel import Panel
 from rich.table import Table
 
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, RankedEffect
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.diagnosis.found_effects import RankedEffect
 from pprs_dynamics.diagnosis.quantities import name_drives
 from pprs_dynamics.diagnosis.sentences import Finding, FittedValue, Sentences, fitted_values
 

@@ -1,0 +1,50 @@
+"""What an adopted effect leaves may be its form: a catalogue's form is an idealisation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.joint_fit import JointFit
+from pprs_dynamics.diagnosis.judging import Judged
+from pprs_dynamics.diagnosis.library import Candidate
+
+# A further effect on the same drives has to gain this share of what the first one gained.
+FORM_SHARE = 0.08
+# And have this share of its force, both weighed under the same noise.
+FORM_AMPLITUDE = 0.1
+
+
+def is_form(one: Judged, other: Judged, without: JointFit) -> bool:
+    """Return whether an effect is no more than another's form may be off by.
+
+    Parameters
+    ----------
+    one, other : Judged
+        The other is adopted, here or before.
+    without : JointFit
+        Of what is adopted here, under the noise of `one`.
+    """
+    if one.evidence < FORM_SHARE * other.evidence:
+        return True
+    here = all(any(active is known for known in without.active)
+               for active in other.candidate.active)
+    return within_form(squared_size(one.candidate, one.fit), without if here else other.fit,
+                       other.candidate)
+
+
+def within_form(squares: float, fit: JointFit, candidate: Candidate) -> bool:
+    """Return whether squares that a fitted effect leaves, whitened, may be those of its form."""
+    return squares < FORM_AMPLITUDE ** 2 * squared_size(candidate, fit)
+
+
+def squared_size(candidate: Candidate, fit: JointFit) -> float:
+    """Return the squared force, whitened, that only this effect of a fit explains."""
+    wanted = {id(active) for active in candidate.active}
+    place = len(fit.coefficients) - sum(one.size for one in fit.active)
+    at: list[int] = []
+    for one in fit.active:
+        if id(one) in wanted:
+            at += range(place, place + one.size)
+        place += one.size
+    found = fit.coefficients[at]
+    return float(found @ np.linalg.pinv(fit.covariance[np.ix_(at, at)]) @ found)
