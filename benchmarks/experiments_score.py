@@ -4,10 +4,11 @@
     python benchmarks/experiments_score.py --table experiments.jsonl
 
 A robot with a hidden effect, numbers off within the model file's tolerances and noisy sensors
-makes a short slow recording, weaker and weaker until the diagnosis is ambiguous with the truth
-among the candidates. Then one run of 20 s is added: the designed one, a random one that uses the
-same limits, or the old motion repeated for as long. Settled is a diagnosis of both together that
-names the truth and holds nothing against it; open one that holds a rival, or names nothing.
+makes a poor recording of 10 s: up and down only, or slow and small, with a weaker and weaker
+effect, until the diagnosis is ambiguous with the truth among the candidates. Then one
+run of 20 s is added: the designed one, a random one that uses the same limits, or the old motion
+repeated for as long. Settled is a diagnosis of both together that names the truth and holds
+nothing against it; open one that holds a rival, or names nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +28,13 @@ from hidden_strength import changed_values, tolerated_numbers
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.experiments.fourier_path import FourierFamily
 from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.next_experiment import experiment_of
-from pprs_dynamics.experiments.question import question_of
+from pprs_dynamics.experiments.question import Question, question_of
 from pprs_dynamics.experiments.trajectory_search import TrajectorySearch
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
@@ -46,8 +49,8 @@ EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'ro
            'revolute_friction', 'revolute_stiffness', 'drive_inertia', 'platform_inertia')
 RATE, TOLERANCE, NOISE, CORRELATION = 250.0, 0.04, 0.08, 0.81
 OLD, NEW = 10.0, 20.0  # [s]
-SCALES = (1.0, 0.6, 0.35, 0.2)  # of the effect as drawn, until it is ambiguous
-SLOW = {'amplitude': 0.025, 'tilt': 0.05, 'highest_frequency': 0.25}
+SCALES = (1.0, 0.35)  # of the effect as drawn, until it is ambiguous
+HEAVE, HEAVE_HARMONICS = 0.05, (1, 2, 3)  # [m]
 
 
 class HiddenRobot:
@@ -110,23 +113,45 @@ class _Values:
         self.values = values
 
 
+@dataclass(frozen=True)
+class Start:
+    """What there is before an experiment."""
+
+    robot: HiddenRobot
+    how: str
+    motion: PlatformMotion
+    recording: Recording
+    question: Question
+
+
 def times(duration: float) -> np.ndarray:
     """Return the sampling times of a motion."""
     return np.arange(round(duration * RATE)) / RATE
 
 
-def ambiguous_start(name: str, seed: int) -> tuple[HiddenRobot, Recording, Any] | None:
-    """Return a robot, its recording and the open question, or None."""
-    motion = Excitation(duration=OLD, seed=seed, **SLOW).motion(times(OLD))
-    for scale in SCALES:
-        robot = HiddenRobot(name, seed, scale)
-        old = robot.record(motion, 0)
-        question = question_of(robot.model, [old], lambda share: None)
-        pairs = {one for c in question.contests for one in (c.truth.name, c.rival.name)}
-        if name in pairs:
-            return robot, old, question
-        if not question.subjects or question.kind == 'excite':
-            return None
+def poor_motions(seed: int) -> dict[str, PlatformMotion]:
+    """Return motions that tell little: up and down only, and slow and small."""
+    family = FourierFamily(OLD, np.tile(HEAVE_HARMONICS, (6, 1)), HOME)
+    parameters = np.zeros((6, family.size // 6))
+    parameters[2] = np.random.default_rng((seed, 5)).normal(size=family.size // 6)
+    parameters[2] *= HEAVE / np.abs(parameters[2]).max()
+    return {'heave': family.path(parameters.ravel()).motion(times(OLD)),
+            'slow': Excitation(duration=OLD, seed=seed, amplitude=0.025, tilt=0.05,
+                               highest_frequency=0.25).motion(times(OLD))}
+
+
+def ambiguous_start(name: str, seed: int) -> Start | None:
+    """Return a robot, its poor motion, the recording and the open question, or None."""
+    for how, motion in poor_motions(seed).items():
+        for scale in SCALES:
+            robot = HiddenRobot(name, seed, scale)
+            old = robot.record(motion, 0)
+            question = question_of(robot.model, [old], lambda share: None)
+            pairs = {one for c in question.contests for one in (c.truth.name, c.rival.name)}
+            if name in pairs:
+                return Start(robot, how, motion, old, question)
+            if not question.subjects or question.kind == 'excite':
+                break
     return None
 
 
@@ -147,7 +172,7 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
     start = ambiguous_start(name, seed)
     if start is None:
         return None
-    robot, old, question = start
+    robot, old, question = start.robot, start.recording, start.question
     limits = MotionLimits(effort_reserve=4 * question.noise_floor)
     search = TrajectorySearch(question, limits, NEW, seed)
     cpu, wall = time.process_time(), time.perf_counter()
@@ -156,7 +181,7 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
     random = TrajectorySearch(question, limits, NEW, seed + 1000).screen(draws=1)[0].path
     experiment = experiment_of(question, found)
     result: dict[str, Any] = {
-        'effect': name, 'seed': seed, 'scale': robot.scale,
+        'effect': name, 'seed': seed, 'scale': robot.scale, 'motion': start.how,
         'rivals': sorted({one for c in question.contests
                           for one in (c.truth.name, c.rival.name)} - {name}),
         'promised': [list(pair) for pair in experiment.separates],
@@ -167,8 +192,7 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
     grid = times(NEW)
     result['designed'] = judged(robot, [old, robot.record(found.path.motion(grid), 1)])
     result['random'] = judged(robot, [old, robot.record(random.motion(grid), 2)])
-    again = Excitation(duration=OLD, seed=seed, **SLOW).motion(times(OLD))
-    result['repeat'] = judged(robot, [old, robot.record(again, 3), robot.record(again, 4)])
+    result['repeat'] = judged(robot, [old, *(robot.record(start.motion, run) for run in (3, 4))])
     if follow:
         result['followed'] = robot.follow(found.path.motion(grid), limits)
     return result

@@ -9,8 +9,10 @@ from hidden_recordings import Case, make_case
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.library import Library
+from pprs_dynamics.diagnosis.form import squared_size, within_form
+from pprs_dynamics.diagnosis.joint_fit import Active, Regression
+from pprs_dynamics.diagnosis.judging import Judge, Judged
+from pprs_dynamics.diagnosis.library import Candidate, Library
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
@@ -161,6 +163,57 @@ def test_what_is_in_the_model_is_moved_and_not_claimed_again() -> None:
     assert found.verdict == 'adequate'
     assert found.adopted.values['effects.coulomb_friction.slide_2.force'] == pytest.approx(
         0.5, abs=0.02)
+
+
+OFFSETS = dict(zip(DRIVES, (0.44, -0.32, 0.89, -0.63, -0.88, -0.43), strict=True))
+WRENCH = {'force_x': 0.66, 'force_y': 0.78, 'force_z': 0.1,
+          'moment_x': -0.05, 'moment_y': 0.04, 'moment_z': 0.02}
+
+
+def judge_of(name: str, values: dict[str, float]) -> Judge:
+    """Return the judge of a recording of a model with an effect."""
+    true = build_model({**MODEL.values, 'effects.active': [name], **{
+        f'effects.{name}.{key}': value for key, value in values.items()}})
+    return Judge(Regression(Design.of(MODEL, [record(true, 0.08)])))
+
+
+def judged(judge: Judge, *active: Active) -> Judged:
+    """Return an effect beside nothing else."""
+    without = judge.regression.fit((), judge.rich)
+    price = sum(map(judge.library.penalty, active)) + judge.library.name_penalty
+    return judge.of(Candidate(active, 0.0, price), without, ())
+
+
+def test_a_wrench_proposed_without_its_moments_is_completed() -> None:
+    judge = judge_of('external_wrench', WRENCH)
+    term = next(t for t in judge.library.structure if t.effect.name == 'external_wrench')
+    part = judged(judge, Active(term, ('force_x', 'force_y', 'force_z')))
+    whole = judge.completed(part, judge.regression.fit((), judge.rich), ())
+    assert whole.evidence > part.evidence
+    assert whole.candidate.active[0].variant == tuple(WRENCH)
+    np.testing.assert_allclose(whole.fit.coefficients[-6:], list(WRENCH.values()), atol=0.02)
+
+
+def test_an_offset_proposed_on_five_drives_is_completed() -> None:
+    judge = judge_of('effort_offset', {f'{d}.force': one for d, one in OFFSETS.items()})
+    terms = [t for d in range(6) for t in judge.library.local[d]
+             if t.effect.name == 'effort_offset']
+    part = judged(judge, *(Active(term, ('force',)) for term in terms[:5]))
+    whole = judge.completed(part, judge.regression.fit((), judge.rich), ())
+    assert whole.evidence > part.evidence
+    assert sorted(whole.candidate.drives or ()) == list(range(6))
+
+
+def test_the_size_of_an_effect_is_what_the_fit_loses_without_it() -> None:
+    judge = judge_of('external_wrench', WRENCH)
+    term = next(t for t in judge.library.structure if t.effect.name == 'external_wrench')
+    found = judged(judge, Active(term, tuple(WRENCH)))
+    _, _, without = judge.regression.solve((), found.fit.noises)
+    _, _, with_it = judge.regression.solve(found.candidate.active, found.fit.noises)
+    size = squared_size(found.candidate, found.fit)
+    assert size == pytest.approx(without - with_it, rel=1e-4)
+    assert within_form(0.009 * size, found.fit, found.candidate)
+    assert not within_form(0.011 * size, found.fit, found.candidate)
 
 
 # Hidden physics in forms of its own, from the physics engine; `make score` has the whole table.

@@ -74,7 +74,8 @@ class Judge:
                 if set(variant) > set(first.variant)]
         else:
             more = self._further_drives(one, active)
-            wider = [(*one.candidate.active, *more)] if more else []
+            wider = [(*one.candidate.active, *more[:count])
+                     for count in {min(1, len(more)), len(more)} - {0}]
         judged = [one]
         for every in wider:
             price = prices + sum(map(self.library.penalty, every))
@@ -82,18 +83,19 @@ class Judge:
         return max(judged, key=lambda one: one.evidence)
 
     def _further_drives(self, one: Judged, active: tuple[Active, ...]) -> list[Active]:
-        """Return an effect without shape on drives where it pays beside that on the others."""
+        """Return an effect without shape on drives where it may pay beside others, best first."""
         taken = {(a.term.effect.name, a.term.drive) for a in (*active, *one.candidate.active)}
-        scan = Scan(self.library, (*active, *one.candidate.active), one.fit.noises)
-        found = []
+        noises = {**self.rich, **{d: one.fit.noises[d] for d in one.candidate.drives or ()}}
+        scan = Scan(self.library, (*active, *one.candidate.active), noises)
+        found: list[tuple[float, Active]] = []
         for term in (term for terms in self.library.local.values() for term in terms):
             if term.effect is one.candidate.effect and not term.shape and (
                     term.effect.name, term.drive) not in taken:
                 trials = [Active(term, variant) for variant in term.effect.variants]
-                best = max(trials, key=lambda a: scan.gain(a) - self.library.penalty(a))
-                if scan.gain(best) - self.library.penalty(best) > DRIVE_MARGIN:
-                    found.append(best)
-        return found
+                found.append(max(((scan.gain(trial) - self.library.penalty(trial), trial)
+                                  for trial in trials), key=lambda pair: pair[0]))
+        found.sort(key=lambda pair: -pair[0])
+        return [further for score, further in found if score > DRIVE_MARGIN]
 
     def polished(self, winner: Judged, without: JointFit, active: tuple[Active, ...]) -> Judged:
         """Return a winner with its shapes as exact as they can be had, if that is better."""
