@@ -18,6 +18,7 @@ from pprs_dynamics.diagnosis.adoption import (
 )
 from pprs_dynamics.diagnosis.cautions import find_cautions
 from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.form import form_allowance
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, joined, listed
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.diagnosis.judging import Judged
@@ -26,7 +27,7 @@ from pprs_dynamics.diagnosis.paired_errors import rms
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.selection import Selection, Selector
-from pprs_dynamics.diagnosis.unexplained import Unexplained, explained_by, find_unexplained
+from pprs_dynamics.diagnosis.unexplained import Unexplained, allowed_by_model, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import Array
@@ -140,8 +141,9 @@ def diagnose(
         model_with = _model_with(stage, bent)
         stage = _Stage.of(model_with, recordings, lambda share: report(0.5 + 0.4 * share), bent)
     early = _effects_of(first, bent, validate) if bent else []
-    explained = sum((np.var(one.force, axis=0) for one in early), explained_by(first.design))
-    unexplained = find_unexplained(stage.selector, stage.selection, explained)
+    allowed = sum((form_allowance(one.effect, one.force) for one in early),
+                  allowed_by_model(first.design))
+    unexplained = find_unexplained(stage.selector, stage.selection, allowed)
     report(0.95)
     return _answer(first, bent, early, stage, unexplained, validate)
 

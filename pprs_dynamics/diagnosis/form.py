@@ -1,4 +1,8 @@
-"""What an adopted effect leaves may be its form: a catalogue's form is an idealisation."""
+"""What an adopted effect leaves may be its form, where that is an idealisation.
+
+Friction, springs and cords are only nearly of the catalogue's form, and what a strong effect
+leaves is no further effect and nothing unknown. Inertia, gravity and geometry are exact.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,15 @@ import numpy as np
 from pprs_dynamics.diagnosis.joint_fit import JointFit
 from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.library import Candidate
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.mechanism.robot import Array
 
 # A further effect on the same drives has to gain this share of what the first one gained.
 FORM_SHARE = 0.08
 # And have this share of its force, both weighed under the same noise.
 FORM_AMPLITUDE = 0.1
+# Of the mean square that an effect explains on a drive beside its mean: less is its form.
+REMAINDER_SHARE = 0.06
 
 
 def is_form(one: Judged, other: Judged, without: JointFit) -> bool:
@@ -34,7 +42,16 @@ def is_form(one: Judged, other: Judged, without: JointFit) -> bool:
 
 def within_form(squares: float, fit: JointFit, candidate: Candidate) -> bool:
     """Return whether squares that a fitted effect leaves, whitened, may be those of its form."""
-    return squares < FORM_AMPLITUDE ** 2 * squared_size(candidate, fit)
+    size = FORM_AMPLITUDE ** 2 * squared_size(candidate, fit)
+    return candidate.effect.idealised and squares < size
+
+
+def form_allowance(effect: type[CatalogueEffect], force: Array) -> Array:
+    """Return the mean square that an effect's form may leave of a force (N, ...), (...) [N^2]."""
+    constant = FORM_AMPLITUDE ** 2 * effect.idealised
+    allowance: Array = (REMAINDER_SHARE * np.nanvar(force, axis=0)
+                        + constant * np.nanmean(force, axis=0) ** 2)
+    return allowance
 
 
 def squared_size(candidate: Candidate, fit: JointFit) -> float:

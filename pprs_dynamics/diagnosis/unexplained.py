@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.form import form_allowance
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
 from pprs_dynamics.diagnosis.judging import MARGIN, Judged
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
@@ -22,8 +23,6 @@ from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.mechanism.robot import Array
 
-# Of the mean square that adopted effects explain on a drive: less is their form.
-FORM_SHARE = 0.06
 # A free curve explains this much more than an effect: then it is not that effect.
 BETTER = 1.3
 MOST_LEFT = 0.4  # of a drive's mean square, beside an effect that explains poorly
@@ -51,7 +50,7 @@ class Unexplained:
     remaining: Array
 
 
-def find_unexplained(selector: Selector, selection: Selection, explained: Array,
+def find_unexplained(selector: Selector, selection: Selection, allowed: Array,
                      ) -> Unexplained:
     """Return what remains, after dropping effects that a remainder explains better.
 
@@ -60,11 +59,11 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
     selector : Selector
     selection : Selection
         From which effects are dropped.
-    explained : (D,) array
-        Mean square of what effects in the model explain on each drive already [N^2].
+    allowed : (D,) array
+        Mean square that the form of effects in the model may leave on each drive [N^2].
     """
     regression = selector.regression
-    found = _search(regression, selection, explained)
+    found = _search(regression, selection, allowed)
     while True:
         # One at a time, the weakest first: without it, others may no longer look needless.
         dropped = next((one for one in sorted(selection.adopted, key=lambda one: one.evidence) if (
@@ -77,17 +76,14 @@ def find_unexplained(selector: Selector, selection: Selection, explained: Array,
         active = tuple(a for one in selection.adopted for a in one.candidate.active)
         selection.fit = regression.fit(active, selection.fit.noises)
         selection.rivals.pop(dropped.candidate.name, None)
-        found = _search(regression, selection, explained, found.where,
+        found = _search(regression, selection, allowed, found.where,
                         dropped.candidate.drives or tuple(regression.series))
 
 
-def explained_by(design: Design) -> Array:
-    """Return the mean square of what effects in the model explain on each drive, (D,) [N^2].
-
-    Their form leaves something over, as that of effects which are found now.
-    """
+def allowed_by_model(design: Design) -> Array:
+    """Return the mean square that the form of effects in the model may leave, (D,) [N^2]."""
     parts = design.residuals.parts
-    return sum((np.nanvar(parts[effect.name], axis=0) for effect in design.model.effects
+    return sum((form_allowance(type(effect), parts[effect.name]) for effect in design.model.effects
                 if isinstance(effect, CatalogueEffect) and effect.name in parts),
                np.zeros(len(design.drives)))
 
@@ -100,27 +96,27 @@ def _search(regression: Regression, selection: Selection, before: Array,
         remaining[series.index, d] = np.where(series.known, selection.fit.rest[d], np.nan)
     where = localise(replace(residuals, measured=residuals.model + remaining, parts={}),
                      known=known, changed=[residuals.drives[d] for d in changed])
-    explained = before + _explained(regression, selection)
+    allowed = before + _allowed(regression, selection)
     statements: list[Statement] = []
     of_form: list[Statement] = []
     for statement in where.statements:
         d = residuals.drives.index(statement.drive)
-        small = statement.mean_square < FORM_SHARE * explained[d]
+        small = statement.mean_square < allowed[d]
         (of_form if small else statements).append(statement)
     return Unexplained(tuple(statements), tuple(of_form), where, remaining)
 
 
-def _explained(regression: Regression, selection: Selection) -> Array:
-    """Return the mean square of what adopted effects explain on each drive [N^2]."""
+def _allowed(regression: Regression, selection: Selection) -> Array:
+    """Return the mean square that the form of adopted effects may leave on each drive [N^2]."""
     squares = np.zeros(len(regression.design.drives))
     place = len(regression.design.base)
     for one in selection.fit.active:
+        assert isinstance(one, Active)
         for d in regression.series:
             rows = regression.rows(one, d)
             if rows is not None:
-                force = rows[0] if one.fixed else (
-                    selection.fit.coefficients[place:place + one.size] @ rows)
-                squares[d] += float(np.mean((force - force.mean()) ** 2))
+                squares[d] += form_allowance(one.term.effect, rows[0] if one.fixed else (
+                    selection.fit.coefficients[place:place + one.size] @ rows))
         place += one.size
     return squares
 

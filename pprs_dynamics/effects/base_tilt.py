@@ -21,6 +21,7 @@ class BaseTilt(BodyEffect):
     """Gravity turned by x about the x axis of `base`, then by y about its y axis."""
 
     name: ClassVar[str] = 'base_tilt'
+    idealised: ClassVar[bool] = False
     linear = tuple(
         Parameter(axis, f'alpha_{axis}', 'rad', f'turn of gravity about {axis} of base', -3.2, 3.2,
                   scale=0.01)

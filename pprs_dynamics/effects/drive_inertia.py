@@ -14,6 +14,7 @@ class DriveInertia(DriveEffect):
     """Force in proportion to acceleration: rotor, coupling and screw, reflected to the slide."""
 
     name: ClassVar[str] = 'drive_inertia'
+    idealised: ClassVar[bool] = False
     linear = (Parameter('mass', 'm', 'kg', 'reflected inertia', -1e4, 1e4, scale=0.1),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'mass': 0.0}
     card = Card(

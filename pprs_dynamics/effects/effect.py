@@ -133,6 +133,9 @@ class CatalogueEffect(Effect):
         Parameters that make the force unphysical below that value (negative friction).
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
+    idealised : bool
+        False where the form is exact: inertia, gravity, geometry, a factor. Real friction,
+        springs and cords are only nearly of the form that they have here.
     """
 
     card: ClassVar[Card]
@@ -144,6 +147,7 @@ class CatalogueEffect(Effect):
     scanned: ClassVar[tuple[str, ...]]
     unphysical_below: ClassVar[Mapping[str, float]] = {}
     may_be_measurement: ClassVar[bool] = False
+    idealised: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):

@@ -20,6 +20,7 @@ class EffortGain(MeasurementEffect):
     """A drive constant (force per current) that is not what the amplifier thinks."""
 
     name: ClassVar[str] = 'effort_gain'
+    idealised: ClassVar[bool] = False
     linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -0.9, 9.0,
                         scale=0.05),)
     card = Card(

@@ -21,6 +21,7 @@ class HomingError(MeasurementEffect):
     """The whole mechanism stands elsewhere than its encoders say."""
 
     name: ClassVar[str] = 'homing_error'
+    idealised: ClassVar[bool] = False
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
                         scale=0.001),)
     card = Card(

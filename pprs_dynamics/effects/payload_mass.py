@@ -20,6 +20,7 @@ class PayloadMass(BodyEffect):
     """Mass more at the centre of mass, as a point: the inertia about it stays."""
 
     name: ClassVar[str] = 'payload_mass'
+    idealised: ClassVar[bool] = False
     linear = (Parameter('mass', 'm_+', 'kg', 'mass beyond masses.payload', -1e3, 1e3,
                         scale=0.1),)
     card = Card(

@@ -22,6 +22,7 @@ class PlatformInertia(BodyEffect):
     """Inertia more about the centre of mass, without mass."""
 
     name: ClassVar[str] = 'platform_inertia'
+    idealised: ClassVar[bool] = False
     linear = (
         *(Parameter(axes, f'I_{axes}', 'kg m^2', f'moment of inertia beyond {axes} of the model',
                     -1e3, 1e3, scale=0.005) for axes in MOMENTS),

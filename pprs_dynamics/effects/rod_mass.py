@@ -20,6 +20,7 @@ class RodMass(BodyEffect):
     """Mass more in every rod, spread evenly over its length."""
 
     name: ClassVar[str] = 'rod_mass'
+    idealised: ClassVar[bool] = False
     linear = (Parameter('mass', 'm_b+', 'kg', 'mass beyond masses.rods, of each rod', -1e3, 1e3,
                         scale=0.05),)
     card = Card(

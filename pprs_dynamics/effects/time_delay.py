@@ -26,6 +26,7 @@ class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
     name: ClassVar[str] = 'time_delay'
+    idealised: ClassVar[bool] = False
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)
