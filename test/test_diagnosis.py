@@ -9,7 +9,7 @@ from hidden_recordings import Case, make_case
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.diagnosis.form import squared_size, within_form
+from pprs_dynamics.diagnosis.form import form_allowance, squared_size, within_form
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.judging import Judge, Judged
 from pprs_dynamics.diagnosis.library import Candidate, Library
@@ -214,6 +214,14 @@ def test_the_size_of_an_effect_is_what_the_fit_loses_without_it() -> None:
     assert size == pytest.approx(without - with_it, rel=1e-4)
     assert within_form(0.009 * size, found.fit, found.candidate)
     assert not within_form(0.011 * size, found.fit, found.candidate)
+
+
+def test_only_idealised_forms_leave_something_over() -> None:
+    force = 3.0 + np.sin(np.arange(4000) * 0.01 * np.pi)[:, None]
+    exact = form_allowance(CATALOGUE['payload_mass'], force)
+    cord = form_allowance(CATALOGUE['external_wrench'], force)
+    assert exact == pytest.approx(0.06 * 0.5, rel=0.01)
+    assert cord - exact == pytest.approx(0.1 ** 2 * 9.0, rel=0.01)
 
 
 # Hidden physics in forms of its own, from the physics engine; `make score` has the whole table.

@@ -20,8 +20,9 @@ from made_up_diagnosis import (
 )
 from rich.console import Console
 
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, _joined
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
+from pprs_dynamics.diagnosis.found_effects import joined
 from pprs_dynamics.diagnosis.hypotheses import OWN, PLATFORM
 from pprs_dynamics.diagnosis.partial import partial_residual, remaining_profile
 from pprs_dynamics.diagnosis.quantities import name_drives, with_uncertainty
@@ -296,7 +297,7 @@ def test_an_effect_that_is_found_on_further_drives_is_told_once() -> None:
     first = found_effect('effort_gain', ('lift_2',), error_after=0.2)
     further = found_effect('effort_gain', ('slide_1',), error_before=0.2, error_after=0.1)
     other = found_effect('load_friction', ('lift_1',), error_before=0.1, error_after=0.05)
-    gain, friction = _joined([first], [further, other], DRIVES)
+    gain, friction = joined([first], [further, other], DRIVES)
     assert (gain.name, gain.drives) == ('effort_gain', ('slide_1', 'lift_2'))
     assert set(gain.parameters) == {'slide_1.gain', 'lift_2.gain'}
     assert gain.evidence == first.evidence + further.evidence

@@ -20,6 +20,8 @@ FORM_SHARE = 0.08
 FORM_AMPLITUDE = 0.1
 # Of the mean square that an effect explains on a drive beside its mean: less is its form.
 REMAINDER_SHARE = 0.06
+# The model's own friction: laws of friction seldom hold to this share of the force.
+FRICTION_SHARE = 0.02
 
 
 def is_form(one: Judged, other: Judged, without: JointFit) -> bool:
@@ -51,6 +53,12 @@ def form_allowance(effect: type[CatalogueEffect], force: Array) -> Array:
     constant = FORM_AMPLITUDE ** 2 * effect.idealised
     allowance: Array = (REMAINDER_SHARE * np.nanvar(force, axis=0)
                         + constant * np.nanmean(force, axis=0) ** 2)
+    return allowance
+
+
+def friction_allowance(force: Array) -> Array:
+    """Return the mean square that the form of the model's own friction may leave [N^2]."""
+    allowance: Array = FRICTION_SHARE ** 2 * np.nanmean(force ** 2, axis=0)
     return allowance
 
 

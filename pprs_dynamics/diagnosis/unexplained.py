@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.diagnosis.design import Design
-from pprs_dynamics.diagnosis.form import form_allowance
+from pprs_dynamics.diagnosis.form import form_allowance, friction_allowance
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
 from pprs_dynamics.diagnosis.judging import MARGIN, Judged
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
@@ -37,7 +37,8 @@ class Unexplained:
     statements : tuple of Statement
         Ranked by evidence.
     of_form : tuple of Statement
-        Remainders that are small against an adopted effect on the same drive.
+        Remainders that are small against an adopted effect, or the model's own friction, on the
+        same drive.
     where : Localisation
         The search that found them.
     remaining : (M, D) array
@@ -82,10 +83,14 @@ def find_unexplained(selector: Selector, selection: Selection, allowed: Array,
 
 def allowed_by_model(design: Design) -> Array:
     """Return the mean square that the form of effects in the model may leave, (D,) [N^2]."""
-    parts = design.residuals.parts
-    return sum((form_allowance(type(effect), parts[effect.name]) for effect in design.model.effects
-                if isinstance(effect, CatalogueEffect) and effect.name in parts),
-               np.zeros(len(design.drives)))
+    squares = np.zeros(len(design.drives))
+    for effect in design.model.effects:
+        force = design.residuals.parts.get(effect.name)
+        if force is not None and isinstance(effect, CatalogueEffect):
+            squares += form_allowance(type(effect), force)
+        elif force is not None and effect.name.endswith('friction'):
+            squares += friction_allowance(force)
+    return squares
 
 
 def _search(regression: Regression, selection: Selection, before: Array,
