@@ -208,12 +208,15 @@ def test_the_size_of_an_effect_is_what_the_fit_loses_without_it() -> None:
     judge = judge_of('external_wrench', WRENCH)
     term = next(t for t in judge.library.structure if t.effect.name == 'external_wrench')
     found = judged(judge, Active(term, tuple(WRENCH)))
-    _, _, without = judge.regression.solve((), found.fit.noises)
-    _, _, with_it = judge.regression.solve(found.candidate.active, found.fit.noises)
-    size = squared_size(found.candidate, found.fit)
-    assert size == pytest.approx(without - with_it, rel=1e-4)
-    assert within_form(0.009 * size, found.fit, found.candidate)
-    assert not within_form(0.011 * size, found.fit, found.candidate)
+    active, noises = found.candidate.active, found.fit.noises
+    size = squared_size(found.candidate, active, noises, judge.regression)
+    coefficients, covariance = found.fit.coefficients[-6:], found.fit.covariance[-6:, -6:]
+    assert size == pytest.approx(coefficients @ np.linalg.solve(covariance, coefficients), rel=1e-3)
+    assert within_form(0.009 * size, found.candidate, active, noises, judge.regression)
+    assert not within_form(0.011 * size, found.candidate, active, noises, judge.regression)
+    lifts = squared_size(found.candidate, active, {d: noises[d] for d in (3, 4, 5)},
+                         judge.regression)
+    assert lifts < 0.5 * size, 'most of the force lies along the slides'
 
 
 def test_only_idealised_forms_leave_something_over() -> None:

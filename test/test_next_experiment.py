@@ -13,9 +13,9 @@ from ros_processes import executable
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.design import Design
-from pprs_dynamics.diagnosis.diagnose import _Stage
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
+from pprs_dynamics.diagnosis.stages import Stage
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.experiments.columns import Block, plan_for
 from pprs_dynamics.experiments.commissioning import commissioning
@@ -292,7 +292,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     time = np.arange(0.0, DURATION, 0.004)
     path = FAMILY.path(parameters)
     old = recorded(robot, path.motion(time), 1, 0.1)
-    stage = _Stage.of(model, [old], lambda share: None)
+    stage = Stage.of(model, [old], lambda share: None)
     assert [one.candidate.name for one in stage.selection.adopted] == ['coulomb_friction']
     stage.selection.rivals = {}
     assert _Asker(stage).question().kind == 'estimate'

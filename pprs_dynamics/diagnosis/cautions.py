@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.design import SLOW, Design
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import effective_samples
 from pprs_dynamics.diagnosis.scan import Scan
@@ -20,7 +20,6 @@ SHORT = 8.0  # [s]
 FEW_SAMPLES = 60.0  # independent ones, per drive
 UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least
 ONE_WAY = 0.95  # of the moving time in one direction
-SLOW = 2e-3  # [m/s], below which a drive hardly moves
 FILTERED = 0.05  # high frequencies of the effort over those of white noise
 
 
@@ -56,13 +55,14 @@ def _motion(design: Design) -> list[str]:
     for d, name in enumerate(design.drives):
         v = velocity[:, d]
         moving = np.abs(v) > SLOW
-        if moving.mean() < 0.05:
+        if not design.moves(d):
             still.append(name)
         elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > ONE_WAY:
             one_way.append(name)
     found = []
     if still:
-        found.append(f'{", ".join(still)} hardly move: friction there cannot be seen')
+        found.append(f'{", ".join(still)} hardly move: friction there cannot be seen, and '
+                     'what holds a drive at rest looks like a constant force')
     if one_way:
         found.append(f'{", ".join(one_way)} move in one direction only: friction there looks '
                      'like a constant force; record motion both ways')

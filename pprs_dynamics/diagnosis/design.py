@@ -46,6 +46,8 @@ from pprs_dynamics.model.force_model import ForceModel, Forces
 SHAPE_STEP = 1e-3  # relative, for derivatives by shape parameters of effects in the model
 COLUMN = 'column '
 FREE = 1e-6  # prior precision of what is not known beforehand
+# A drive that is slower nearly all the time hardly moves [m/s].
+SLOW, LEAST_MOVING = 2e-3, 0.05
 Rows = dict[int, Array]
 """Columns by drive, (k, M) each; drives that are not in it feel nothing."""
 
@@ -212,6 +214,11 @@ class Design:
                                FREE)
                     for c, column in zip(effect.coefficients, rows, strict=True)]
         return design
+
+    def moves(self, drive: int) -> bool:
+        """Return whether a drive is in motion for a noteworthy share of the time."""
+        speed = np.abs(self.residuals.variables['velocity'][:, drive])
+        return bool(np.nanmean(speed > SLOW) >= LEAST_MOVING)
 
     def _covered(self, drive: int) -> DriveRange:
         position = np.concatenate([one.position[:, drive] for one in self.recordings])

@@ -17,7 +17,6 @@ from pprs_dynamics.diagnosis.adoption import (
     fitted_model,
 )
 from pprs_dynamics.diagnosis.cautions import find_cautions
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.form import form_allowance
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, joined, listed
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
@@ -25,19 +24,13 @@ from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.paired_errors import rms
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
-from pprs_dynamics.diagnosis.selection import Selection, Selector
+from pprs_dynamics.diagnosis.selection import Selector
+from pprs_dynamics.diagnosis.stages import Path, Stage, find_path
 from pprs_dynamics.diagnosis.unexplained import Unexplained, allowed_by_model, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
-
-# Shares of the work, for the progress bar.
-DESIGN, SELECTION = 0.4, 0.3
-# Effects that change how all others show, or that their columns describe only nearby.
-NOT_LINEAR = frozenset({'time_delay', 'homing_error', 'effort_gain', 'payload_offset',
-                        'base_tilt'})
 
 
 @dataclass(frozen=True)
@@ -133,62 +126,21 @@ def diagnose(
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    stage = _Stage.of(model, recordings, report)
-    first = stage
-    bent = [one for one in stage.selection.adopted if one.candidate.name in NOT_LINEAR]
-    if bent:
-        # All other columns hold only around a model that has these: it starts again from there.
-        model_with = _model_with(stage, bent)
-        stage = _Stage.of(model_with, recordings, lambda share: report(0.5 + 0.4 * share), bent)
+    path = find_path(model, recordings, lambda share: report(0.85 * share))
+    first, bent, stage = path.first, path.bent, path.last
     early = _effects_of(first, bent, validate) if bent else []
     allowed = sum((form_allowance(one.effect, one.force) for one in early),
                   allowed_by_model(first.design))
     unexplained = find_unexplained(stage.selector, stage.selection, allowed)
     report(0.95)
-    return _answer(first, bent, early, stage, unexplained, validate)
+    return _answer(path, early, unexplained, validate)
 
 
-@dataclass(frozen=True)
-class _Stage:
-    """A selection from one model."""
-
-    design: Design
-    regression: Regression
-    selector: Selector
-    selection: Selection
-
-    @classmethod
-    def of(cls, model: ForceModel, recordings: Sequence[Recording],
-           report: Callable[[float], None], earlier: Sequence[Judged] = ()) -> _Stage:
-        design = Design.of(model, recordings, lambda share: report(DESIGN * share))
-        regression = Regression(design)
-        selector = Selector(
-            regression, lambda share: report(DESIGN + SELECTION * share), earlier)
-        selection = selector.select()
-        regression.tell_widths(list(estimate_widths(regression, selection.fit)))
-        return cls(design, regression, selector, selection)
-
-
-def _model_with(stage: _Stage, adopted: Sequence[Judged]) -> ForceModel:
-    """Return the model with some of what a stage adopted, its own numbers as they were."""
-    fit = stage.selection.fit
-    kept = {id(active) for one in adopted for active in one.candidate.active}
-    place = len(stage.design.base)
-    active, places = [], list(range(place))
-    for one in fit.active:
-        if id(one) in kept:
-            active.append(one)
-            places += range(place, place + one.size)
-        place += one.size
-    part = replace(fit, active=tuple(active), coefficients=fit.coefficients[places],
-                   covariance=fit.covariance[np.ix_(places, places)])
-    return fitted_model(stage.regression, part, calibrate=False)
-
-
-def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], stage: _Stage,
-            unexplained: Unexplained, validate: Sequence[Recording]) -> Diagnosis:
+def _answer(path: Path, early: list[FoundEffect], unexplained: Unexplained,
+            validate: Sequence[Recording]) -> Diagnosis:
+    first, stage = path.first, path.last
     regression, fit = stage.regression, stage.selection.fit
-    known = {one.candidate.name for one in bent}
+    known = {one.candidate.name for one in path.bent}
     late = _effects_of(stage, sorted(
         stage.selection.adopted, key=lambda one: one.candidate.name not in known), validate)
     for k, one in enumerate(early):
@@ -198,9 +150,7 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
                           held_out_before=early[-1].held_out_after)
     drives = first.design.drives
     effects = joined(early, late, drives)
-    rivals = {**{one.candidate.name: first.selection.rivals.get(one.candidate.name, [])
-                 for one in bent}, **stage.selection.rivals}
-    sets = tuple((name, *others) for name, others in rivals.items() if others)
+    sets = tuple((name, *others) for name, others in path.rivals.items() if others)
     verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
                else 'effect' if effects else 'adequate')
     moved = [c for c in calibrations(regression, fit) if abs(c.after - c.before) > 2 * c.std]
@@ -216,7 +166,7 @@ def _answer(first: _Stage, bent: Sequence[Judged], early: list[FoundEffect], sta
         'validation' if validate else 'blocks', first.selector)
 
 
-def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Recording],
+def _effects_of(stage: Stage, adopted: Sequence[Judged], validate: Sequence[Recording],
                 ) -> list[FoundEffect]:
     """Return what a stage adopted, with the errors as one after the other is added."""
     design, regression, fit = stage.design, stage.regression, stage.selection.fit
@@ -249,7 +199,7 @@ def _effects_of(stage: _Stage, adopted: Sequence[Judged], validate: Sequence[Rec
     return effects
 
 
-def _fit_of_first(stage: _Stage, adopted: Sequence[Judged], count: int) -> JointFit:
+def _fit_of_first(stage: Stage, adopted: Sequence[Judged], count: int) -> JointFit:
     """Return the fit of the first adopted effects."""
     selection = stage.selection
     if count == len(selection.adopted):

@@ -6,11 +6,14 @@ leaves is no further effect and nothing unknown. Inertia, gravity and geometry a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from pprs_dynamics.diagnosis.joint_fit import JointFit
+from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.library import Candidate
+from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.mechanism.robot import Array
 
@@ -24,28 +27,43 @@ REMAINDER_SHARE = 0.06
 FRICTION_SHARE = 0.02
 
 
-def is_form(one: Judged, other: Judged, without: JointFit) -> bool:
-    """Return whether an effect is no more than another's form may be off by.
+def is_form(one: Judged, other: Judged, active: Sequence[Active], regression: Regression) -> bool:
+    """Return whether an effect is no more than another's form may be off by on its drives.
 
     Parameters
     ----------
     one, other : Judged
-        The other is adopted, here or before.
-    without : JointFit
-        Of what is adopted here, under the noise of `one`.
+        The other is adopted.
+    active : sequence of Active
+        All that is adopted.
+    regression : Regression
     """
     if one.evidence < FORM_SHARE * other.evidence:
         return True
-    here = all(any(active is known for known in without.active)
-               for active in other.candidate.active)
-    return within_form(squared_size(one.candidate, one.fit), without if here else other.fit,
-                       other.candidate)
+    noises = one.fit.noises
+    if one.candidate.drives is not None:
+        noises = {d: noises[d] for d in one.candidate.drives}
+    squares = squared_size(one.candidate, [*active, *one.candidate.active], noises, regression)
+    return within_form(squares, other.candidate, active, noises, regression)
 
 
-def within_form(squares: float, fit: JointFit, candidate: Candidate) -> bool:
-    """Return whether squares that a fitted effect leaves, whitened, may be those of its form."""
-    size = FORM_AMPLITUDE ** 2 * squared_size(candidate, fit)
-    return candidate.effect.idealised and squares < size
+def within_form(squares: float, candidate: Candidate, active: Sequence[Active],
+                noises: dict[int, NoiseModel], regression: Regression) -> bool:
+    """Return whether squares, whitened, may be what the form of an adopted effect leaves."""
+    return candidate.effect.idealised and squares < FORM_AMPLITUDE ** 2 * squared_size(
+        candidate, active, noises, regression)
+
+
+def squared_size(candidate: Candidate, active: Sequence[Active],
+                 noises: dict[int, NoiseModel], regression: Regression) -> float:
+    """Return the squares, whitened, that only this one of the active effects explains.
+
+    On the drives that have a noise model here.
+    """
+    mine = {id(one) for one in candidate.active}
+    _, _, without = regression.solve([one for one in active if id(one) not in mine], noises)
+    _, _, beside = regression.solve(active, noises)
+    return without - beside
 
 
 def form_allowance(effect: type[CatalogueEffect], force: Array) -> Array:
@@ -60,16 +78,3 @@ def friction_allowance(force: Array) -> Array:
     """Return the mean square that the form of the model's own friction may leave [N^2]."""
     allowance: Array = FRICTION_SHARE ** 2 * np.nanmean(force ** 2, axis=0)
     return allowance
-
-
-def squared_size(candidate: Candidate, fit: JointFit) -> float:
-    """Return the squared force, whitened, that only this effect of a fit explains."""
-    wanted = {id(active) for active in candidate.active}
-    place = len(fit.coefficients) - sum(one.size for one in fit.active)
-    at: list[int] = []
-    for one in fit.active:
-        if id(one) in wanted:
-            at += range(place, place + one.size)
-        place += one.size
-    found = fit.coefficients[at]
-    return float(found @ np.linalg.pinv(fit.covariance[np.ix_(at, at)]) @ found)

@@ -13,6 +13,7 @@ from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.diagnosis.regression import solve
 from pprs_dynamics.diagnosis.scan import DRIVE_MARGIN, FINE, Scan
 
+WHITE_ITERATIONS = 4  # of noise and effect in turn, from least squares on
 MARGIN = 10.0  # beyond the penalty, for what slow noise looks like
 
 
@@ -98,12 +99,18 @@ class Judge:
         return [further for score, further in found if score > DRIVE_MARGIN]
 
     def polished(self, winner: Judged, without: JointFit, active: tuple[Active, ...]) -> Judged:
-        """Return a winner with its shapes as exact as they can be had, if that is better."""
-        if not any(one.term.shape for one in winner.candidate.active):
-            return winner
-        scan = Scan(self.library, active, winner.fit.noises)
-        exact = self.of(scan.refined(winner.candidate, FINE), without, active)
-        return exact if exact.evidence > winner.evidence else winner
+        """Return a winner with shapes and noise as exact as they can be had, if that is better."""
+        if any(one.term.shape for one in winner.candidate.active):
+            scan = Scan(self.library, active, winner.fit.noises)
+            exact = self.of(scan.refined(winner.candidate, FINE), without, active)
+            winner = max(winner, exact, key=lambda one: one.evidence)
+        # Noise and effect have more than one optimum: a slow noise that swallows part of the
+        # effect is one. Least squares without any correlation starts at another.
+        white = {d: NoiseModel((), (0,), (np.zeros(0),), (noise.innovation,))
+                 for d, noise in self.rich.items()}
+        fit = self.regression.fit(winner.fit.active, white, iterations=WHITE_ITERATIONS)
+        gain = winner.fit.deviance - fit.deviance
+        return Judged(winner.candidate, fit, winner.evidence + gain) if gain > 0 else winner
 
     def _rich_noise(self, d: int) -> NoiseModel:
         """Noise of what a drive's regression on nearly all effects leaves."""

@@ -151,6 +151,7 @@ class Library:
         for effect in catalogue().values():
             if (not issubclass(effect, DriveEffect) or effect is HomingError
                     or (effect.name, design.drives[d]) in present
+                    or (effect.needs_motion and not design.moves(d))
                     or not design.model.offers(effect)):
                 continue
             shapes = effect.trials(design.covered[d])

@@ -9,7 +9,7 @@ recording that it was not fitted to.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,12 +69,14 @@ class Selector:
         Called with the share that is done.
     earlier : sequence of Judged
         What was adopted already and is in the design's model.
+    excluded : collection of str
+        Effects that may be rivals only.
     """
 
     def __init__(self, regression: Regression,
                  progress: Callable[[float], None] | None = None,
-                 earlier: Sequence[Judged] = ()) -> None:
-        self.regression, self.earlier = regression, tuple(earlier)
+                 earlier: Sequence[Judged] = (), excluded: Collection[str] = ()) -> None:
+        self.regression, self.earlier, self.excluded = regression, tuple(earlier), excluded
         self._report = progress or (lambda share: None)
         self.judge = Judge(regression)
         self.library, self.rich = self.judge.library, self.judge.rich
@@ -97,12 +99,15 @@ class Selector:
             _add(selection, winner)
             self._prune(selection)
         self._swap(selection)
-        selection.rivals = self._find_rivals(selection)
+        selection.rivals = self.find_rivals(selection)
         self._report(1.0)
         return selection
 
     def _actives(self, adopted: Sequence[Judged]) -> tuple[Active, ...]:
         return tuple(active for one in adopted for active in one.candidate.active)
+
+    def _allowed(self, scan: Scan) -> list[Candidate]:
+        return [one for one in scan.candidates() if one.name not in self.excluded]
 
     def _judge_proposals(self, selection: Selection) -> list[Judged]:
         """Return proposals of two scans, each judged, best first."""
@@ -110,7 +115,7 @@ class Selector:
         chosen: dict[tuple[Any, ...], Candidate] = {}
         for noises in (selection.fit.noises, self.rich):
             scan = Scan(self.library, active, noises)
-            for candidate in scan.candidates()[:PROPOSALS]:
+            for candidate in self._allowed(scan)[:PROPOSALS]:
                 if candidate.score > -MARGIN:
                     refined = scan.refined(candidate)
                     for number, shaped in enumerate([refined, *scan.alternatives(refined)]):
@@ -137,11 +142,10 @@ class Selector:
         if change.mean() <= errors * change.std(ddof=1) / np.sqrt(len(change)):
             return False
         mine = one.candidate.drives
-        under = self.regression.at(active, one.fit.noises)
         for other in before_it:
             theirs = other.candidate.drives
             shared = mine is None or theirs is None or set(mine) & set(theirs)
-            if shared and is_form(one, other, under):
+            if shared and is_form(one, other, active, self.regression):
                 return False
         return True
 
@@ -149,9 +153,11 @@ class Selector:
                   selection: Selection) -> Judged:
         """Return an effect that the winner holds, where the rest may be the form of that one."""
         for one in judged:
-            if one is not winner and holds(winner.candidate, one.candidate) and within_form(
-                    one.fit.deviance - winner.fit.deviance,
-                    self.regression.at(one.fit.active, winner.fit.noises), one.candidate) and (
+            if one is winner or not holds(winner.candidate, one.candidate):
+                continue
+            active = (*self._actives(selection.adopted), *one.candidate.active)
+            lost = one.fit.deviance - winner.fit.deviance
+            if within_form(lost, one.candidate, active, winner.fit.noises, self.regression) and (
                     self._stands(one, selection)):
                 return one
         return winner
@@ -186,7 +192,7 @@ class Selector:
             active = self._actives(others)
             scan = Scan(self.library, active, selection.fit.noises)
             without = self.regression.fit(active, selection.fit.noises)
-            found = [scan.refined(one) for one in scan.candidates()[:2]]
+            found = [scan.refined(one) for one in self._allowed(scan)[:2]]
             judged = [self.judge.of(one, without, active) for one in found]
             own = next((one for one in judged
                         if one.candidate.name == selection.adopted[k].candidate.name), None)
@@ -198,7 +204,7 @@ class Selector:
                 selection.adopted[k] = best
                 selection.fit = best.fit
 
-    def _find_rivals(self, selection: Selection) -> dict[str, list[str]]:
+    def find_rivals(self, selection: Selection) -> dict[str, list[str]]:
         """Return, for each adopted effect, those that explain as well in its place."""
         rivals: dict[str, list[str]] = {}
         for k, one in enumerate(selection.adopted):
@@ -219,8 +225,8 @@ class Selector:
                 if holds(refined, mine):
                     # It can do all that the adopted effect does: a rival only where it uses more.
                     if behind < NEAR_SCORE / 2 and not within_form(
-                            refined.gain - mine.gain,
-                            self.regression.at((*active, *mine.active), noises), mine):
+                            refined.gain - mine.gain, mine, (*active, *mine.active), noises,
+                            self.regression):
                         near.append(refined.name)
                     continue
                 change = self.regression.block_losses(

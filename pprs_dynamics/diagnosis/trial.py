@@ -11,13 +11,13 @@ import numpy as np
 from pprs_dynamics.diagnosis.adoption import Calibration, Estimate, calibrations, estimate_all
 from pprs_dynamics.diagnosis.adoption import fitted_model as model_of
 from pprs_dynamics.diagnosis.design import Design
-from pprs_dynamics.diagnosis.diagnose import NOT_LINEAR
 from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
 from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.library import Candidate
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
 from pprs_dynamics.diagnosis.scan import Scan
 from pprs_dynamics.diagnosis.selection import Selector
+from pprs_dynamics.diagnosis.stages import NOT_LINEAR
 from pprs_dynamics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect

@@ -133,6 +133,9 @@ class CatalogueEffect(Effect):
         Parameters that make the force unphysical below that value (negative friction).
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
+    needs_motion : bool
+        True for friction: of a drive that stands it tells nothing, and any constant force looks
+        like it.
     idealised : bool
         False where the form is exact: inertia, gravity, geometry, a factor. Real friction,
         springs and cords are only nearly of the form that they have here.
@@ -147,6 +150,7 @@ class CatalogueEffect(Effect):
     scanned: ClassVar[tuple[str, ...]]
     unphysical_below: ClassVar[Mapping[str, float]] = {}
     may_be_measurement: ClassVar[bool] = False
+    needs_motion: ClassVar[bool] = False
     idealised: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:

@@ -16,6 +16,7 @@ class FrictionDrift(DriveEffect):
     """Friction that changes while the robot works: cold grease, seals that warm up."""
 
     name: ClassVar[str] = 'friction_drift'
+    needs_motion: ClassVar[bool] = True
     linear = (Parameter('force', 'F', 'N', 'friction at the start beyond the later one', -1e6, 1e6,
                         scale=0.5),)
     shape = (Parameter('time', 'tau', 's', 'time in which it fades', 1e-3, 1e7, scale=10.0),)

@@ -8,10 +8,10 @@ from itertools import permutations
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.diagnose import NOT_LINEAR, _model_with, _Stage
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.library import Candidate
 from pprs_dynamics.diagnosis.scan import Scan, holds
+from pprs_dynamics.diagnosis.stages import Stage, find_path
 from pprs_dynamics.experiments.columns import Block, ColumnPlan, plan_for
 from pprs_dynamics.experiments.criteria import (
     Contest,
@@ -74,13 +74,10 @@ class Question:
 def question_of(model: DriveModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    stage = _Stage.of(model, recordings, lambda share: progress(0.6 * share))
-    bent = [one for one in stage.selection.adopted if one.candidate.name in NOT_LINEAR]
-    contested = any(stage.selection.rivals.get(one.candidate.name) for one in bent)
-    if bent and not contested:
-        # As the diagnosis does: all others are judged around a model that has these.
-        stage = _Stage.of(_model_with(stage, bent), recordings,
-                          lambda share: progress(0.6 + 0.4 * share), bent)
+    path = find_path(model, recordings, progress)
+    # As the diagnosis does: all others are judged around a model that has what bends them.
+    contested = any(path.rivals.get(one.candidate.name) for one in path.bent)
+    stage = path.first if contested else path.last
     progress(1.0)
     return _Asker(stage).question()
 
@@ -88,7 +85,7 @@ def question_of(model: DriveModel, recordings: Sequence[Recording],
 class _Asker:
     """Turns a selection into a question."""
 
-    def __init__(self, stage: _Stage) -> None:
+    def __init__(self, stage: Stage) -> None:
         self.stage, self.selection = stage, stage.selection
         self.regression: Regression = stage.regression
         self.noises = self.selection.fit.noises

@@ -1,0 +1,192 @@
+"""Around which model effects are searched.
+
+Some effects bend all columns: a delay, a shifted zero, a force constant, an offset of the centre of
+mass, a tilt of the base. Their own columns hold only nearby, too, since friction follows loads.
+Where one of these is adopted, the search starts again around a model that has it. And where such an
+effect competes with another one for the first place, both ways are gone to their end and compared
+there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pprs_dynamics.diagnosis.adoption import fitted_model
+from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.diagnosis.form import within_form
+from pprs_dynamics.diagnosis.joint_fit import Regression
+from pprs_dynamics.diagnosis.judging import MARGIN, Judged
+from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
+from pprs_dynamics.diagnosis.selection import FAR_SCORE, NEAR_SCORE, Selection, Selector
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.force_model import ForceModel
+
+# Effects that change how all others show, or that their columns describe only nearby.
+NOT_LINEAR = frozenset({'time_delay', 'homing_error', 'effort_gain', 'payload_offset',
+                        'base_tilt'})
+COMPETES = 0.5  # of the best evidence, from which on an effect may be the first, too
+# Shares of the work, for the progress bar.
+DESIGN, FIRST, AGAIN = 0.5, 0.5, 0.25
+
+Report = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A selection from one model."""
+
+    design: Design
+    regression: Regression
+    selector: Selector
+    selection: Selection
+
+    @classmethod
+    def of(cls, model: ForceModel, recordings: Sequence[Recording], report: Report,
+           earlier: Sequence[Judged] = ()) -> Stage:
+        """Return the selection around a model that has some effects already."""
+        design = Design.of(model, recordings, lambda share: report(DESIGN * share))
+        return cls.around(design, lambda share: report(DESIGN + (1 - DESIGN) * share), earlier)
+
+    @classmethod
+    def around(cls, design: Design, report: Report, earlier: Sequence[Judged] = (),
+               excluded: Collection[str] = ()) -> Stage:
+        """Return the selection from a design's columns."""
+        regression = Regression(design)
+        selector = Selector(regression, report, earlier, excluded)
+        selection = selector.select()
+        regression.tell_widths(list(estimate_widths(regression, selection.fit)))
+        return cls(design, regression, selector, selection)
+
+    def with_only(self, one: Judged) -> Stage:
+        """Return the stage as if one candidate for the first place had been all."""
+        selection = replace(self.selection, adopted=[one], fit=one.fit, rivals={})
+        selection.rivals = self.selector.find_rivals(selection)
+        return replace(self, selection=selection)
+
+
+@dataclass(frozen=True)
+class Path:
+    """From the model as given to all effects.
+
+    Parameters
+    ----------
+    first : Stage
+    bent : tuple of Judged
+        Of the first stage, and in the model of the last.
+    last : Stage
+        The first, where nothing bends.
+    """
+
+    first: Stage
+    bent: tuple[Judged, ...]
+    last: Stage
+
+    @property
+    def adopted(self) -> list[Judged]:
+        """All effects, in order."""
+        return [*self.bent, *self.last.selection.adopted]
+
+    @property
+    def cost(self) -> float:
+        """Deviance at the end with the prices of all effects; of two paths the less is better."""
+        return self.last.selection.fit.deviance + sum(
+            one.candidate.penalty + MARGIN for one in self.adopted)
+
+    def may_leave(self, squares: float) -> bool:
+        """Return whether squares, whitened, may be what the form of an effect leaves here."""
+        selection = self.last.selection
+        active = [active for one in selection.adopted for active in one.candidate.active]
+        return any(within_form(squares, one.candidate, active, selection.fit.noises,
+                               self.last.regression) for one in selection.adopted)
+
+    @property
+    def rivals(self) -> dict[str, list[str]]:
+        """Effects that explain as well as an adopted one."""
+        early = self.first.selection.rivals
+        return {**{one.candidate.name: early.get(one.candidate.name, []) for one in self.bent},
+                **self.last.selection.rivals}
+
+
+def find_path(model: ForceModel, recordings: Sequence[Recording], report: Report) -> Path:
+    """Return the way on which effects explain the recordings best.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    path = _followed(Stage.of(model, recordings, lambda share: report(FIRST * share)), recordings,
+                     lambda share: report(FIRST + AGAIN * share))
+    other = _other(path, recordings, lambda share: report(FIRST + AGAIN + AGAIN * share))
+    report(1.0)
+    if other is None:
+        return path
+    better, worse = sorted((path, other), key=lambda one: one.cost)
+    if len(worse.adopted) < len(better.adopted) and worse.may_leave(worse.cost - better.cost):
+        return worse
+    _tell_rivals(better, worse)
+    return better
+
+
+def _followed(first: Stage, recordings: Sequence[Recording], report: Report) -> Path:
+    """Return the path from a first stage on."""
+    bent = tuple(one for one in first.selection.adopted if one.candidate.name in NOT_LINEAR)
+    if not bent:
+        return Path(first, (), first)
+    return Path(first, bent, Stage.of(model_with(first, bent), recordings, report, bent))
+
+
+def _other(path: Path, recordings: Sequence[Recording], report: Report) -> Path | None:
+    """Return the path on which what competes for the first place has it, if that bends or not."""
+    selection = path.first.selection
+    if not selection.adopted:
+        return None
+    bends = selection.adopted[0].candidate.name in NOT_LINEAR
+    names = {one.candidate.name for one in selection.adopted}
+    contender = next((
+        one for one in selection.candidates
+        if (one.candidate.name in NOT_LINEAR) != bends and one.candidate.name not in names
+        and one.evidence > COMPETES * selection.candidates[0].evidence), None)
+    if contender is None:
+        return None
+    if bends:
+        straight = Stage.around(path.first.design, report, excluded=NOT_LINEAR)
+        return Path(straight, (), straight)
+    return _followed(path.first.with_only(contender), recordings, report)
+
+
+def _tell_rivals(better: Path, worse: Path) -> None:
+    """Make the worse path's effect a rival, where it is hardly worse; where it is far, none."""
+    mine = [one.candidate.name for one in better.adopted]
+    theirs = [one.candidate.name for one in worse.adopted]
+    name = next((name for name in mine if name not in theirs), None)
+    other = next((name for name in theirs if name not in mine), None)
+    if name is None or other is None:
+        return
+    bent = {one.candidate.name for one in better.bent}
+    stage = better.first if name in bent else better.last
+    known = stage.selection.rivals.get(name, [])
+    gap = worse.cost - better.cost
+    if gap < NEAR_SCORE and other not in known:
+        stage.selection.rivals[name] = [*known, other]
+    elif gap > FAR_SCORE:
+        stage.selection.rivals[name] = [rival for rival in known if rival != other]
+
+
+def model_with(stage: Stage, adopted: Sequence[Judged]) -> ForceModel:
+    """Return the model with some of what a stage adopted, its own numbers as they were."""
+    fit = stage.selection.fit
+    kept = {id(active) for one in adopted for active in one.candidate.active}
+    place = len(stage.design.base)
+    active, places = [], list(range(place))
+    for one in fit.active:
+        if id(one) in kept:
+            active.append(one)
+            places += range(place, place + one.size)
+        place += one.size
+    part = replace(fit, active=tuple(active), coefficients=fit.coefficients[places],
+                   covariance=fit.covariance[np.ix_(places, places)])
+    return fitted_model(stage.regression, part, calibrate=False)
