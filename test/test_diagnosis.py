@@ -17,21 +17,23 @@ from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect
+from pprs_dynamics.experiments.fourier_path import FourierFamily, FourierPath
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.model_file import build_model
 
 MODEL = DriveModel.load()
 TIME = np.arange(6000) * 0.002
+EXCITATION = Excitation()
 TOLERANCES = {'tolerances.masses.payload': 0.05, 'tolerances.masses.slides': 0.05,
               'tolerances.friction.drives.coulomb': 0.05}
 
 
-def record(model: DriveModel, noise: float = 0.0, seed: int = 0) -> Recording:
+def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
+           motion: Excitation | FourierPath = EXCITATION) -> Recording:
     """Return a recording of what a model says about a motion."""
-    motion = Excitation().motion(TIME).with_time(TIME)
-    forces = model.drive_forces(motion)
+    forces = model.drive_forces(motion.motion(TIME).with_time(TIME))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
     return Recording.from_arrays(
@@ -168,6 +170,20 @@ def test_what_is_in_the_model_is_moved_and_not_claimed_again() -> None:
 OFFSETS = dict(zip(DRIVES, (0.44, -0.32, 0.89, -0.63, -0.88, -0.43), strict=True))
 WRENCH = {'force_x': 0.66, 'force_y': 0.78, 'force_z': 0.1,
           'moment_x': -0.05, 'moment_y': 0.04, 'moment_z': 0.02}
+
+
+def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
+    true = build_model({**MODEL.values, 'effects.active': ['base_tilt'],
+                        'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
+    family = FourierFamily(TIME[-1], np.tile((1, 2, 3), (6, 1)), HOME)
+    up_and_down = np.zeros((6, family.size // 6))
+    up_and_down[2] = 0.03, -0.02, 0.04
+    found = diagnose(MODEL, [record(true, 0.08, motion=family.path(up_and_down.ravel()))])
+    assert [one.name for one in found.effects] == ['base_tilt']
+    assert found.effects[0].parameters['x'].value == pytest.approx(0.045, abs=5e-4)
+    assert found.effects[0].parameters['y'].value == pytest.approx(-0.048, abs=5e-4)
+    assert any('slide_1, slide_2, slide_3 hardly move' in one for one in found.warnings)
+    assert not any('independent samples' in one for one in found.warnings)
 
 
 def judge_of(name: str, values: dict[str, float]) -> Judge:

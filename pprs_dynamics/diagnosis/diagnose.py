@@ -160,7 +160,7 @@ def _answer(path: Path, early: list[FoundEffect], unexplained: Unexplained,
         tuple(_ranked(one, drives, first.regression) for one in first.selection.candidates),
         tuple(_ranked(one, drives, regression) for one in stage.selection.suspects),
         unexplained.statements, unexplained.of_form, tuple(moved),
-        find_cautions(first.design, first.regression, first.selector, first.selection, effects),
+        find_cautions(stage.design, regression, stage.selector, stage.selection, effects),
         first.design.notes, first.design.model, fitted_model(regression, fit),
         first.design.residuals, unexplained.remaining, float(np.sqrt(np.mean(noise ** 2))),
         'validation' if validate else 'blocks', first.selector)
