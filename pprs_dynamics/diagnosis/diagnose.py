@@ -25,7 +25,7 @@ from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.paired_errors import rms
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.selection import Selector
-from pprs_dynamics.diagnosis.stages import Path, Stage, find_path
+from pprs_dynamics.diagnosis.stages import Stage, Way, find_way
 from pprs_dynamics.diagnosis.unexplained import Unexplained, allowed_by_model, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.measurement.recording import Recording
@@ -126,21 +126,21 @@ def diagnose(
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    path = find_path(model, recordings, lambda share: report(0.85 * share))
-    first, bent, stage = path.first, path.bent, path.last
+    way = find_way(model, recordings, lambda share: report(0.85 * share))
+    first, bent, stage = way.first, way.bent, way.last
     early = _effects_of(first, bent, validate) if bent else []
     allowed = sum((form_allowance(one.effect, one.force) for one in early),
                   allowed_by_model(first.design))
     unexplained = find_unexplained(stage.selector, stage.selection, allowed)
     report(0.95)
-    return _answer(path, early, unexplained, validate)
+    return _answer(way, early, unexplained, validate)
 
 
-def _answer(path: Path, early: list[FoundEffect], unexplained: Unexplained,
+def _answer(way: Way, early: list[FoundEffect], unexplained: Unexplained,
             validate: Sequence[Recording]) -> Diagnosis:
-    first, stage = path.first, path.last
+    first, stage = way.first, way.last
     regression, fit = stage.regression, stage.selection.fit
-    known = {one.candidate.name for one in path.bent}
+    known = {one.candidate.name for one in way.bent}
     late = _effects_of(stage, sorted(
         stage.selection.adopted, key=lambda one: one.candidate.name not in known), validate)
     for k, one in enumerate(early):
@@ -150,7 +150,7 @@ def _answer(path: Path, early: list[FoundEffect], unexplained: Unexplained,
                           held_out_before=early[-1].held_out_after)
     drives = first.design.drives
     effects = joined(early, late, drives)
-    sets = tuple((name, *others) for name, others in path.rivals.items() if others)
+    sets = tuple((name, *others) for name, others in way.rivals.items() if others)
     verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
                else 'effect' if effects else 'adequate')
     moved = [c for c in calibrations(regression, fit) if abs(c.after - c.before) > 2 * c.std]

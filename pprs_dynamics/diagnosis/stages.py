@@ -68,7 +68,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Path:
+class Way:
     """From the model as given to all effects.
 
     Parameters
@@ -91,7 +91,7 @@ class Path:
 
     @property
     def cost(self) -> float:
-        """Deviance at the end with the prices of all effects; of two paths the less is better."""
+        """Deviance at the end with the prices of all effects; of two ways the less is better."""
         return self.last.selection.fit.deviance + sum(
             one.candidate.penalty + MARGIN for one in self.adopted)
 
@@ -110,7 +110,7 @@ class Path:
                 **self.last.selection.rivals}
 
 
-def find_path(model: ForceModel, recordings: Sequence[Recording], report: Report) -> Path:
+def find_way(model: ForceModel, recordings: Sequence[Recording], report: Report) -> Way:
     """Return the way on which effects explain the recordings best.
 
     Raises
@@ -118,30 +118,30 @@ def find_path(model: ForceModel, recordings: Sequence[Recording], report: Report
     PprsError
         As `measure_residuals`.
     """
-    path = _followed(Stage.of(model, recordings, lambda share: report(FIRST * share)), recordings,
+    way = _followed(Stage.of(model, recordings, lambda share: report(FIRST * share)), recordings,
                      lambda share: report(FIRST + AGAIN * share))
-    other = _other(path, recordings, lambda share: report(FIRST + AGAIN + AGAIN * share))
+    other = _other(way, recordings, lambda share: report(FIRST + AGAIN + AGAIN * share))
     report(1.0)
     if other is None:
-        return path
-    better, worse = sorted((path, other), key=lambda one: one.cost)
+        return way
+    better, worse = sorted((way, other), key=lambda one: one.cost)
     if len(worse.adopted) < len(better.adopted) and worse.may_leave(worse.cost - better.cost):
         return worse
     _tell_rivals(better, worse)
     return better
 
 
-def _followed(first: Stage, recordings: Sequence[Recording], report: Report) -> Path:
-    """Return the path from a first stage on."""
+def _followed(first: Stage, recordings: Sequence[Recording], report: Report) -> Way:
+    """Return the way from a first stage on."""
     bent = tuple(one for one in first.selection.adopted if one.candidate.name in NOT_LINEAR)
     if not bent:
-        return Path(first, (), first)
-    return Path(first, bent, Stage.of(model_with(first, bent), recordings, report, bent))
+        return Way(first, (), first)
+    return Way(first, bent, Stage.of(model_with(first, bent), recordings, report, bent))
 
 
-def _other(path: Path, recordings: Sequence[Recording], report: Report) -> Path | None:
-    """Return the path on which what competes for the first place has it, if that bends or not."""
-    selection = path.first.selection
+def _other(way: Way, recordings: Sequence[Recording], report: Report) -> Way | None:
+    """Return the way on which what competes for the first place has it, if that bends or not."""
+    selection = way.first.selection
     if not selection.adopted:
         return None
     bends = selection.adopted[0].candidate.name in NOT_LINEAR
@@ -153,13 +153,13 @@ def _other(path: Path, recordings: Sequence[Recording], report: Report) -> Path 
     if contender is None:
         return None
     if bends:
-        straight = Stage.around(path.first.design, report, excluded=NOT_LINEAR)
-        return Path(straight, (), straight)
-    return _followed(path.first.with_only(contender), recordings, report)
+        straight = Stage.around(way.first.design, report, excluded=NOT_LINEAR)
+        return Way(straight, (), straight)
+    return _followed(way.first.with_only(contender), recordings, report)
 
 
-def _tell_rivals(better: Path, worse: Path) -> None:
-    """Make the worse path's effect a rival, where it is hardly worse; where it is far, none."""
+def _tell_rivals(better: Way, worse: Way) -> None:
+    """Make the worse way's effect a rival, where it is hardly worse; where it is far, none."""
     mine = [one.candidate.name for one in better.adopted]
     theirs = [one.candidate.name for one in worse.adopted]
     name = next((name for name in mine if name not in theirs), None)

@@ -11,7 +11,7 @@ import numpy as np
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.library import Candidate
 from pprs_dynamics.diagnosis.scan import Scan, holds
-from pprs_dynamics.diagnosis.stages import Stage, find_path
+from pprs_dynamics.diagnosis.stages import Stage, find_way
 from pprs_dynamics.experiments.columns import Block, ColumnPlan, plan_for
 from pprs_dynamics.experiments.criteria import (
     Contest,
@@ -74,10 +74,10 @@ class Question:
 def question_of(model: DriveModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    path = find_path(model, recordings, progress)
+    way = find_way(model, recordings, progress)
     # As the diagnosis does: all others are judged around a model that has what bends them.
-    contested = any(path.rivals.get(one.candidate.name) for one in path.bent)
-    stage = path.first if contested else path.last
+    contested = any(way.rivals.get(one.candidate.name) for one in way.bent)
+    stage = way.first if contested else way.last
     progress(1.0)
     return _Asker(stage).question()
 
