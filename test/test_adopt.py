@@ -22,12 +22,12 @@ import pytest
 from node_bench import bench
 from ros_processes import environment, executable, node_process
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.diagnosis import loop, objections
 from pprs_dynamics.diagnosis.adopt import Adoption, adopt
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.diagnosis.measuring import measure_residuals
-from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.diagnosis.trial import Offer, StandingError
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
@@ -383,3 +383,18 @@ def test_an_offer_is_read_in_one_way() -> None:
     offer = Offer.of('coulomb_friction: lift_2,slide_1,lift_2')
     assert offer.drives == ('slide_1', 'lift_2')
     assert replace(offer, drives=None) == Offer.of('coulomb_friction')
+
+
+@pytest.mark.parametrize(('text', 'named'), [('coulomb_friction:slide_1,lift_1', 'slide_1'),
+                                             ('viscous_friction:slide_2', 'slide_2')])
+def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence(text: str, named: str) -> None:
+    model, time = DriveModel.load(), np.arange(2000) * 0.004
+    up_and_down = np.tile([0.0, 0.0, 0.5], (2000, 1))
+    up_and_down[:, 2] += 0.04 * np.sin(2 * np.pi * time / 4) * np.sin(np.pi * time / 8) ** 2
+    motion = PlatformMotion.from_poses(time, up_and_down, np.tile([0.0, 0, 0, 1], (2000, 1)))
+    forces = model.drive_forces(motion)
+    noise = 0.05 * np.random.default_rng(1).normal(size=(2000, 6))
+    recording = Recording.from_arrays('heave', time, forces.mechanism.position, None,
+                                      forces.total + noise)
+    with pytest.raises(StandingError, match=f'on {named}: .* hardly moved'):
+        adopt(model, Offer.of(text), [recording])

@@ -30,7 +30,9 @@ def stage(deviance: float, *adopted: Any, candidates: Any = (), rivals: Any = No
     selection = SimpleNamespace(adopted=list(adopted), candidates=list(candidates),
                                 fit=SimpleNamespace(deviance=deviance, noises={}),
                                 rivals=dict(rivals or {}))
-    return cast(Stage, SimpleNamespace(selection=selection, regression=Weighed(), design=None))
+    selector = SimpleNamespace(stands_alone=lambda one: one.evidence > 0)
+    return cast(Stage, SimpleNamespace(selection=selection, regression=Weighed(), design=None,
+                                       selector=selector))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.design import SLOW, Design
+from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import effective_samples
 from pprs_dynamics.diagnosis.scan import Scan
@@ -54,7 +54,7 @@ def _motion(design: Design) -> list[str]:
     still, one_way = [], []
     for d, name in enumerate(design.drives):
         v = velocity[:, d]
-        moving = np.abs(v) > SLOW
+        moving = design.moving(d)
         if not design.moves(d):
             still.append(name)
         elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > ONE_WAY:

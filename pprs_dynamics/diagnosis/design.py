@@ -46,8 +46,9 @@ from pprs_dynamics.model.force_model import ForceModel, Forces
 SHAPE_STEP = 1e-3  # relative, for derivatives by shape parameters of effects in the model
 COLUMN = 'column '
 FREE = 1e-6  # prior precision of what is not known beforehand
-# A drive that is slower nearly all the time hardly moves [m/s].
-SLOW, LEAST_MOVING = 2e-3, 0.05
+# A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
+# over, times the first: in less than the second of the time.
+TURNED, LEAST_MOVING = 2.0, 0.05
 Rows = dict[int, Array]
 """Columns by drive, (k, M) each; drives that are not in it feel nothing."""
 
@@ -215,10 +216,14 @@ class Design:
                     for c, column in zip(effect.coefficients, rows, strict=True)]
         return design
 
+    def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
+        """Return when a drive is in motion, (M,)."""
+        width = np.broadcast_to(self.model.reversal.velocity, len(self.drives))[drive]
+        return np.abs(self.residuals.variables['velocity'][:, drive]) > float(TURNED * width)
+
     def moves(self, drive: int) -> bool:
         """Return whether a drive is in motion for a noteworthy share of the time."""
-        speed = np.abs(self.residuals.variables['velocity'][:, drive])
-        return bool(np.nanmean(speed > SLOW) >= LEAST_MOVING)
+        return bool(np.mean(self.moving(drive)) >= LEAST_MOVING)
 
     def _covered(self, drive: int) -> DriveRange:
         position = np.concatenate([one.position[:, drive] for one in self.recordings])

@@ -1,7 +1,7 @@
 """What an adopted effect leaves may be its form, where that is an idealisation.
 
-Friction, springs and cords are only nearly of the catalogue's form, and what a strong effect
-leaves is no further effect and nothing unknown. Inertia, gravity and geometry are exact.
+What a strong effect leaves is no further effect and nothing unknown: a little of any, since columns
+are linear, and more of friction, springs and cords, which are only nearly of the catalogue's form.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ def is_form(one: Judged, other: Judged, active: Sequence[Active], regression: Re
     """
     if one.evidence < FORM_SHARE * other.evidence:
         return True
-    noises = one.fit.noises
-    if one.candidate.drives is not None:
-        noises = {d: noises[d] for d in one.candidate.drives}
+    if not all(any(mine is known for known in active) for mine in other.candidate.active):
+        return False  # adopted earlier and in the model
+    felt = {d for mine in one.candidate.active for d in mine.term.rows}
+    noises = {d: noise for d, noise in one.fit.noises.items() if d in felt}
     squares = squared_size(one.candidate, [*active, *one.candidate.active], noises, regression)
     return within_form(squares, other.candidate, active, noises, regression)
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
+from pprs_dynamics.diagnosis.joint_fit import Active, Fitted, JointFit, Regression
 from pprs_dynamics.diagnosis.library import Candidate, Library
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.parallel import each
@@ -86,7 +87,8 @@ class Judge:
     def _further_drives(self, one: Judged, active: tuple[Active, ...]) -> list[Active]:
         """Return an effect without shape on drives where it may pay beside others, best first."""
         taken = {(a.term.effect.name, a.term.drive) for a in (*active, *one.candidate.active)}
-        noises = {**self.rich, **{d: one.fit.noises[d] for d in one.candidate.drives or ()}}
+        taking_part = set(one.candidate.drives or ()) & set(one.fit.noises)
+        noises = {**self.rich, **{d: one.fit.noises[d] for d in taking_part}}
         scan = Scan(self.library, (*active, *one.candidate.active), noises)
         found: list[tuple[float, Active]] = []
         for term in (term for terms in self.library.local.values() for term in terms):
@@ -106,11 +108,14 @@ class Judge:
             winner = max(winner, exact, key=lambda one: one.evidence)
         # Noise and effect have more than one optimum: a slow noise that swallows part of the
         # effect is one. Least squares without any correlation starts at another.
+        fit = self.from_least_squares(winner.fit.active)
+        return replace(winner, fit=fit) if fit.deviance < winner.fit.deviance else winner
+
+    def from_least_squares(self, active: Sequence[Fitted]) -> JointFit:
+        """Return the fit that starts without any correlation of the noise."""
         white = {d: NoiseModel((), (0,), (np.zeros(0),), (noise.innovation,))
                  for d, noise in self.rich.items()}
-        fit = self.regression.fit(winner.fit.active, white, iterations=WHITE_ITERATIONS)
-        gain = winner.fit.deviance - fit.deviance
-        return Judged(winner.candidate, fit, winner.evidence + gain) if gain > 0 else winner
+        return self.regression.fit(active, white, iterations=WHITE_ITERATIONS)
 
     def _rich_noise(self, d: int) -> NoiseModel:
         """Noise of what a drive's regression on nearly all effects leaves."""

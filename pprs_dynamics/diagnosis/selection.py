@@ -83,7 +83,8 @@ class Selector:
 
     def select(self) -> Selection:
         """Return the effects that the errors call for."""
-        start = self.regression.fit((), self.rich)
+        start = min(self.regression.fit((), self.rich), self.judge.from_least_squares(()),
+                    key=lambda fit: fit.deviance)
         selection = Selection([], start, start)
         while len(selection.adopted) < MOST_EFFECTS:
             judged = self._judge_proposals(selection)
@@ -125,9 +126,9 @@ class Selector:
         best: dict[str, Judged] = {}
         for one in sorted(judged, key=lambda one: -one.evidence):
             best.setdefault(one.candidate.name, one)
-        near = max((one.evidence for one in best.values()), default=0.0) / 2
-        front = [self.judge.completed(one, selection.fit, active) if one.evidence > near else one
-                 for one in best.values()]
+        most = max((one.evidence for one in best.values()), default=0.0)
+        front = [self.judge.completed(one, selection.fit, active)
+                 if one.evidence >= most - abs(most) / 2 else one for one in best.values()]
         return sorted(front, key=lambda one: -one.evidence)
 
     def _stands(self, one: Judged, selection: Selection) -> bool:
@@ -148,6 +149,11 @@ class Selector:
             if shared and is_form(one, other, active, self.regression):
                 return False
         return True
+
+    def stands_alone(self, one: Judged) -> bool:
+        """Return whether an effect stands beside nothing else."""
+        start = self.regression.fit((), self.rich)
+        return self._stands(one, Selection([], start, start))
 
     def _simplest(self, winner: Judged, judged: Sequence[Judged],
                   selection: Selection) -> Judged:
@@ -200,7 +206,7 @@ class Selector:
                 selection.adopted[k].candidate.penalty + MARGIN)
             best = max(judged, key=lambda one: one.evidence)
             limit = max(current, own.evidence if own else current)
-            if best.evidence > limit + SWAP or best is own:
+            if best.evidence > limit + SWAP or (best is own and best.evidence > current):
                 selection.adopted[k] = best
                 selection.fit = best.fit
 

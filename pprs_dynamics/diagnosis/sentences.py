@@ -293,7 +293,7 @@ def _on_drive(diagnosis: Diagnosis, drive: str) -> list[str]:
     index = diagnosis.residuals.drives.index(drive)
     sitting = [one.name for one in diagnosis.effects if one.drives and drive in one.drives]
     return sitting or [one.name for one in diagnosis.effects if np.any(one.force[:, index])] or [
-        'the friction of the model']
+        'what the model has there']
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:

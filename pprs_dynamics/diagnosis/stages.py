@@ -64,7 +64,9 @@ class Stage:
         """Return the stage as if one candidate for the first place had been all."""
         selection = replace(self.selection, adopted=[one], fit=one.fit, rivals={})
         selection.rivals = self.selector.find_rivals(selection)
-        return replace(self, selection=selection)
+        regression = Regression(self.design)
+        regression.tell_widths(list(estimate_widths(regression, one.fit)))
+        return replace(self, regression=regression, selection=selection)
 
 
 @dataclass(frozen=True)
@@ -86,12 +88,12 @@ class Way:
 
     @property
     def adopted(self) -> list[Judged]:
-        """All effects, in order."""
+        """All effects, those in the last stage's model first."""
         return [*self.bent, *self.last.selection.adopted]
 
     @property
     def cost(self) -> float:
-        """Deviance at the end with the prices of all effects; of two ways the less is better."""
+        """Deviance at the end with the prices of all effects; the cheaper way is better."""
         return self.last.selection.fit.deviance + sum(
             one.candidate.penalty + MARGIN for one in self.adopted)
 
@@ -105,9 +107,11 @@ class Way:
     @property
     def rivals(self) -> dict[str, list[str]]:
         """Effects that explain as well as an adopted one."""
-        early = self.first.selection.rivals
-        return {**{one.candidate.name: early.get(one.candidate.name, []) for one in self.bent},
-                **self.last.selection.rivals}
+        early, late = self.first.selection.rivals, self.last.selection.rivals
+        found = {one.candidate.name: early.get(one.candidate.name, []) for one in self.bent}
+        for name, others in late.items():
+            found[name] = list(dict.fromkeys((*found.get(name, []), *others)))
+        return found
 
 
 def find_way(model: ForceModel, recordings: Sequence[Recording], report: Report) -> Way:
@@ -120,14 +124,19 @@ def find_way(model: ForceModel, recordings: Sequence[Recording], report: Report)
     """
     way = _followed(Stage.of(model, recordings, lambda share: report(FIRST * share)), recordings,
                      lambda share: report(FIRST + AGAIN * share))
-    other = _other(way, recordings, lambda share: report(FIRST + AGAIN + AGAIN * share))
-    report(1.0)
-    if other is None:
+    contender = _contender(way.first)
+    if contender is None:
+        report(1.0)
         return way
+    favourite = way.first.selection.adopted[0].candidate.name
+    other = _without(way, favourite, contender, recordings,
+                     lambda share: report(FIRST + AGAIN + AGAIN * share))
+    report(1.0)
     better, worse = sorted((way, other), key=lambda one: one.cost)
     if len(worse.adopted) < len(better.adopted) and worse.may_leave(worse.cost - better.cost):
         return worse
-    _tell_rivals(better, worse)
+    names = favourite, contender.candidate.name
+    _tell_rivals(better, worse, names if better is way else names[::-1])
     return better
 
 
@@ -139,32 +148,36 @@ def _followed(first: Stage, recordings: Sequence[Recording], report: Report) -> 
     return Way(first, bent, Stage.of(model_with(first, bent), recordings, report, bent))
 
 
-def _other(way: Way, recordings: Sequence[Recording], report: Report) -> Way | None:
-    """Return the way on which what competes for the first place has it, if that bends or not."""
-    selection = way.first.selection
+def _contender(first: Stage) -> Judged | None:
+    """Return what competes for the first place, where only one of the two bends the columns."""
+    selection = first.selection
     if not selection.adopted:
         return None
     bends = selection.adopted[0].candidate.name in NOT_LINEAR
     names = {one.candidate.name for one in selection.adopted}
-    contender = next((
+    return next((
         one for one in selection.candidates
         if (one.candidate.name in NOT_LINEAR) != bends and one.candidate.name not in names
-        and one.evidence > COMPETES * selection.candidates[0].evidence), None)
-    if contender is None:
-        return None
-    if bends:
-        straight = Stage.around(way.first.design, report, excluded=NOT_LINEAR)
-        return Way(straight, (), straight)
-    return _followed(way.first.with_only(contender), recordings, report)
+        and one.evidence > COMPETES * selection.candidates[0].evidence
+        and first.selector.stands_alone(one)), None)
 
 
-def _tell_rivals(better: Way, worse: Way) -> None:
+def _without(way: Way, favourite: str, contender: Judged, recordings: Sequence[Recording],
+             report: Report) -> Way:
+    """Return the way on which a contender has the first place and its favourite none."""
+    first = way.first
+    if contender.candidate.name in NOT_LINEAR:
+        return _followed(first.with_only(contender), recordings, report)
+    straight = Stage.around(first.design, report, excluded=(favourite,))
+    # What could be the first of all remains what it was.
+    straight.selection.candidates = first.selection.candidates
+    return _followed(straight, recordings, report)
+
+
+def _tell_rivals(better: Way, worse: Way, names: tuple[str, str]) -> None:
     """Make the worse way's effect a rival, where it is hardly worse; where it is far, none."""
-    mine = [one.candidate.name for one in better.adopted]
-    theirs = [one.candidate.name for one in worse.adopted]
-    name = next((name for name in mine if name not in theirs), None)
-    other = next((name for name in theirs if name not in mine), None)
-    if name is None or other is None:
+    name, other = names
+    if name not in {one.candidate.name for one in better.adopted}:
         return
     bent = {one.candidate.name for one in better.bent}
     stage = better.first if name in bent else better.last

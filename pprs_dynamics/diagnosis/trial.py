@@ -34,6 +34,10 @@ class OfferError(PprsError, ValueError):
     """An effect or drive that does not exist."""
 
 
+class StandingError(PprsError, ValueError):
+    """Friction that is to be fitted on drives that stand."""
+
+
 @dataclass(frozen=True)
 class Offer:
     """An effect that somebody wants in the model.
@@ -150,11 +154,14 @@ def try_effect(
     ------
     ModelError
         Where the fit gives values that no model may have.
+    StandingError
+        Where friction is asked for on drives that hardly moved.
     PprsError
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.4 * share))
+    _require_motion(design, offer)
     regression = Regression(design)
     selector = Selector(regression)
     without = regression.fit((), selector.rich)
@@ -197,6 +204,19 @@ def try_effect(
         judged.evidence, _own_share(selector, active, fit), regression, fit, without,
         regression.held_out_error((), noises), around.held_out_error(last.active, noises),
         before - after)
+
+
+def _require_motion(design: Design, offer: Offer) -> None:
+    """Raise StandingError for friction on drives that stand, where these are asked for or all."""
+    if not offer.effect.needs_motion:
+        return
+    asked = offer.drives or design.drives
+    standing = [name for name in asked if not design.moves(design.drives.index(name))]
+    if standing and (offer.drives or len(standing) == len(asked)):
+        raise StandingError(
+            f'{offer.name} on {", ".join(standing)}: the recordings must show friction where it is '
+            f'to be fitted, but {"this drive" if len(standing) == 1 else "these drives"} hardly '
+            'moved in them')
 
 
 def _is_move(regression: Regression, one: Calibration) -> bool:
