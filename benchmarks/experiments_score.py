@@ -213,6 +213,11 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
                  for count, bad in zip(counts, wrong, strict=True)]
         yield (f'| {name} | {"" if name == "all" else ", ".join(rivals)} | {len(some)} | '
                f'{" | ".join(cells)} |')
+    pairs = [(row['effect'], rival, row['designed']['verdict'] == 'settled')
+             for row in rows for rival in row['rivals']]
+    different = {frozenset(pair[:2]) for pair in pairs}
+    yield (f'{len(different)} different pairs of truth and rival, {len(pairs)} in all, of which '
+           f'the designed motion settled {sum(pair[2] for pair in pairs)}')
     followed = [row['followed'] for row in rows if 'followed' in row]
     if followed:
         worst = {key: max(one[key] for one in followed) for key in followed[0]}
