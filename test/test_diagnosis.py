@@ -220,6 +220,18 @@ def test_an_offset_proposed_on_five_drives_is_completed() -> None:
     assert sorted(whole.candidate.drives or ()) == list(range(6))
 
 
+def test_an_offset_is_among_what_a_spring_can_be() -> None:
+    judge = judge_of('effort_offset', {'slide_2.force': 0.4, 'lift_1.force': -0.3})
+    springs = [Active(term, term.effect.variants[-1]) for d in (1, 3) for term in
+               judge.library.local[d] if term.effect.name == 'drive_spring']
+    spring = judged(judge, *springs)
+    cases = judge.library.special_cases(spring.candidate)
+    assert [(one.name, one.drives) for one in cases] == [('effort_offset', (1, 3))]
+    offset = judged(judge, *cases[0].active)
+    assert offset.evidence > spring.evidence
+    assert not judge.library.special_cases(offset.candidate)
+
+
 def test_the_size_of_an_effect_is_what_the_fit_loses_without_it() -> None:
     judge = judge_of('external_wrench', WRENCH)
     term = next(t for t in judge.library.structure if t.effect.name == 'external_wrench')
@@ -261,6 +273,16 @@ def test_a_hidden_effect_is_named(name: str) -> None:
     if named[:1] == [name] and truth['effects'][0]['drives'] is not None:
         assert set(found.effects[0].drives or ()) == set(truth['effects'][0]['drives'])
     assert found.effects[0].error_after < found.effects[0].error_before
+
+
+def test_wide_reversals_are_widths_and_no_further_friction() -> None:
+    model, recording, truth = make_case(Case('effects', ('homing_error',), 5, 1.0, 0.9))
+    found = diagnose(model, [recording])
+    assert [one.name for one in found.effects] == ['homing_error']
+    widths = np.array(found.adopted.reversal.velocity) / model.reversal.velocity
+    assert widths[1:3] == pytest.approx(truth['drive_width'][1:3], rel=0.05)
+    told = {one.label: one.before for one in found.calibrated if 'reversal' in one.label}
+    assert told['friction.reversal_velocities[2]'] == model.reversal.velocity == 0.001
 
 
 @pytest.mark.parametrize('noise', [0.0, 0.98, 0.999, '1/f'])

@@ -169,8 +169,17 @@ def _within(parameter: Parameter, value: float) -> float:
     return float(min(max(rounded, parameter.lower), parameter.upper))
 
 
-def calibrations(regression: Regression, fit: JointFit) -> list[Calibration]:
-    """Return the numbers that the fit moves within their tolerances."""
+def calibrations(regression: Regression, fit: JointFit,
+                 given: ForceModel | None = None) -> list[Calibration]:
+    """Return the numbers that the fit moves within their tolerances.
+
+    Parameters
+    ----------
+    regression : Regression
+    fit : JointFit
+    given : ForceModel, optional
+        From which widths of reversal are counted; by default the design's.
+    """
     found = []
     for k, column in enumerate(regression.design.base):
         if column.number is None:
@@ -181,12 +190,14 @@ def calibrations(regression: Regression, fit: JointFit) -> list[Calibration]:
             number.key, number.element, number.value,
             float(f'{number.value + np.sign(number.value) * share * number.deviation:.{DIGITS}g}'),
             std, number.unit))
-    common = np.broadcast_to(regression.design.model.reversal.velocity,
-                             len(regression.design.drives))
+    model, count = regression.design.model, len(regression.design.drives)
+    before = np.broadcast_to((given or model).reversal.velocity, count)
+    after = np.array(np.broadcast_to(model.reversal.velocity, count))
+    for d, width in estimate_widths(regression, fit).items():
+        after[d] = float(f'{width:.{DIGITS}g}')
     # Widths are told without an uncertainty: the fits allow for all of them anyway.
-    found += [Calibration(*place_of(regression.design, d), float(common[d]),
-                          float(f'{width:.{DIGITS}g}'), 0.0, 'm/s')
-              for d, width in estimate_widths(regression, fit).items()]
+    found += [Calibration(*place_of(regression.design, d), float(before[d]), float(after[d]), 0.0,
+                          'm/s') for d in range(count) if before[d] != after[d]]
     return found
 
 

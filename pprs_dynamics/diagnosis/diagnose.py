@@ -148,12 +148,16 @@ def _answer(way: Way, early: list[FoundEffect], unexplained: Unexplained,
     if early and late:
         late[0] = replace(late[0], error_before=early[-1].error_after,
                           held_out_before=early[-1].held_out_after)
+    elif late and stage is not first:
+        error, held_out = _errors_as_given(first, validate)
+        late[0] = replace(late[0], error_before=error, held_out_before=held_out)
     drives = first.design.drives
     effects = joined(early, late, drives)
     sets = tuple((name, *others) for name, others in way.rivals.items() if others)
     verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
                else 'effect' if effects else 'adequate')
-    moved = [c for c in calibrations(regression, fit) if abs(c.after - c.before) > 2 * c.std]
+    moved = [c for c in calibrations(regression, fit, first.design.model)
+             if abs(c.after - c.before) > 2 * c.std]
     noise = np.concatenate([rest[regression.series[d].known] for d, rest in fit.rest.items()])
     return Diagnosis(
         verdict, tuple(effects), sets,
@@ -164,6 +168,14 @@ def _answer(way: Way, early: list[FoundEffect], unexplained: Unexplained,
         first.design.notes, first.design.model, fitted_model(regression, fit),
         first.design.residuals, unexplained.remaining, float(np.sqrt(np.mean(noise ** 2))),
         'validation' if validate else 'blocks', first.selector)
+
+
+def _errors_as_given(first: Stage, validate: Sequence[Recording]) -> tuple[float, float]:
+    """Return the error of the model as given, and the one on what it was not fitted to [N]."""
+    error = first.regression.error((), np.zeros(len(first.design.base)))
+    if validate:
+        return error, rms(measure_residuals(first.design.model, validate)[0])
+    return error, first.regression.held_out_error((), first.selection.fit.noises)
 
 
 def _effects_of(stage: Stage, adopted: Sequence[Judged], validate: Sequence[Recording],

@@ -19,6 +19,7 @@ from pprs_dynamics.mechanism.robot import Array
 # Of its square, at least this share of a column must be its own, in single precision.
 SCANNED_SHARE = 1e-5
 LEAST_EIGENVALUE = 1e-5
+HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,25 @@ class Candidate:
     def score(self) -> float:
         """Gain less penalty."""
         return self.gain - self.penalty
+
+
+def holds(larger: Candidate, smaller: Candidate) -> bool:
+    """Return whether an effect with more coefficients can be all that another one is."""
+    if sum(one.size for one in larger.active) <= sum(one.size for one in smaller.active):
+        return False
+    reached: dict[int | None, Active] = {one.term.drive: one for one in larger.active}
+    for one in smaller.active:
+        other = reached.get(one.term.drive)
+        if other is None:
+            return False
+        for d in one.term.rows:
+            theirs, mine = other.on(d), one.on(d)
+            if theirs is None or mine is None:
+                return False
+            rest = mine - np.linalg.lstsq(theirs.T, mine.T, rcond=None)[0].T @ theirs
+            if np.sum(rest ** 2) > HELD * np.sum(mine ** 2):
+                return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -189,6 +209,24 @@ class Library:
         white = series.whiten(noise, self._rows[d])
         self._white[d] = [*self._white[d][-1:], (noise, white)]
         return white
+
+    def special_cases(self, candidate: Candidate) -> list[Candidate]:
+        """Return effects without a shape, on the same drives, that the candidate can be as well."""
+        drives = candidate.drives
+        if drives is None:
+            return []
+        by_effect: dict[type[CatalogueEffect], dict[int | None, Term]] = {}
+        for term in (term for terms in self.local.values() for term in terms):
+            if not term.shape and not term.fixed and term.effect is not candidate.effect:
+                by_effect.setdefault(term.effect, {})[term.drive] = term
+        found = []
+        for effect, terms in by_effect.items():
+            for variant in effect.variants if set(drives) <= set(terms) else ():
+                active = tuple(Active(terms[d], variant) for d in drives)
+                one = Candidate(active, 0.0, sum(map(self.penalty, active)) + self.name_penalty)
+                if holds(candidate, one):
+                    found.append(one)
+        return found
 
     def penalty(self, active: Active) -> float:
         """Return the price of one term: its coefficients, shapes, variants and place."""

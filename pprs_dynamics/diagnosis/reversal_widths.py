@@ -21,6 +21,8 @@ from pprs_dynamics.effects.axis_friction import AxisFriction
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples, MeasurementEffect
 from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.model_file import build_model
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
 TRIALS = 13
@@ -33,6 +35,18 @@ KEY, COMMON_KEY = 'friction.reversal_velocities', 'friction.reversal_velocity'
 def place_of(design: Design, d: int) -> tuple[str, int | None]:
     """Return the key and the element under which a model file has the width of a drive."""
     return (KEY, d) if KEY in design.model.keys else (COMMON_KEY, None)
+
+
+def with_widths(model: ForceModel, design: Design, widths: Mapping[int, float]) -> ForceModel:
+    """Return the model with other widths of reversal [m/s] on some of a design's drives."""
+    if not widths:
+        return model
+    values = dict(model.values)
+    for d, width in widths.items():
+        key, element = place_of(design, d)
+        values[key] = width if element is None else tuple(
+            width if k == element else old for k, old in enumerate(values[key]))
+    return replace(build_model(values), source=model.source)
 
 
 def estimate_widths(regression: Regression, fit: JointFit) -> dict[int, float]:
@@ -55,7 +69,7 @@ def _estimate(regression: Regression, fit: JointFit) -> dict[int, float]:
         columns = [(k, row) for k, row in zip(regression.base_index[d], regression.base_rows[d],
                                               strict=True) if design.base[k].kind == 'width'
                    and design.base[k].label.startswith(design.drives[d])]
-        if not columns:
+        if not columns or not design.moves(d):
             continue
         width = float(np.broadcast_to(design.model.reversal.velocity, len(design.drives))[d])
         turning = _turning(regression, fit, d)

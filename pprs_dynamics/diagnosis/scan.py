@@ -18,7 +18,6 @@ from pprs_dynamics.mechanism.robot import Array
 # What the model and the adopted effects have taken already cannot be told apart from them: of
 # its square, at least this share of a column must be its own.
 OWN_SHARE = 1e-7
-HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 DRIVE_MARGIN = 6.0
 # Evaluations of a shape parameter between its neighbours in the grid: of a proposal, and of what
 # is adopted.
@@ -232,25 +231,6 @@ class Scan:
             if gain > best_gain:
                 shape[name], best_gain = trial, gain
         return Active(design.term(effect, d, shape), active.variant)
-
-
-def holds(larger: Candidate, smaller: Candidate) -> bool:
-    """Return whether an effect with more coefficients can be all that another one is."""
-    if sum(one.size for one in larger.active) <= sum(one.size for one in smaller.active):
-        return False
-    reached: dict[int | None, Active] = {one.term.drive: one for one in larger.active}
-    for one in smaller.active:
-        other = reached.get(one.term.drive)
-        if other is None:
-            return False
-        for d in one.term.rows:
-            theirs, mine = other.on(d), one.on(d)
-            if theirs is None or mine is None:
-                return False
-            rest = mine - np.linalg.lstsq(theirs.T, mine.T, rcond=None)[0].T @ theirs
-            if np.sum(rest ** 2) > HELD * np.sum(mine ** 2):
-                return False
-    return True
 
 
 def _best_between(low: float, high: float, gain: Callable[[float], float], evaluations: int,

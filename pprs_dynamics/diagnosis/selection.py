@@ -18,8 +18,8 @@ import numpy as np
 from pprs_dynamics.diagnosis.form import is_form, within_form
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.diagnosis.judging import MARGIN, Judge, Judged
-from pprs_dynamics.diagnosis.library import Candidate
-from pprs_dynamics.diagnosis.scan import Scan, holds
+from pprs_dynamics.diagnosis.library import Candidate, holds
+from pprs_dynamics.diagnosis.scan import Scan
 
 MOST_EFFECTS = 6
 FURTHER_MARGIN = 10.0  # more, for an effect that lives on what others have left
@@ -158,13 +158,17 @@ class Selector:
     def _simplest(self, winner: Judged, judged: Sequence[Judged],
                   selection: Selection) -> Judged:
         """Return an effect that the winner holds, where the rest may be the form of that one."""
-        for one in judged:
-            if one is winner or not holds(winner.candidate, one.candidate):
-                continue
-            active = (*self._actives(selection.adopted), *one.candidate.active)
+        before = self._actives(selection.adopted)
+        special = [self.judge.of(one, selection.fit, before)
+                   for one in self.library.special_cases(winner.candidate)]
+        held = [one for one in judged if one is not winner
+                and holds(winner.candidate, one.candidate)]
+        for one in sorted((*special, *held), key=lambda one: -one.evidence):
             lost = one.fit.deviance - winner.fit.deviance
-            if within_form(lost, one.candidate, active, winner.fit.noises, self.regression) and (
-                    self._stands(one, selection)):
+            better = one.evidence > winner.evidence or within_form(
+                lost, one.candidate, (*before, *one.candidate.active), winner.fit.noises,
+                self.regression)
+            if better and self._stands(one, selection):
                 return one
         return winner
 

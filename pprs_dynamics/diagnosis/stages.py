@@ -4,7 +4,8 @@ Some effects bend all columns: a delay, a shifted zero, a force constant, an off
 mass, a tilt of the base. Their own columns hold only nearby, too, since friction follows loads.
 Where one of these is adopted, the search starts again around a model that has it. And where such an
 effect competes with another one for the first place, both ways are gone to their end and compared
-there.
+there. Where several effects are adopted and reversals turn over in widths far from the model's, the
+search starts again around these widths: what a linear column leaves of them looks like friction.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.form import within_form
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.judging import MARGIN, Judged
-from pprs_dynamics.diagnosis.reversal_widths import estimate_widths
+from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.diagnosis.selection import FAR_SCORE, NEAR_SCORE, Selection, Selector
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
@@ -27,6 +28,8 @@ from pprs_dynamics.model.force_model import ForceModel
 # Effects that change how all others show, or that their columns describe only nearby.
 NOT_LINEAR = frozenset({'time_delay', 'homing_error', 'effort_gain', 'payload_offset',
                         'base_tilt'})
+# Widths of reversal so much larger or smaller than the model's bend the columns of friction, too.
+FAR_WIDTH = 1.5
 COMPETES = 0.5  # of the best evidence, from which on an effect may be the first, too
 # Shares of the work, for the progress bar.
 DESIGN, FIRST, AGAIN = 0.5, 0.5, 0.25
@@ -142,10 +145,21 @@ def find_way(model: ForceModel, recordings: Sequence[Recording], report: Report)
 
 def _followed(first: Stage, recordings: Sequence[Recording], report: Report) -> Way:
     """Return the way from a first stage on."""
-    bent = tuple(one for one in first.selection.adopted if one.candidate.name in NOT_LINEAR)
-    if not bent:
+    adopted = first.selection.adopted
+    bent = tuple(one for one in adopted if one.candidate.name in NOT_LINEAR)
+    widths = _far_widths(first) if adopted else {}
+    if not bent and not (widths and len(adopted) > 1):
         return Way(first, (), first)
-    return Way(first, bent, Stage.of(model_with(first, bent), recordings, report, bent))
+    model = with_widths(model_with(first, bent), first.design, widths)
+    return Way(first, bent, Stage.of(model, recordings, report, bent))
+
+
+def _far_widths(stage: Stage) -> dict[int, float]:
+    """Return widths of reversal that are far from the model's [m/s]."""
+    old = np.broadcast_to(stage.design.model.reversal.velocity, len(stage.design.drives))
+    found = estimate_widths(stage.regression, stage.selection.fit)
+    return {d: width for d, width in found.items()
+            if not 1 / FAR_WIDTH < width / old[d] < FAR_WIDTH}
 
 
 def _contender(first: Stage) -> Judged | None:

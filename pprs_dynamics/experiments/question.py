@@ -9,8 +9,8 @@ from itertools import permutations
 import numpy as np
 
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
-from pprs_dynamics.diagnosis.library import Candidate
-from pprs_dynamics.diagnosis.scan import Scan, holds
+from pprs_dynamics.diagnosis.library import Candidate, holds
+from pprs_dynamics.diagnosis.scan import Scan
 from pprs_dynamics.diagnosis.stages import Stage, find_way
 from pprs_dynamics.experiments.columns import Block, ColumnPlan, plan_for
 from pprs_dynamics.experiments.criteria import (
