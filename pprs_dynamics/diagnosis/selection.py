@@ -160,7 +160,8 @@ class Selector:
         """Return an effect that the winner holds, where the rest may be the form of that one."""
         before = self._actives(selection.adopted)
         special = [self.judge.of(one, selection.fit, before)
-                   for one in self.library.special_cases(winner.candidate)]
+                   for one in self.library.special_cases(winner.candidate)
+                   if one.name not in self.excluded]
         held = [one for one in judged if one is not winner
                 and holds(winner.candidate, one.candidate)]
         for one in sorted((*special, *held), key=lambda one: -one.evidence):
