@@ -27,7 +27,7 @@ from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.paired_errors import block_gains, rms
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.diagnosis.trial import Offer, try_effect
+from pprs_dynamics.diagnosis.trial import Offer, StandingError, try_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.recording import Recording
@@ -152,7 +152,7 @@ def adopt(
     try:
         trial = try_effect(start, offer, recordings,
                            lambda share: report(DIAGNOSIS + (TRIAL - DIAGNOSIS) * share))
-    except ModelError as error:
+    except (ModelError, StandingError) as error:
         return case.without_model(str(error))
     if trial is None:
         return _fit_anew(case, report)

@@ -213,10 +213,8 @@ def _require_motion(design: Design, offer: Offer) -> None:
     asked = offer.drives or design.drives
     standing = [name for name in asked if not design.moves(design.drives.index(name))]
     if standing and (offer.drives or len(standing) == len(asked)):
-        raise StandingError(
-            f'{offer.name} on {", ".join(standing)}: the recordings must show friction where it is '
-            f'to be fitted, but {"this drive" if len(standing) == 1 else "these drives"} hardly '
-            'moved in them')
+        raise StandingError(f'{", ".join(standing)} hardly moved in the recordings, but they must '
+                            'show friction where it is to be fitted')
 
 
 def _is_move(regression: Regression, one: Calibration) -> bool:
