@@ -16,6 +16,7 @@ from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.keys import set_number
 from pprs_dynamics.model.model_file import build_model
 
 DELAY_STEP = 1e-4  # [s]
@@ -213,12 +214,7 @@ def fitted_model(regression: Regression, fit: JointFit, calibrate: bool = True) 
     values: dict[str, Any] = dict(design.model.values)
     if calibrate:
         for one in calibrations(regression, fit):
-            if one.element is None:
-                values[one.key] = one.after
-            else:
-                values[one.key] = tuple(
-                    one.after if k == one.element else old
-                    for k, old in enumerate(values[one.key]))
+            set_number(values, one.key, one.element, one.after)
     _update_present(values, design, fit)
     names = list(values.get('effects.active', []))
     for active, estimates in zip([a for a in fit.active if isinstance(a, Active)],

@@ -19,8 +19,8 @@ from pprs_dynamics.diagnosis.adoption import (
 from pprs_dynamics.diagnosis.cautions import find_cautions
 from pprs_dynamics.diagnosis.form import form_allowance
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, joined, listed
-from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
-from pprs_dynamics.diagnosis.judging import Judged
+from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
+from pprs_dynamics.diagnosis.judging import Judged, actives_of
 from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.paired_errors import rms
 from pprs_dynamics.diagnosis.residuals import Residuals
@@ -216,9 +216,7 @@ def _fit_of_first(stage: Stage, adopted: Sequence[Judged], count: int) -> JointF
     selection = stage.selection
     if count == len(selection.adopted):
         return selection.fit
-    active: tuple[Active, ...] = tuple(
-        a for one in adopted[:count] for a in one.candidate.active)
-    return stage.regression.fit(active, selection.fit.noises, iterations=1)
+    return stage.regression.fit(actives_of(adopted[:count]), selection.fit.noises, iterations=1)
 
 
 def _ranked(one: Judged, drives: tuple[str, ...], regression: Regression) -> RankedEffect:

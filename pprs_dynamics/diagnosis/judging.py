@@ -36,6 +36,11 @@ class Judged:
     evidence: float
 
 
+def actives_of(adopted: Sequence[Judged]) -> tuple[Active, ...]:
+    """Return the terms of several effects, in order."""
+    return tuple(active for one in adopted for active in one.candidate.active)
+
+
 class Judge:
     """Judges effects by the likelihood that they gain.
 
@@ -77,7 +82,7 @@ class Judge:
         else:
             more = self._further_drives(one, active)
             wider = [(*one.candidate.active, *more[:count])
-                     for count in {min(1, len(more)), len(more)} - {0}]
+                     for count in sorted({1, len(more)})] if more else []
         judged = [one]
         for every in wider:
             price = prices + sum(map(self.library.penalty, every))

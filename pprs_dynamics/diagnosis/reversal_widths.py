@@ -22,6 +22,7 @@ from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples, Measur
 from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.keys import set_number
 from pprs_dynamics.model.model_file import build_model
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
@@ -43,9 +44,7 @@ def with_widths(model: ForceModel, design: Design, widths: Mapping[int, float]) 
         return model
     values = dict(model.values)
     for d, width in widths.items():
-        key, element = place_of(design, d)
-        values[key] = width if element is None else tuple(
-            width if k == element else old for k, old in enumerate(values[key]))
+        set_number(values, *place_of(design, d), width)
     return replace(build_model(values), source=model.source)
 
 

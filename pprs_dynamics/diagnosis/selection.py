@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.diagnosis.form import is_form, within_form
-from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
-from pprs_dynamics.diagnosis.judging import MARGIN, Judge, Judged
+from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
+from pprs_dynamics.diagnosis.judging import MARGIN, Judge, Judged, actives_of
 from pprs_dynamics.diagnosis.library import Candidate, holds
 from pprs_dynamics.diagnosis.scan import Scan
 
@@ -91,12 +91,12 @@ class Selector:
             if not selection.adopted:
                 selection.candidates = judged
             self._report((len(selection.adopted) + 1) / (MOST_EFFECTS + 2))
-            winner = next((one for one in judged if self._stands(one, selection)), None)
+            winner = next((one for one in judged if self._stands(one, selection.adopted)), None)
             if winner is None:
                 selection.suspects = [one for one in judged if self._is_suspect(one, selection)]
                 break
             winner = self.judge.polished(self._simplest(winner, judged, selection),
-                                         selection.fit, self._actives(selection.adopted))
+                                         selection.fit, actives_of(selection.adopted))
             _add(selection, winner)
             self._prune(selection)
         self._swap(selection)
@@ -104,15 +104,12 @@ class Selector:
         self._report(1.0)
         return selection
 
-    def _actives(self, adopted: Sequence[Judged]) -> tuple[Active, ...]:
-        return tuple(active for one in adopted for active in one.candidate.active)
-
     def _allowed(self, scan: Scan) -> list[Candidate]:
         return [one for one in scan.candidates() if one.name not in self.excluded]
 
     def _judge_proposals(self, selection: Selection) -> list[Judged]:
         """Return proposals of two scans, each judged, best first."""
-        active = self._actives(selection.adopted)
+        active = actives_of(selection.adopted)
         chosen: dict[tuple[Any, ...], Candidate] = {}
         for noises in (selection.fit.noises, self.rich):
             scan = Scan(self.library, active, noises)
@@ -131,11 +128,11 @@ class Selector:
                  if one.evidence >= most - abs(most) / 2 else one for one in best.values()]
         return sorted(front, key=lambda one: -one.evidence)
 
-    def _stands(self, one: Judged, selection: Selection) -> bool:
-        before_it = [*self.earlier, *selection.adopted]
+    def _stands(self, one: Judged, adopted: Sequence[Judged]) -> bool:
+        before_it = [*self.earlier, *adopted]
         if one.evidence <= (FURTHER_MARGIN if before_it else 0.0):
             return False
-        active = self._actives(selection.adopted)
+        active = actives_of(adopted)
         before = self.regression.block_losses(active, one.fit.noises).losses
         after = self.regression.block_losses(one.fit.active, one.fit.noises).losses
         change = before - after
@@ -152,13 +149,12 @@ class Selector:
 
     def stands_alone(self, one: Judged) -> bool:
         """Return whether an effect stands beside nothing else."""
-        start = self.regression.fit((), self.rich)
-        return self._stands(one, Selection([], start, start))
+        return self._stands(one, ())
 
     def _simplest(self, winner: Judged, judged: Sequence[Judged],
                   selection: Selection) -> Judged:
         """Return an effect that the winner holds, where the rest may be the form of that one."""
-        before = self._actives(selection.adopted)
+        before = actives_of(selection.adopted)
         special = [self.judge.of(one, selection.fit, before)
                    for one in self.library.special_cases(winner.candidate)
                    if one.name not in self.excluded]
@@ -169,7 +165,7 @@ class Selector:
             better = one.evidence > winner.evidence or within_form(
                 lost, one.candidate, (*before, *one.candidate.active), winner.fit.noises,
                 self.regression)
-            if better and self._stands(one, selection):
+            if better and self._stands(one, selection.adopted):
                 return one
         return winner
 
@@ -177,7 +173,7 @@ class Selector:
         """Return whether an effect would stand if the noise were as a rich regression says."""
         if not LEAST_SUSPECT < one.evidence <= 0:
             return False
-        scan = Scan(self.library, self._actives(selection.adopted), self.rich)
+        scan = Scan(self.library, actives_of(selection.adopted), self.rich)
         gain = sum(scan.gain(active) for active in one.candidate.active)
         return gain - one.candidate.penalty - MARGIN > 0
 
@@ -187,7 +183,7 @@ class Selector:
             worst, drop = 0.0, None
             for k, one in enumerate(selection.adopted[:-1]):
                 others = selection.adopted[:k] + selection.adopted[k + 1:]
-                fit = self.regression.fit(self._actives(others), selection.fit.noises)
+                fit = self.regression.fit(actives_of(others), selection.fit.noises)
                 value = fit.deviance - selection.fit.deviance - one.candidate.penalty - MARGIN
                 if value < worst:
                     worst, drop, kept = value, k, fit
@@ -200,7 +196,7 @@ class Selector:
         """Give an adopted effect's place to another that does better beside the rest."""
         for k in range(len(selection.adopted) if len(selection.adopted) > 1 else 0):
             others = selection.adopted[:k] + selection.adopted[k + 1:]
-            active = self._actives(others)
+            active = actives_of(others)
             scan = Scan(self.library, active, selection.fit.noises)
             without = self.regression.fit(active, selection.fit.noises)
             found = [scan.refined(one) for one in self._allowed(scan)[:2]]
@@ -220,7 +216,7 @@ class Selector:
         rivals: dict[str, list[str]] = {}
         for k, one in enumerate(selection.adopted):
             others = selection.adopted[:k] + selection.adopted[k + 1:]
-            active = self._actives(others)
+            active = actives_of(others)
             noises = selection.fit.noises
             scan = Scan(self.library, active, noises)
             found = scan.candidates()

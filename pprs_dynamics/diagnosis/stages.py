@@ -19,7 +19,7 @@ from pprs_dynamics.diagnosis.adoption import fitted_model
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.form import within_form
 from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.judging import MARGIN, Judged
+from pprs_dynamics.diagnosis.judging import MARGIN, Judged, actives_of
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.diagnosis.selection import FAR_SCORE, NEAR_SCORE, Selection, Selector
 from pprs_dynamics.measurement.recording import Recording
@@ -103,7 +103,7 @@ class Way:
     def may_leave(self, squares: float) -> bool:
         """Return whether squares, whitened, may be what the form of an effect leaves here."""
         selection = self.last.selection
-        active = [active for one in selection.adopted for active in one.candidate.active]
+        active = actives_of(selection.adopted)
         return any(within_form(squares, one.candidate, active, selection.fit.noises,
                                self.last.regression) for one in selection.adopted)
 
@@ -206,7 +206,7 @@ def _tell_rivals(better: Way, worse: Way, names: tuple[str, str]) -> None:
 def model_with(stage: Stage, adopted: Sequence[Judged]) -> ForceModel:
     """Return the model with some of what a stage adopted, its own numbers as they were."""
     fit = stage.selection.fit
-    kept = {id(active) for one in adopted for active in one.candidate.active}
+    kept = {id(active) for active in actives_of(adopted)}
     place = len(stage.design.base)
     active, places = [], list(range(place))
     for one in fit.active:

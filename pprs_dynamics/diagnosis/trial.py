@@ -25,6 +25,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.keys import set_number
 from pprs_dynamics.model.model_file import build_model
 
 LEAST_MOVE = 0.02  # of a number's deviation; less is left as the file has it
@@ -230,11 +231,7 @@ def _with_numbers(fitted: ForceModel, start: ForceModel, moved: Sequence[Calibra
     """Return a fitted model in which only some numbers are not as they were at the start."""
     values = {**fitted.values, **{key: start.values[key] for key in start.keys}}
     for one in moved:
-        if one.element is None:
-            values[one.key] = one.after
-        else:
-            values[one.key] = tuple(one.after if k == one.element else old
-                                    for k, old in enumerate(values[one.key]))
+        set_number(values, one.key, one.element, one.after)
     return replace(build_model(values), source=fitted.source)
 
 

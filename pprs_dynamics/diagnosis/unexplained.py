@@ -15,7 +15,7 @@ import numpy as np
 from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.form import form_allowance, friction_allowance
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
-from pprs_dynamics.diagnosis.judging import MARGIN, Judged
+from pprs_dynamics.diagnosis.judging import MARGIN, Judged, actives_of
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.diagnosis.regression import orthonormal
 from pprs_dynamics.diagnosis.selection import Selection, Selector
@@ -74,7 +74,7 @@ def find_unexplained(selector: Selector, selection: Selection, allowed: Array,
         if dropped is None:
             return found
         selection.adopted.remove(dropped)
-        active = tuple(a for one in selection.adopted for a in one.candidate.active)
+        active = actives_of(selection.adopted)
         selection.fit = regression.fit(active, selection.fit.noises)
         selection.rivals.pop(dropped.candidate.name, None)
         found = _search(regression, selection, allowed, found.where,

@@ -174,3 +174,9 @@ NODE_KEYS = frozenset({
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)
+
+
+def set_number(values: dict[str, Any], key: str, element: int | None, number: float) -> None:
+    """Put a number into a model's values, as one element where the key holds several."""
+    values[key] = number if element is None else tuple(
+        number if k == element else old for k, old in enumerate(values[key]))
