@@ -13,8 +13,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.paths import Excitation
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.monitor import MonitorNode
 

@@ -16,7 +16,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.simulated_robot import SimulatedRobotNode
 

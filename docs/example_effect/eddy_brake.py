@@ -16,9 +16,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.mechanism.robot import Array
 
 
 class EddyBrake(DriveEffect):

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis import objections
 from pprs_dynamics.diagnosis.adoption import (
     Calibration,
@@ -31,7 +32,6 @@ from pprs_dynamics.diagnosis.trial import Offer, StandingError, try_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import original_values
 from pprs_dynamics.model.model_file import build_model

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.sensitivities import (
     DRIVE_WIDTHS,
     NUMBERS,
@@ -16,7 +17,6 @@ from pprs_dynamics.diagnosis.sensitivities import (
 )
 from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.mechanism.reversal import smooth_sign
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.axis_model import AxisForces, AxisModel, AxisMotion
 from pprs_dynamics.model.model_file import build_model
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.localisation import MOST_SAMPLES, Localisation, localise
 from pprs_dynamics.diagnosis.noise import (
     effective_samples,
@@ -17,7 +18,6 @@ from pprs_dynamics.diagnosis.noise import (
 )
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import DriveSearch
-from pprs_dynamics.mechanism.robot import Array
 
 # What is left beyond noise is nothing to speak of below this share of the noise itself: the
 # noise is known to about a tenth, and sqrt(1.1^2 - 1) = 0.46.

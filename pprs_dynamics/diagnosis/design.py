@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.axis_sensitivities import AxisSensitivities
 from pprs_dynamics.diagnosis.measuring import join_tables, treated_table
 from pprs_dynamics.diagnosis.platform_sensitivities import PlatformSensitivities
@@ -38,7 +39,6 @@ from pprs_dynamics.effects.time_delay import TimeDelay, shifted
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.axis_model import AxisModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel, Forces

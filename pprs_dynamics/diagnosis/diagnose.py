@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.adoption import (
     Calibration,
     calibrations,
@@ -29,7 +30,6 @@ from pprs_dynamics.diagnosis.stages import Stage, Way, find_way
 from pprs_dynamics.diagnosis.unexplained import Unexplained, allowed_by_model, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 
 

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.library import Candidate
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.mechanism.robot import Array
 
 # A further effect on the same drives has to gain this share of what the first one gained.
 FORM_SHARE = 0.08

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.adoption import Estimate
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.mechanism.robot import Array
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.mechanism.robot import Array
 
 BINS = 12
 TIME_BINS = 16

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import DriveModel
 
 # Stamps to see before their step is known; more than a late first message or two.

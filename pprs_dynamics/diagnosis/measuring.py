@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct, treated_forces
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 
 MOTION = ('position', 'velocity', 'acceleration')

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from scipy import fft
 
-from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.arrays import Array
 
 SINGLE_LAGS = 12
 LONGEST_LAG = 512

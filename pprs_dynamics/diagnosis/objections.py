@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.adoption import Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.paired_errors import certainty
@@ -18,7 +19,6 @@ from pprs_dynamics.effects.axis_friction import AxisFriction
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.passive_friction import PassiveFriction
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 
 SURE = 2.0  # standard deviations

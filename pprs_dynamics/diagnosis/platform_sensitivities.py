@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.sensitivities import (
     DRIVE_WIDTHS,
     HOMING,
@@ -32,7 +33,7 @@ from pprs_dynamics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.mechanism.forward_motion import platform_rates, solve_forward_motion
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.mechanism.state import MechanismState
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.model.model_file import build_robot

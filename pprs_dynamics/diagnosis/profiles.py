@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.hypotheses import BINS, bin_edges
 from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import DriveSearch
-from pprs_dynamics.mechanism.robot import Array
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize_scalar
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.joint_fit import Active
 from pprs_dynamics.diagnosis.library import LEAST_EIGENVALUE, Candidate, Library
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.effects.drive_effect import DriveEffect
-from pprs_dynamics.mechanism.robot import Array
 
 # What the model and the adopted effects have taken already cannot be told apart from them: of
 # its square, at least this share of a column must be its own.

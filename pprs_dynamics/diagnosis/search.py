@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import median_filter
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.hypotheses import LEAST_SHARE, Family, Pattern, build_families
 from pprs_dynamics.diagnosis.noise import COEFFICIENT_PENALTY, NoiseModel, fit_noise
 from pprs_dynamics.diagnosis.regression import (
@@ -27,7 +28,6 @@ from pprs_dynamics.diagnosis.regression import (
     trial_limits,
 )
 from pprs_dynamics.diagnosis.residuals import Residuals, bridged, find_stretches
-from pprs_dynamics.mechanism.robot import Array
 
 # Samples per column below which the rich regression would explain the noise itself.
 SAMPLES_PER_COLUMN = 8

@@ -11,10 +11,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.force_model import ForceModel
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.search import Candidate, DriveSearch
-from pprs_dynamics.mechanism.robot import Array
 
 # How a variable is called, and the unit it is read in: factor from SI, and name.
 UNITS = {

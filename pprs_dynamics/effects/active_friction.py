@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Effect
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 
 Six = tuple[float, float, float, float, float, float]

@@ -9,9 +9,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import CatalogueEffect, names
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.mechanism.robot import AXIS, DRIVES, Array
+from pprs_dynamics.mechanism.robot import AXIS, DRIVES
 from pprs_dynamics.mechanism.state import DriveStates
 
 

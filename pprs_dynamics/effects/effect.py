@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 
 

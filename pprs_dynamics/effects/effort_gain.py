@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.mechanism.robot import Array
 
 
 class EffortGain(MeasurementEffect):

@@ -12,9 +12,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.mechanism.robot import Array
 
 SHORTEST = 8e-4  # [m], pitch tried
 FEWEST = 3  # periods over the stroke; fewer are a spring's curve as well

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Effect
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.mechanism.arithmetic import sqrt
@@ -18,7 +19,6 @@ from pprs_dynamics.mechanism.inverse_kinematics import ChainSample, read_chain
 from pprs_dynamics.mechanism.joint_rates import Turnover, length, relative_rate
 from pprs_dynamics.mechanism.numbers import Chain, chain
 from pprs_dynamics.mechanism.reversal import sign_over_speed
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 from pprs_dynamics.mechanism.vectors import in_base, plus, times
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.effects.passive_friction import (
     Resistances,
@@ -18,7 +19,6 @@ from pprs_dynamics.effects.passive_friction import (
     resistance,
 )
 from pprs_dynamics.effects.structure_effect import PassiveJointEffect
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.effects.passive_friction import (
     Resistances,
@@ -19,7 +20,6 @@ from pprs_dynamics.effects.passive_friction import (
     spherical_speed,
 )
 from pprs_dynamics.effects.structure_effect import PassiveJointEffect
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 
 

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.mechanism.robot import Array
 
 SLOWEST = 1e-3  # [m/s], tried; below it friction turns over, and Stribeck's fall cannot be told
 EXPONENTS = (2.0, 1.0)

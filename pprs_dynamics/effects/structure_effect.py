@@ -6,9 +6,10 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, Self
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.mechanism.rigid_body import StructureLoad
-from pprs_dynamics.mechanism.robot import Array, Robot
+from pprs_dynamics.mechanism.robot import Robot
 from pprs_dynamics.mechanism.state import MechanismState
 
 

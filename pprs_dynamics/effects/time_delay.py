@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveRange, MeasurementEffect
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.mechanism.robot import Array
 
 LONGEST, STEP = 0.03, 0.002  # [s], tried; filters and buses of drives delay by less
 # Where the effort changes fast a delay of twice the true one fits worse than none.

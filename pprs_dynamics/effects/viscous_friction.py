@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.mechanism.robot import Array
 
 
 class ViscousFriction(DriveEffect):

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.mechanism.robot import Array
 
 ROUNDS, ITERATIONS = 2, 2
 TRUST = 0.3  # of the largest parameter, that a round may move each

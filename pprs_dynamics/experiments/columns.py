@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.design import SHAPE_STEP, Design, FullRate
 from pprs_dynamics.diagnosis.joint_fit import Active
 from pprs_dynamics.diagnosis.platform_sensitivities import ChunkSensitivities
@@ -23,7 +24,7 @@ from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.structure_effect import StructureEffect
 from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 
 DELAY_STEP = 1e-4  # [s]

@@ -17,8 +17,8 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.experiments.columns import Block
-from pprs_dynamics.mechanism.robot import Array
 
 WEAK = 1e-9  # prior precision of what is free, relative to what is known of it
 # A direction of less information, per scale, is unknown, and so is what has a share in it.

@@ -23,8 +23,8 @@ from functools import cache
 import numpy as np
 from scipy.linalg import null_space
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array
 
 FREEDOMS = 6  # x, y, z [m]; turns about z, then y, then x [rad]
 CONDITIONS = 3  # on each series, for rest at its ends

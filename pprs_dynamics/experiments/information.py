@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.experiments.columns import Block, ColumnPlan, MotionColumns, RecordedColumns
-from pprs_dynamics.mechanism.robot import Array
 
 LEAST_FREQUENCIES = 1024  # at which a noise model's spectrum is taken, at least
 

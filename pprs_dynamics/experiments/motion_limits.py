@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.passive_friction import IndependentChainsFriction
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.jacobians import condition_number
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 
 

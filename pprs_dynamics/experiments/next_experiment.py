@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.selection import FAR_SCORE
 from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.errors import PprsError
@@ -20,7 +21,7 @@ from pprs_dynamics.experiments.question import Question, block_scales, question_
 from pprs_dynamics.experiments.trajectory_search import Found, TrajectorySearch, forces_of
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 
 PURPOSES = ('separate', 'commission')

@@ -8,6 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.library import Candidate, holds
 from pprs_dynamics.diagnosis.scan import Scan
@@ -23,7 +24,6 @@ from pprs_dynamics.experiments.criteria import (
 )
 from pprs_dynamics.experiments.information import Information, NoiseSpectra, block_index
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import DriveModel
 
 UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least

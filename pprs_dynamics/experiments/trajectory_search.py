@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.experiments.climbing import climb
@@ -25,7 +26,6 @@ from pprs_dynamics.experiments.fourier_path import (
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.experiments.question import Question
 from pprs_dynamics.mechanism.paths import HOME
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 
 HARMONICS = 4  # of each degree of freedom

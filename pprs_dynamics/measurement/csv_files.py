@@ -16,6 +16,7 @@ from typing import TextIO
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.samples import (
     Finding,
@@ -24,7 +25,6 @@ from pprs_dynamics.measurement.samples import (
     counted,
     whole_epoch,
 )
-from pprs_dynamics.mechanism.robot import Array
 
 QUANTITIES = ('position', 'velocity', 'effort')
 # The second is what PlotJuggler writes.

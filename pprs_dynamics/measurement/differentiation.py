@@ -53,7 +53,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import oaconvolve
 
-from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.arrays import Array
 
 ORDER = 7
 SHORTEST_WINDOW = 2 * ORDER + 3  # samples; shorter ones hardly smooth

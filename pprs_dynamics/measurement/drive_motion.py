@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.differentiation import (
     SHORTEST_WINDOW,
@@ -20,7 +21,6 @@ from pprs_dynamics.measurement.differentiation import (
 )
 from pprs_dynamics.measurement.sampling_grid import SamplingGrid, find_grid
 from pprs_dynamics.measurement.treatment import block_length
-from pprs_dynamics.mechanism.robot import Array
 
 # Where fewer blocks than this share of the measured samples' have an effort in every sample,
 # efforts come less often than positions, and blocks are single samples.

@@ -7,12 +7,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ConvergenceError
 from pprs_dynamics.measurement.drive_motion import DriveMotion
 from pprs_dynamics.measurement.samples import Progress
 from pprs_dynamics.mechanism.forward_motion import find_jumps, solve_forward_motion
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import AXIS, DRIVES, Array, Geometry
+from pprs_dynamics.mechanism.robot import AXIS, DRIVES, Geometry
 from pprs_dynamics.model.axis_model import AxisModel, AxisMotion
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel

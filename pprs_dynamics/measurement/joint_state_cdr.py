@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices, Mask
-from pprs_dynamics.mechanism.robot import Array
 
 # Encapsulation: plain CDR, version 1, little endian; the two bytes after it are options.
 LITTLE_ENDIAN = b'\x00\x01'

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.stamps import LOST_STEPS
-from pprs_dynamics.mechanism.robot import Array
 
 
 class LiveSample(NamedTuple):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.joint_state_cdr import Layout
 from pprs_dynamics.measurement.samples import Indices
-from pprs_dynamics.mechanism.robot import Array
 
 # Of a topic whose messages differ in more ways than this, the others are read one by one.
 MOST_LAYOUTS = 16

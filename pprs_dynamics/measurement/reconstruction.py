@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.differentiation import Smoothing
 from pprs_dynamics.measurement.drive_motion import Measured, smooth_drives
 from pprs_dynamics.measurement.followed_motion import CHUNK, Motion, kinematics_of
 from pprs_dynamics.measurement.samples import Progress
 from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.robot import Geometry
 from pprs_dynamics.model.force_model import ForceModel
 
 

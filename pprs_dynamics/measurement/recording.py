@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.bag_files import read_bag, storage_suffix, write_bag
 from pprs_dynamics.measurement.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.defects import Judgement
 from pprs_dynamics.measurement.samples import Finding, Progress, Samples, counted
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 
 
 @dataclass(frozen=True)

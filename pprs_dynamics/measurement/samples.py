@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.arrays import Array
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]

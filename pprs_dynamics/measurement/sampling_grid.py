@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.differentiation import (
     SHORTEST_WINDOW,
     Stretch,
@@ -22,7 +23,6 @@ from pprs_dynamics.measurement.differentiation import (
     representative,
 )
 from pprs_dynamics.measurement.stamps import gaps
-from pprs_dynamics.mechanism.robot import Array
 
 # Jitter whose error in positions stays below this part of their noise is not looked at.
 HARMLESS_JITTER = 0.3

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices, Mask, Samples
 from pprs_dynamics.measurement.stamps import stretches
-from pprs_dynamics.mechanism.robot import Array
 
 # A step of position this many times faster than 99 % of all, and than its own surroundings, is
 # no motion: real motion gains speed over several samples.

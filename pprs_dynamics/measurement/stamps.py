@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices, Mask
-from pprs_dynamics.mechanism.robot import Array
 
 # A stamp that goes back is late if the clock is ahead again within this many samples and it is
 # late by less than this [s]; otherwise the clock was set back. Sorting the latter would mix two

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.arrays import Array
 
 BLOCK_DURATION = 0.01  # [s]
 

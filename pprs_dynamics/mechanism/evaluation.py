@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.mechanism.robot import Array
+from pprs_dynamics.arrays import Array
 
 Kernel = Callable[..., Any]
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError
 from pprs_dynamics.mechanism.arithmetic import everywhere, larger, sqrt
 from pprs_dynamics.mechanism.closure import Six, closure_rows, eliminate, solve_closure
@@ -22,7 +23,7 @@ from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import chain_arm, solve_inverse_kinematics
 from pprs_dynamics.mechanism.motion import PlatformMotion, checked_matrix
 from pprs_dynamics.mechanism.numbers import Chain, Lengths, chain, lengths
-from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.robot import Geometry
 from pprs_dynamics.mechanism.sample import Rotation, rotation, vector
 from pprs_dynamics.mechanism.vectors import ChainVector, Vector, add, dot, in_chain, plus, times
 

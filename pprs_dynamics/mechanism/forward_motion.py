@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.mechanism.closure import Twist, answer, read_inverse
 from pprs_dynamics.mechanism.evaluation import evaluate
@@ -26,7 +27,7 @@ from pprs_dynamics.mechanism.inverse_kinematics import ChainSample, chain_table,
 from pprs_dynamics.mechanism.jacobians import inverse_table
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.numbers import Chain, chain
-from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.robot import Geometry
 from pprs_dynamics.mechanism.vectors import add, cross, in_chain
 
 # Marks that seed the samples between them are at most this much travel of any drive apart [m]:

@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.mechanism.arithmetic import sqrt
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.numbers import Chain, Lengths, chain, lengths
-from pprs_dynamics.mechanism.robot import Array, Geometry
+from pprs_dynamics.mechanism.robot import Geometry
 from pprs_dynamics.mechanism.sample import MotionSample, Rotation, motion_sample, turned
 from pprs_dynamics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
 

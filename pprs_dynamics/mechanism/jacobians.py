@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.mechanism.closure import (
     INVERSE_COLUMNS,
@@ -22,7 +23,7 @@ from pprs_dynamics.mechanism.closure import (
 )
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics
-from pprs_dynamics.mechanism.robot import Array, ChainFrames, Geometry
+from pprs_dynamics.mechanism.robot import ChainFrames, Geometry
 from pprs_dynamics.mechanism.vectors import ChainVector
 
 

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.arithmetic import sqrt
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import read_chain
 from pprs_dynamics.mechanism.reversal import sign_over_speed
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.vectors import ChainVector
 
 

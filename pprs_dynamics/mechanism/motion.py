@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.mechanism.arithmetic import sqrt
 from pprs_dynamics.mechanism.evaluation import evaluate_if_ready
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.sample import rotation
 
 # A quaternion printed with three decimals is still accepted; a Euler triple with a 0 is not.

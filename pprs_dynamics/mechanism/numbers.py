@@ -9,7 +9,8 @@ import numpy as np
 from pprs_dynamics.mechanism.vectors import Vector
 
 if TYPE_CHECKING:
-    from pprs_dynamics.mechanism.robot import Array, Geometry, Robot
+    from pprs_dynamics.arrays import Array
+    from pprs_dynamics.mechanism.robot import Geometry, Robot
 
 CHAINS = 3
 GEOMETRY = 0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array
 
 KNOTS_PER_PERIOD = 400
 HOME = (0.0, 0.0, 0.5)  # [m]; the unturned platform in the middle of its workspace

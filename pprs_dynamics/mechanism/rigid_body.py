@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.arithmetic import sqrt
 from pprs_dynamics.mechanism.closure import Inverse, Wrench, power, read_inverse, unit_wrench
 from pprs_dynamics.mechanism.evaluation import evaluate
@@ -34,7 +35,7 @@ from pprs_dynamics.mechanism.numbers import (
     gravity,
     platform,
 )
-from pprs_dynamics.mechanism.robot import Array, Robot
+from pprs_dynamics.mechanism.robot import Robot
 from pprs_dynamics.mechanism.sample import (
     MotionSample,
     motion_sample,

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.numbers import geometry_numbers, robot_numbers
 from pprs_dynamics.mechanism.vectors import (  # noqa: F401 - vectors for all
@@ -19,8 +19,6 @@ from pprs_dynamics.mechanism.vectors import (  # noqa: F401 - vectors for all
     in_base,
     in_chain,
 )
-
-Array = NDArray[np.float64]
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 AXIS = 'axis'  # the drive of a single axis

@@ -9,13 +9,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics, chain_table
 from pprs_dynamics.mechanism.jacobians import Jacobians, inverse_table
 from pprs_dynamics.mechanism.joint_rates import turnover_table
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.rigid_body import RigidBody, StructureLoad, solve_bodies
-from pprs_dynamics.mechanism.robot import DRIVES, Array, Geometry, Robot
+from pprs_dynamics.mechanism.robot import DRIVES, Geometry, Robot
 
 
 class DriveStates(Protocol):

@@ -12,13 +12,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.load_friction import LoadFriction
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.mechanism.robot import AXIS, Array
+from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
 from pprs_dynamics.model.keys import AXIS_KEYS
 

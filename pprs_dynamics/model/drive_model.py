@@ -9,13 +9,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.effects.passive_friction import PassiveFriction, WholeMechanismFriction
 from pprs_dynamics.effects.structure_effect import BodyEffect
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES, Array, Robot
+from pprs_dynamics.mechanism.robot import DRIVES, Robot
 from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
 from pprs_dynamics.model.keys import KEYS

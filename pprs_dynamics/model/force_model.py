@@ -14,10 +14,10 @@ from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.mechanism.reversal import Reversal
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import DriveStates
 from pprs_dynamics.model.keys import Key
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, WorkspaceError
 from pprs_dynamics.mechanism.evaluation import evaluate
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 
 COUNT = len(DRIVES)
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.passive_friction import IndependentChainsFriction
 from pprs_dynamics.mechanism.jacobians import condition_number
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.mechanism.state import MechanismState
 from pprs_dynamics.model.drive_model import DriveModel
 

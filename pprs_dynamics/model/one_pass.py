@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.effects.passive_friction import (
     Joints,
@@ -37,7 +38,7 @@ from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.numbers import ROBOT_NUMBERS, Chain, chain, lengths
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.rigid_body import ChainForces, body_forces
-from pprs_dynamics.mechanism.robot import Array, Robot
+from pprs_dynamics.mechanism.robot import Robot
 from pprs_dynamics.mechanism.sample import motion_sample
 from pprs_dynamics.mechanism.state import Kinematics, MechanismState
 from pprs_dynamics.mechanism.vectors import Vector

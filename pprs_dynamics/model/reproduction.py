@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.passive_friction import (
     IndependentChainsFriction,
@@ -18,7 +19,6 @@ from pprs_dynamics.effects.passive_friction import (
     WholeMechanismFriction,
 )
 from pprs_dynamics.mechanism.paths import HelicalPath
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.mechanism.state import MechanismState
 from pprs_dynamics.model.drive_model import DriveModel
 

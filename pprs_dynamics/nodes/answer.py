@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.pose_spline import load_splines
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import RIGID_BODY, DriveForces, DriveModel
 from pprs_dynamics.model.limits import Limits
 from pprs_dynamics.nodes.conversions import NANOSECONDS

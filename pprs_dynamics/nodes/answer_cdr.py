@@ -6,8 +6,9 @@ import struct
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces
 from pprs_dynamics.nodes.conversions import BASE_FRAMES, LATEST_SECOND, NANOSECONDS
 from pprs_dynamics.nodes.trajectory_cdr import LITTLE_ENDIAN, STAMP, WORD

@@ -11,8 +11,9 @@ from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.nodes.rejection import Rejection
 
 PLATFORM = 'platform'

@@ -11,8 +11,8 @@ import struct
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices
-from pprs_dynamics.mechanism.robot import Array
 
 # Encapsulation: plain CDR, version 1, little endian, without options.
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices, Mask
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.nodes.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
 from pprs_dynamics.nodes.rejection import Rejection
 from pprs_dynamics.nodes.trajectory_cdr import read_points

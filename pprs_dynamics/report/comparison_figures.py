@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.diagnosis.profiles import error_profile, error_spectrum
 from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.report.page import plotly_objects
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'

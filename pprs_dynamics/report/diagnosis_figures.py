@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import ErrorStep
 from pprs_dynamics.diagnosis.found_effects import FoundEffect
@@ -18,7 +19,6 @@ from pprs_dynamics.diagnosis.partial import (
 from pprs_dynamics.diagnosis.profiles import error_spectrum
 from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.wording import UNITS, WORDS, Statement
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.report.comparison_figures import ERROR, LINES, MEASURED, MODEL, curve
 from pprs_dynamics.report.page import plotly_objects
 

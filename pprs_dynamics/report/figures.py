@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError
-from pprs_dynamics.mechanism.robot import DRIVES, Array
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.reproduction import Reproduction
 
 # Colours that stay apart in grey print and for colour-blind readers (Okabe and Ito).

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.inverse_kinematics import JointPositions, joint_positions
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import Array
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.report.page import plotly_objects
 

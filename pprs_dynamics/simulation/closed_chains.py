@@ -27,8 +27,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
-from pprs_dynamics.simulation.engine_model import Array, describe_trees, load_engine
+from pprs_dynamics.simulation.engine_model import describe_trees, load_engine
 
 # Order of MuJoCo's joint velocities: slide, lift, hinge of each chain, then v and the platform's
 # angular velocity in `platform`.

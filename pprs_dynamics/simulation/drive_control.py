@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.simulation.closed_chains import ClosedChains
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import DRIVES
 
 

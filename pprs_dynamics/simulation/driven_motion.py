@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.simulation.closed_chains import DOFS, DRIVE_DOFS, ClosedChains
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import PlatformMoment
 
 

@@ -6,12 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pprs_dynamics.errors import MissingLibraryError
-
-Array = NDArray[np.float64]
 
 
 def load_engine() -> Any:

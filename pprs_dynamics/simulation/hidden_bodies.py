@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import DRIVE_DOFS, ClosedChains
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import BodyChange, DriveBound, Range
 
 PICK_UP_TIME = 0.2  # [s], in which the weight of a payload goes over to the platform

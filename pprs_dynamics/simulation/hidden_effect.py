@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.simulation.engine_model import Array
 
 if TYPE_CHECKING:
     from pprs_dynamics.simulation.closed_chains import ClosedChains

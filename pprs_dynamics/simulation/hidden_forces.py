@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.hidden_effect import (
     DRIVES,
     DriveForce,

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.arrays import Array
 
 # Speeds are taken as at least this share of the width: tanh(s)/s is 1 there to rounding.
 SMALLEST_SHARE = 1e-6

@@ -33,12 +33,12 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dposv
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import (
     DRIVE_DOFS,
     ClosedChains,
     Equations,
 )
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveMoment,

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import (
     DOFS,
     DRIVE_DOFS,
@@ -29,7 +30,6 @@ from pprs_dynamics.simulation.closed_chains import (
     ClosedChains,
 )
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveForce,

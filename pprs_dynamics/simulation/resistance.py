@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg.lapack import dposv
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import Equations
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import (
     DriveForce,
     DriveMoment,

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings

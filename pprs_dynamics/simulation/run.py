@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note, Setpoint
-from pprs_dynamics.simulation.engine_model import Array
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.plant import PlantSettings, Truth
 from pprs_dynamics.simulation.robot import SimulatedRobot

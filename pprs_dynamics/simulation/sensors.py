@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pprs_dynamics.simulation.engine_model import Array
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect, SensorEffect
 
 # Correlation times of the slow processes that add up to 1/f noise [samples], a factor 4 apart:
