@@ -30,7 +30,7 @@ from hidden_recordings import LEAD, Case, Scene, noise_settings
 from hidden_strength import Whitening
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.measurement.reconstruction import reconstruct
 from pprs_dynamics.measurement.recording import Recording, write_recording

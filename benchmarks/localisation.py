@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.localisation import localise
-from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
 

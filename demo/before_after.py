@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.report.figures import BLUE, GREY, RED, pyplot_module, save
 
 SHOWN = 5.0  # [s] of the drive in detail

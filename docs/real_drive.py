@@ -20,7 +20,7 @@ from pprs_dynamics import AxisModel, AxisMotion, PprsError
 from pprs_dynamics.diagnosis.adopt import Adoption, adopt
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.diagnosis.loop import Walk, adopt_all
-from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.diagnosis.trial import Offer
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel

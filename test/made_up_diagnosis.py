@@ -11,7 +11,7 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.adoption import Calibration, Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect
-from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.mechanism.robot import DRIVES

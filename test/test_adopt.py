@@ -26,7 +26,7 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.diagnosis import loop, objections
 from pprs_dynamics.diagnosis.adopt import Adoption, adopt
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.diagnosis.trial import Offer
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording, write_recording

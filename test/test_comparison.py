@@ -19,7 +19,7 @@ from pprs_dynamics.diagnosis.noise import (
     unrepeated,
 )
 from pprs_dynamics.diagnosis.profiles import error_profile, error_spectrum
-from pprs_dynamics.diagnosis.residuals import Residuals, ResidualsError
+from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
 
 PERIOD = 0.01
 NOWHERE = Localisation((), {}, np.inf)

@@ -7,13 +7,13 @@ import pytest
 from hidden_recordings import Case, make_case
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.regression.design import Design
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.diagnosis.form import form_allowance, squared_size, within_form
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.judging import Judge, Judged
 from pprs_dynamics.diagnosis.library import Candidate, Library
-from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.simulation.sensors import EffortNoise
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics.diagnosis.localisation import localise
-from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals
 
 FILE = Path(__file__).parents[1] / 'benchmarks' / 'localisation.py'
 FIRST_SEED = 40_000  # none of the benchmark's

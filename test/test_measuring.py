@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.diagnosis.measuring import measure_residuals
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.reconstruction import reconstruct
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.paths import Excitation

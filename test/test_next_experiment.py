@@ -12,7 +12,7 @@ import pytest
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.diagnosis.design import Design
+from pprs_dynamics.regression.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
 from pprs_dynamics.diagnosis.stages import Stage

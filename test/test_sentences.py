@@ -23,7 +23,7 @@ from rich.console import Console
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
 from pprs_dynamics.diagnosis.found_effects import joined
-from pprs_dynamics.diagnosis.hypotheses import OWN, PLATFORM
+from pprs_dynamics.selection.patterns import OWN, PLATFORM
 from pprs_dynamics.diagnosis.partial import partial_residual, remaining_profile
 from pprs_dynamics.diagnosis.quantities import name_drives, with_uncertainty
 from pprs_dynamics.diagnosis.sentences import word_diagnosis

@@ -12,7 +12,7 @@ import pytest
 from ros_processes import environment, executable
 
 from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
-from pprs_dynamics.diagnosis.design import Design, sensitivities_of
+from pprs_dynamics.regression.design import Design, sensitivities_of
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.trial import Offer, OfferError
 from pprs_dynamics.errors import ModelError, MotionError

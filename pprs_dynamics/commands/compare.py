@@ -10,11 +10,11 @@ from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_all
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import localise
-from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.comparison_page import comparison_page
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.tables import comparison_table, console
+from pprs_dynamics.residuals.measuring import measure_residuals
 
 MOST_SHOWN = 8
 

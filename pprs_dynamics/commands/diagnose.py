@@ -17,7 +17,6 @@ from pprs_dynamics.commands.recordings import (
     show_findings,
 )
 from pprs_dynamics.diagnosis.diagnose import diagnose
-from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.model_file import load_model
@@ -25,6 +24,7 @@ from pprs_dynamics.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.report.diagnosis_tables import diagnosis_view
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.tables import console
+from pprs_dynamics.residuals.measuring import measure_residuals
 
 
 class OptionsError(PprsError, ValueError):

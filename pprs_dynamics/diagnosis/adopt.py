@@ -20,14 +20,11 @@ from pprs_dynamics.diagnosis.adoption import (
     estimate_present,
     fitted_model,
 )
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
 from pprs_dynamics.diagnosis.judging import MARGIN
-from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.paired_errors import block_gains, rms
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.trial import Offer, StandingError, try_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.errors import ModelError
@@ -35,6 +32,9 @@ from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import original_values
 from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.residuals.residuals import Residuals
 
 BLOCKS, VALIDATION = 'blocks', 'validation'
 # Shares of the work, for the progress bar.

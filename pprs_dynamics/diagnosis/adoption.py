@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.design import SHAPE_STEP, BaseColumn, Design
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, JointFit, Regression
 from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, place_of
 from pprs_dynamics.effects.drive_effect import DriveEffect
@@ -18,6 +17,7 @@ from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.keys import set_number
 from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.regression.design import SHAPE_STEP, BaseColumn, Design
 
 DELAY_STEP = 1e-4  # [s]
 DIGITS = 6  # significant, of fitted values

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import effective_samples
 from pprs_dynamics.diagnosis.scan import Scan
 from pprs_dynamics.diagnosis.selection import Selection, Selector
+from pprs_dynamics.regression.design import Design
 
 if TYPE_CHECKING:
     from pprs_dynamics.diagnosis.found_effects import FoundEffect

@@ -16,8 +16,8 @@ from pprs_dynamics.diagnosis.noise import (
     fit_noise,
     unrepeated,
 )
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.residuals.residuals import Residuals
 
 # What is left beyond noise is nothing to speak of below this share of the noise itself: the
 # noise is known to about a tenth, and sqrt(1.1^2 - 1) = 0.46.

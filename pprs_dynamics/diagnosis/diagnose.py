@@ -22,15 +22,15 @@ from pprs_dynamics.diagnosis.form import form_allowance
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, joined, listed
 from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
 from pprs_dynamics.diagnosis.judging import Judged, actives_of
-from pprs_dynamics.diagnosis.measuring import measure_residuals
 from pprs_dynamics.diagnosis.paired_errors import rms
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.selection import Selector
 from pprs_dynamics.diagnosis.stages import Stage, Way, find_way
 from pprs_dynamics.diagnosis.unexplained import Unexplained, allowed_by_model, find_unexplained
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.residuals.residuals import Residuals
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals
 
 # The model's own numbers that move without changing the error by this share are no step.
 LEAST_STEP = 1e-3

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.design import Design, Term
 from pprs_dynamics.diagnosis.noise import COEFFICIENT_PENALTY, NoiseModel
 from pprs_dynamics.diagnosis.regression import slow_noise
 from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.regression.design import Design, Term
 
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 FIT_ITERATIONS = 2

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.design import Term
 from pprs_dynamics.diagnosis.joint_fit import Active, Regression
 from pprs_dynamics.diagnosis.noise import NoiseModel
 from pprs_dynamics.diagnosis.parallel import each
@@ -15,6 +14,7 @@ from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.homing_error import HomingError
+from pprs_dynamics.regression.design import Term
 
 # Of its square, at least this share of a column must be its own, in single precision.
 SCANNED_SHARE = 1e-5

@@ -16,12 +16,12 @@ import numpy as np
 from scipy.stats import norm, rankdata
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.hypotheses import Pattern
 from pprs_dynamics.diagnosis.noise import NoiseModel, effective_samples
 from pprs_dynamics.diagnosis.parallel import each
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import FINE, Candidate, DriveSearch
 from pprs_dynamics.diagnosis.wording import Statement, word_statement
+from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.selection.patterns import Pattern
 
 FALSE_ALARMS = 0.005
 DRAWS = 64

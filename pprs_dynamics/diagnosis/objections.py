@@ -10,7 +10,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.adoption import Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.paired_errors import certainty
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.scan import OWN_SHARE
 from pprs_dynamics.diagnosis.selection import FIRST_ERRORS, FURTHER_ERRORS
 from pprs_dynamics.diagnosis.trial import Offer, Trial
@@ -20,6 +19,7 @@ from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.passive_friction import PassiveFriction
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.residuals.residuals import Residuals
 
 SURE = 2.0  # standard deviations
 MOVING = 5.0  # widths in which friction turns over

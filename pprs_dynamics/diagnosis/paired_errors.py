@@ -9,8 +9,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.joint_fit import BLOCKS, LEAST_SAMPLES
 from pprs_dynamics.diagnosis.noise import NoiseModel
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.residuals.residuals import Residuals
 
 SAME_PERIOD = 0.05  # relative, for noise of one recording to be that of another
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.hypotheses import BINS, bin_edges
 from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.selection.patterns import BINS, bin_edges
 
 
 @dataclass(frozen=True)

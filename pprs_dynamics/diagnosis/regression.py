@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.hypotheses import Family
 from pprs_dynamics.diagnosis.noise import NoiseModel
+from pprs_dynamics.selection.patterns import Family
 
 # Periods of the lowest frequency at which a record tells how strong its noise is.
 GUARD_PERIODS = 8

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Active, JointFit, Regression
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.axis_friction import AxisFriction
@@ -24,6 +23,7 @@ from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.keys import set_number
 from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.regression.design import Design
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
 TRIALS = 13

@@ -17,7 +17,6 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.hypotheses import LEAST_SHARE, Family, Pattern, build_families
 from pprs_dynamics.diagnosis.noise import COEFFICIENT_PENALTY, NoiseModel, fit_noise
 from pprs_dynamics.diagnosis.regression import (
     one_degree,
@@ -27,7 +26,8 @@ from pprs_dynamics.diagnosis.regression import (
     solve,
     trial_limits,
 )
-from pprs_dynamics.diagnosis.residuals import Residuals, bridged, find_stretches
+from pprs_dynamics.residuals.residuals import Residuals, bridged, find_stretches
+from pprs_dynamics.selection.patterns import LEAST_SHARE, Family, Pattern, build_families
 
 # Samples per column below which the rich regression would explain the noise itself.
 SAMPLES_PER_COLUMN = 8

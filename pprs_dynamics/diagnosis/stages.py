@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.diagnosis.adoption import fitted_model
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.form import within_form
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.judging import MARGIN, Judged, actives_of
@@ -24,6 +23,7 @@ from pprs_dynamics.diagnosis.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.diagnosis.selection import FAR_SCORE, NEAR_SCORE, Selection, Selector
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.regression.design import Design
 
 # Effects that change how all others show, or that their columns describe only nearby.
 NOT_LINEAR = frozenset({'time_delay', 'homing_error', 'effort_gain', 'payload_offset',

@@ -10,7 +10,6 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.adoption import Calibration, Estimate, calibrations, estimate_all
 from pprs_dynamics.diagnosis.adoption import fitted_model as model_of
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
 from pprs_dynamics.diagnosis.judging import Judged
 from pprs_dynamics.diagnosis.library import Candidate
@@ -27,6 +26,7 @@ from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.keys import set_number
 from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.regression.design import Design
 
 LEAST_MOVE = 0.02  # of a number's deviation; less is left as the file has it
 

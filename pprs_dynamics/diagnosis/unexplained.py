@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.form import form_allowance, friction_allowance
 from pprs_dynamics.diagnosis.joint_fit import Active, Columns, Regression
 from pprs_dynamics.diagnosis.judging import MARGIN, Judged, actives_of
@@ -22,6 +21,7 @@ from pprs_dynamics.diagnosis.regression import orthonormal
 from pprs_dynamics.diagnosis.selection import Selection, Selector
 from pprs_dynamics.diagnosis.wording import Statement
 from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.regression.design import Design
 
 # A free curve explains this much more than an effect: then it is not that effect.
 BETTER = 1.3

@@ -23,7 +23,7 @@ class AsymmetricFriction(DriveEffect):
     """Friction that differs by direction: wipers, worm and screw drives, check valves."""
 
     name: ClassVar[str] = 'asymmetric_friction'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (
         Parameter('force_forward', 'F_f', 'N', 'dry friction forwards', -1e6, 1e6, 0.0, 0.5),
         Parameter('force_backward', 'F_b', 'N', 'dry friction backwards', -1e6, 1e6, 0.0, 0.5),

@@ -14,7 +14,7 @@ class CoulombFriction(DriveEffect):
     """Force of constant size against the motion: seals, preloaded nuts and bearings."""
 
     name: ClassVar[str] = 'coulomb_friction'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F', 'N', 'size of the friction force', -1e6, 1e6, scale=0.5),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
     card = Card(

@@ -102,11 +102,22 @@ class DriveEffect(CatalogueEffect):
         """Return a fresh memory of one drive, or None for an effect without one."""
         return None
 
-    def initial_memory(self) -> Any:
+    @classmethod
+    def begin(cls, memory: Any, time: float) -> None:
+        """Tell a fresh memory of one drive when the recording began [s]; by default nothing.
+
+        The first samples that are evaluated may be later, since derivatives need a window.
+        """
+
+    def initial_memory(self, start: float | None = None) -> Any:
         """Return a fresh memory per drive, or None for an effect without one."""
         if self.drive_memory() is None:
             return None
-        return {drive: self.drive_memory() for drive in self.drives}
+        memory = {drive: self.drive_memory() for drive in self.drives}
+        if start is not None:
+            for of_drive in memory.values():
+                self.begin(of_drive, start)
+        return memory
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""
@@ -148,6 +159,33 @@ class MeasurementEffect(DriveEffect):
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return no force: the drive does not feel its sensors."""
         return tuple(np.zeros_like(drive.velocity) for _ in cls.coefficients)
+
+    @classmethod
+    def sensor_columns(cls, effort: Array, time: Array | None, **shape: float,
+                       ) -> tuple[Array, ...]:
+        """Return what the sensor adds to an effort per coefficient, (N,) each.
+
+        An effect without coefficients gives one column: what its shape says.
+
+        Parameters
+        ----------
+        effort : (N,) array
+            Of one drive, as the sensor would see it without the effect [N].
+        time : (N,) array or None
+            [s]
+        """
+        columns = []
+        for unit in cls.coefficients or (None,):
+            given = {c.name: float(c is unit) for c in cls.coefficients}
+            effect = cls({AXIS: {**cls.from_coefficients(given), **shape}})
+            columns.append(effect.sensed(effort[:, None], time, (AXIS,))[:, 0] - effort)
+        return tuple(columns)
+
+    @classmethod
+    def shifts_positions(cls) -> bool:
+        """Return whether measured positions are not the true ones: all drives feel that."""
+        unit = cls({AXIS: {p.name: p.scale for p in cls.parameters}})
+        return bool(np.any(unit.position_error((AXIS,))))
 
     def position_error(self, drives: Sequence[str]) -> Array:
         """Return what must be taken off measured positions [m], (D,)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ class Parameter:
         Value where a model file is silent; required in the file without one.
     scale : float
         A size at which it matters, for numerical derivatives.
+    is_angle : bool
+        True for a phase: its size says nothing about how strong the effect is.
     """
 
     name: str
@@ -35,6 +38,24 @@ class Parameter:
     upper: float
     default: float | None = None
     scale: float = 1.0
+    is_angle: bool = False
+
+    @property
+    def is_relative(self) -> bool:
+        """True where it is positive by nature, so that it is moved by factors."""
+        return self.lower > 0
+
+    def moved(self, value: float, amount: float) -> float:
+        """Return the value after an amount of movement: a logarithm, or a multiple of `scale`."""
+        return value * math.exp(amount) if self.is_relative else value + self.scale * amount
+
+    def amount(self, spread: float, value: float) -> float:
+        """Return a small difference from a value [unit] as an amount of movement."""
+        return spread / (abs(value) if self.is_relative else self.scale)
+
+    def spread(self, amount: float, value: float) -> float:
+        """Return an amount of movement as a difference from a value [unit]."""
+        return amount * (abs(value) if self.is_relative else self.scale)
 
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
@@ -76,8 +97,14 @@ class Effect(ABC):
             What `initial_memory` returned, advanced in place to the last sample.
         """
 
-    def initial_memory(self) -> Any:
-        """Return a fresh memory, or None for an effect without one."""
+    def initial_memory(self, start: float | None = None) -> Any:
+        """Return a fresh memory, or None for an effect without one.
+
+        Parameters
+        ----------
+        start : float, optional
+            When the recording began [s]; else the first sample counts as the start.
+        """
         return None
 
     def check_memory(self, memories: Mapping[str, Any]) -> None:
@@ -133,9 +160,13 @@ class CatalogueEffect(Effect):
         Parameters that make the force unphysical below that value (negative friction).
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
-    needs_motion : bool
-        True for friction: of a drive that stands it tells nothing, and any constant force looks
-        like it.
+    is_friction : bool
+        True for friction: of a drive that stands it tells nothing, any constant force looks like
+        it, and it may not give power back.
+    bends_columns : bool
+        True where the effect changes how others show, or holds in its linear form nearby only: a
+        delay, a shifted zero, gravity that turns. Sets of effects with and without it are then
+        compared around models of their own.
     idealised : bool
         False where the form is exact: inertia, gravity, geometry, a factor. Real friction,
         springs and cords are only nearly of the form that they have here.
@@ -150,7 +181,8 @@ class CatalogueEffect(Effect):
     scanned: ClassVar[tuple[str, ...]]
     unphysical_below: ClassVar[Mapping[str, float]] = {}
     may_be_measurement: ClassVar[bool] = False
-    needs_motion: ClassVar[bool] = False
+    is_friction: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = False
     idealised: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:

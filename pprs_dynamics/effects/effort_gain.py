@@ -21,6 +21,7 @@ class EffortGain(MeasurementEffect):
 
     name: ClassVar[str] = 'effort_gain'
     idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
     linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -0.9, 9.0,
                         scale=0.05),)
     card = Card(

@@ -24,6 +24,7 @@ class ExternalWrench(BodyEffect):
     """The wrench that the drives apply to the world at o: pulled down, force_z is positive."""
 
     name: ClassVar[str] = 'external_wrench'
+    bends_columns: ClassVar[bool] = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',
                     -1e6, 1e6, scale=1.0) for name in FORCES),

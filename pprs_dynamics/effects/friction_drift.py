@@ -16,7 +16,7 @@ class FrictionDrift(DriveEffect):
     """Friction that changes while the robot works: cold grease, seals that warm up."""
 
     name: ClassVar[str] = 'friction_drift'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F', 'N', 'friction at the start beyond the later one', -1e6, 1e6,
                         scale=0.5),)
     shape = (Parameter('time', 'tau', 's', 'time in which it fades', 1e-3, 1e7, scale=10.0),)
@@ -51,5 +51,10 @@ class FrictionDrift(DriveEffect):
 
     @classmethod
     def drive_memory(cls) -> Any:
-        """Return the time of the first sample, None before it."""
+        """Return the time of the start, None before it is known."""
         return {'start': None}
+
+    @classmethod
+    def begin(cls, memory: Any, time: float) -> None:
+        """Start the clock."""
+        memory['start'] = time

@@ -22,6 +22,7 @@ class HomingError(MeasurementEffect):
 
     name: ClassVar[str] = 'homing_error'
     idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
                         scale=0.001),)
     card = Card(

@@ -14,7 +14,7 @@ class LoadFriction(DriveEffect):
     """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
 
     name: ClassVar[str] = 'load_friction'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (Parameter('coefficient', 'dmu', '1', 'friction coefficient beyond the model\'s',
                         -100.0, 100.0, scale=0.02),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}

@@ -16,7 +16,7 @@ class QuadraticFriction(DriveEffect):
     """Force in proportion to velocity squared: churning lubricant, air in a closed housing."""
 
     name: ClassVar[str] = 'quadratic_friction'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (Parameter('coefficient', 'c', 'N s^2/m^2', 'force per squared velocity', -1e6, 1e6,
                         scale=20.0),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}

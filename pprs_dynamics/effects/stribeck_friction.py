@@ -19,7 +19,7 @@ class StribeckFriction(DriveEffect):
     """Extra friction at low speed: boundary lubrication in greased guides and screws."""
 
     name: ClassVar[str] = 'stribeck_friction'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F_s', 'N', 'breakaway force beyond Coulomb friction', -1e6, 1e6,
                         scale=0.5),)
     shape = (Parameter('velocity', 'v_s', 'm/s', 'Stribeck velocity', 1e-6, 10.0, scale=0.01),

@@ -27,6 +27,7 @@ class TimeDelay(MeasurementEffect):
 
     name: ClassVar[str] = 'time_delay'
     idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)

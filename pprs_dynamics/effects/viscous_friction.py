@@ -14,7 +14,7 @@ class ViscousFriction(DriveEffect):
     """Force in proportion to velocity: lubricant, motor damping, a current loop's back-EMF."""
 
     name: ClassVar[str] = 'viscous_friction'
-    needs_motion: ClassVar[bool] = True
+    is_friction: ClassVar[bool] = True
     linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity', -1e6, 1e6, scale=5.0),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
     card = Card(

@@ -13,11 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.design import SHAPE_STEP, Design, FullRate
 from pprs_dynamics.diagnosis.joint_fit import Active
-from pprs_dynamics.diagnosis.platform_sensitivities import ChunkSensitivities
-from pprs_dynamics.diagnosis.residuals import Residuals
-from pprs_dynamics.diagnosis.sensitivities import Number
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.homing_error import HomingError
@@ -26,6 +22,10 @@ from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.regression.design import SHAPE_STEP, Design, FullRate
+from pprs_dynamics.regression.platform_sensitivities import ChunkSensitivities
+from pprs_dynamics.regression.sensitivities import Number
+from pprs_dynamics.residuals.residuals import Residuals
 
 DELAY_STEP = 1e-4  # [s]
 PER_MILLISECOND = 1e-3

@@ -6,10 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.platform_sensitivities import PASSIVE_WIDTHS
-from pprs_dynamics.diagnosis.sensitivities import DRIVE_WIDTHS, known_numbers
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.experiments.columns import Block, ColumnPlan
@@ -21,6 +18,9 @@ from pprs_dynamics.measurement.treatment import BLOCK_DURATION
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.model_file import build_robot
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.platform_sensitivities import PASSIVE_WIDTHS
+from pprs_dynamics.regression.sensitivities import DRIVE_WIDTHS, known_numbers
 
 # Effects that most machines have, or that are most often entered wrongly.
 ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_offset',

@@ -81,6 +81,8 @@ class Reconstruction:
         Samples of the recording's segments that are not here: edges and short segments.
     notes : tuple of str
         What was done and found, in words.
+    start : float
+        Time of the recording's first sample, which may be dropped here [s].
     """
 
     time: Array
@@ -99,6 +101,7 @@ class Reconstruction:
     jumps: np.ndarray
     dropped: int
     notes: tuple[str, ...]
+    start: float
 
     def __len__(self) -> int:
         return len(self.time)
@@ -162,7 +165,8 @@ def reconstruct(
         time, drives.position, drives.velocity, drives.acceleration, followed.motion,
         recording.effort[drives.index], drives.index, drives.segments,
         Treatment(drives.block_starts, total), drives.smoothing, drives.block,
-        drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes))
+        drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
+        float(recording.time[0]))
 
 
 def treated_forces(
@@ -189,10 +193,10 @@ def treated_forces(
         See `DriveModel.drive_forces`.
     """
     treated: dict[str, Array] = {}
-    state = model.initial_state()
+    state = model.initial_state(reconstruction.start)
     for chunk in reconstruction.chunks():
         if chunk.is_start:
-            state = model.initial_state()
+            state = model.initial_state(reconstruction.start)
         forces = model.measured(model.drive_forces(chunk.motion, state), state)
         for name, values in {**forces.parts, 'total': forces.total, **more(forces)}.items():
             if name not in treated:

@@ -110,9 +110,15 @@ class ForceModel(ABC):
         By name in the interface: (N, D) where every drive has its own, (N,) where all share it.
         """
 
-    def initial_state(self) -> ModelState:
-        """Return a fresh state for effects with memory."""
-        return ModelState({effect.name: effect.initial_memory() for effect in self.effects})
+    def initial_state(self, start: float | None = None) -> ModelState:
+        """Return a fresh state for effects with memory.
+
+        Parameters
+        ----------
+        start : float, optional
+            When the recording began [s], where that is before the first sample.
+        """
+        return ModelState({effect.name: effect.initial_memory(start) for effect in self.effects})
 
     def continued_state(self, model: Self, state: ModelState) -> ModelState:
         """Return a state that goes on from another model's for the effects that both have."""

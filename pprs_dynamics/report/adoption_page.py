@@ -12,13 +12,13 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.adopt import Adoption
 from pprs_dynamics.diagnosis.error_steps import ErrorStep
 from pprs_dynamics.diagnosis.paired_errors import rms_by_drive
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.report.adoption_tables import error_rows, headline, parameter_rows
 from pprs_dynamics.report.comparison_figures import LINES, curve
 from pprs_dynamics.report.diagnosis_figures import before_and_after, waterfall
 from pprs_dynamics.report.page import Page, plotly_objects
+from pprs_dynamics.residuals.residuals import Residuals
 
 
 def adoption_page(answer: Adoption, recordings: Sequence[Recording],

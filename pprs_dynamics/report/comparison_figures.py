@@ -10,8 +10,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.diagnosis.profiles import error_profile, error_spectrum
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.report.page import plotly_objects
+from pprs_dynamics.residuals.residuals import Residuals
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'
 LINES = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')

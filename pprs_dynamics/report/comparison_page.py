@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pprs_dynamics.diagnosis.comparison import Comparison
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.report import comparison_figures as figures
 from pprs_dynamics.report.page import Page
 from pprs_dynamics.report.tables import comparison_rows
+from pprs_dynamics.residuals.residuals import Residuals
 
 HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained', 'noise floor [N]',
             'independent samples', 'verdict')

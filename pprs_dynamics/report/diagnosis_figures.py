@@ -17,10 +17,10 @@ from pprs_dynamics.diagnosis.partial import (
     remaining_residuals,
 )
 from pprs_dynamics.diagnosis.profiles import error_spectrum
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.wording import UNITS, WORDS, Statement
 from pprs_dynamics.report.comparison_figures import ERROR, LINES, MEASURED, MODEL, curve
 from pprs_dynamics.report.page import plotly_objects
+from pprs_dynamics.residuals.residuals import Residuals
 
 AFTER, FLOOR, RISE = '#009E73', '#1a1a1a', '#D55E00'
 MARGIN = {'l': 60, 'r': 20, 't': 40, 'b': 45}

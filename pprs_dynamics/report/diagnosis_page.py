@@ -9,11 +9,11 @@ import numpy as np
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.diagnosis.sentences import Finding, Sentences, fitted_values
 from pprs_dynamics.report import diagnosis_figures as figures
 from pprs_dynamics.report.diagnosis_tables import finding_lines, sites
 from pprs_dynamics.report.page import Page
+from pprs_dynamics.residuals.residuals import Residuals
 
 METHOD = (
     'Model and measured effort get the same treatment; every effect of the catalogue, in every '

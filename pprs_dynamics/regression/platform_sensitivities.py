@@ -1,4 +1,4 @@
-"""How the forces of a 3-PPRS change with its numbers, and with effects outside the drives.
+"""Derivatives of the forces of a 3-PPRS by its numbers and by effects outside the drives.
 
 The geometry changes the motion, bodies change the loads, loads change friction: most of it is
 differences of the whole model.
@@ -14,8 +14,20 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.sensitivities import (
-    DRIVE_WIDTHS,
+from pprs_dynamics.effects.active_friction import ActiveFriction
+from pprs_dynamics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.effects.passive_friction import PassiveFriction
+from pprs_dynamics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.mechanism.forward_motion import platform_rates, solve_forward_motion
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.reversal import Reversal
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.mechanism.state import MechanismState
+from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.model.model_file import build_robot
+from pprs_dynamics.regression.sensitivities import (
+    BARE,
     HOMING,
     NUMBERS,
     OF_DRIVES,
@@ -24,19 +36,8 @@ from pprs_dynamics.diagnosis.sensitivities import (
     RELATIVE_STEP,
     Number,
     Sensitivities,
+    reversal_columns,
 )
-from pprs_dynamics.effects.active_friction import ActiveFriction
-from pprs_dynamics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.effects.passive_friction import PassiveFriction
-from pprs_dynamics.effects.structure_effect import BodyEffect, StructureEffect
-from pprs_dynamics.mechanism.forward_motion import platform_rates, solve_forward_motion
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.mechanism.state import MechanismState
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
-from pprs_dynamics.model.model_file import build_robot
 
 HOMING_STEP = 1e-5  # [m]
 HOMING_STRIDE = 5  # samples; these columns change slowly
@@ -65,12 +66,16 @@ class PlatformSensitivities(Sensitivities):
         columns = {
             NUMBERS: found.of_numbers(self.numbers), OF_DRIVES: found.of_drive_widths(),
             OF_JOINTS: found.of_passive_widths(), HOMING: found.of_homing(samples)[:, nearest]}
-        for effect in self.absent:
-            columns[effect.name] = np.stack(list(found.of_structure(effect)))
+        for effect in self.searched:
+            full, bare = zip(*found.of_structure(effect), strict=True)
+            columns[effect.name] = np.stack(full)
+            if issubclass(effect, BodyEffect):
+                columns[BARE + effect.name] = np.stack(bare)
+        known = {effect.name for effect in self.given.effects}
         for present in self.model.effects:
-            if isinstance(present, StructureEffect):
+            if isinstance(present, StructureEffect) and present.name in known:
                 columns[PRESENT + present.name] = np.stack(
-                    [column for _, _, column in found.of_present(present)])
+                    [full for full, _ in found.of_structure(type(present))])
         return columns
 
 
@@ -106,41 +111,44 @@ class ChunkSensitivities:
             column = effect.sensed(column, self.state.time, DRIVES)
         return column
 
-    def of_structure(self, effect: type[StructureEffect]) -> Iterator[Array]:
-        """Yield the column of every coefficient of an effect that is not in the model, (N, 6)."""
+    def of_structure(self, effect: type[StructureEffect]) -> Iterator[tuple[Array, Array]]:
+        """Yield the columns of every coefficient of an effect, (N, 6) per unit.
+
+        Two for each: as the model says, and as it would be if friction did not follow the loads
+        that the effect adds (a preloaded guide). Around the effect's values in the model, where
+        it has them, and around none.
+        """
+        present = next((one for one in self.model.effects if type(one) is effect), None)
+        values = effect.to_coefficients(present.values) if present is not None else {}
         for coefficient in effect.coefficients:
             step = coefficient.scale
-            small = effect.at({coefficient.name: step})
-            if isinstance(small, BodyEffect):
-                column = (self._forces(small.apply(self.state)) - self._reference) / step
+            moved = effect.at({**values, coefficient.name: values.get(coefficient.name, 0) + step})
+            if not isinstance(moved, BodyEffect):
+                change = moved.force(self.state)
+                change = change if present is None else change - present.force(self.state)
+                full = bare = self.sensed(change / step)
             else:
-                column = small.force(self.state) / step
-            yield self.sensed(column)
-
-    def of_present(self, effect: CatalogueEffect) -> Iterator[tuple[str, str, Array]]:
-        """Yield drive ('' for none), coefficient and column of an effect that is in the model."""
-        if isinstance(effect, StructureEffect):
-            at = effect.to_coefficients(effect.values)
-            for c in effect.coefficients:
-                moved = effect.at({**at, c.name: at[c.name] + c.scale})
-                if isinstance(moved, BodyEffect):
-                    model = self._with(effect, moved)
-                    change = self._difference(model)
-                else:
-                    change = moved.force(self.state) - effect.force(self.state)
-                yield '', c.name, self.sensed(change / c.scale)
+                state = (moved.apply(self.state) if present is None
+                         else self._solved(self._with(present, moved)))
+                full = self.sensed((self._forces(state) - self._reference) / step)
+                bare = self.sensed((state.rigid_body.force - self.state.rigid_body.force) / step)
+            yield full, bare
 
     def _with(self, old: CatalogueEffect, new: CatalogueEffect) -> DriveModel:
         return replace(self.model, effects=tuple(
             new if effect is old else effect for effect in self.model.effects))
 
-    def _difference(self, model: DriveModel) -> Array:
-        """Return the change with another model of the same geometry, memories left out."""
-        robot = model.robot
-        state = replace(self.state, load=None, reversal=model.reversal).loaded(robot)
+    def _solved(self, model: DriveModel) -> MechanismState:
+        """Return the state with another model of the same geometry."""
+        state = replace(self.state, load=None, reversal=model.reversal).loaded(model.robot)
         for effect in model.effects:
             if isinstance(effect, BodyEffect):
                 state = effect.apply(state)
+        return state
+
+    def _difference(self, model: DriveModel) -> Array:
+        """Return the change with another model of the same geometry, memories left out."""
+        state = self._solved(model)
         total = state.rigid_body.force + sum(
             effect.force(state) for effect in model.effects
             if not effect.is_measurement and not isinstance(effect, BodyEffect)
@@ -162,7 +170,8 @@ class ChunkSensitivities:
                 columns[row][:, mine] = together[key][:, mine]
             else:
                 columns[row] = self._moved(key, element)
-            columns[row] = self.sensed(columns[row] * number.deviation / abs(number.value))
+            now = self.model.values[key] if element is None else self.model.values[key][element]
+            columns[row] = self.sensed(columns[row] * number.deviation / abs(now))
         return columns
 
     def _moved(self, key: str, element: int | None) -> Array:
@@ -199,11 +208,9 @@ class ChunkSensitivities:
     def of_drive_widths(self) -> Array:
         """Return what other widths of turning over would change in each drive, (W, N, 6)."""
         friction = next(e for e in self.model.effects if isinstance(e, ActiveFriction))
-        dry = np.asarray(friction.coulomb) * self.state.guide_load
-        width = np.asarray(self.model.reversal.velocity)
-        return np.stack([self.sensed(dry * (
-            smooth_sign(self.state.velocity, factor * width) - self.state.direction))
-            for factor in DRIVE_WIDTHS])
+        return np.stack([self.sensed(column) for column in reversal_columns(
+            friction.dry(self.state.guide_load), self.state.velocity, self.state.direction,
+            np.asarray(self.model.reversal.velocity))])
 
     def of_passive_widths(self) -> Array:
         """Return the same for the passive joints, all at once, (W, N, 6)."""

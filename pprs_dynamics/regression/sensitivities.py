@@ -1,4 +1,4 @@
-"""How a model's forces change with its own numbers and with effects that it lacks.
+"""Derivatives of a model's forces by its own numbers and by effects that it may lack.
 
 Everything is linear here: a column is the change of all drives' measured efforts per unit of one
 coefficient, at one chunk of a recording, at full rate. What a kind of model has for columns beside
@@ -11,10 +11,13 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect
+from pprs_dynamics.mechanism.reversal import smooth_sign
 from pprs_dynamics.model.force_model import ForceModel
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
@@ -24,7 +27,7 @@ DEVIATIONS = 2.5
 # width whose differences span what is between 0.2 and 5 times the model's.
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
 # Names of columns; those of effects outside the drives have the effects' names.
-NUMBERS, HOMING, PRESENT = 'numbers', 'homing', 'present '
+NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
 OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
 
 
@@ -77,36 +80,41 @@ class Sensitivities(ABC):
     Parameters
     ----------
     model : ForceModel
+        Around which forces are linear.
+    given : ForceModel
+        As the user gave it: what it has already is no candidate, and its numbers are those that
+        tolerances are about.
 
     Attributes
     ----------
     numbers : tuple of Number
-    absent : tuple of type of StructureEffect
-        Effects outside the drives that the model could have and has not.
+    searched : tuple of type of StructureEffect
+        Effects outside the drives that the given model could have and has not.
     """
 
-    def __init__(self, model: ForceModel) -> None:
-        self.model = model
-        self.numbers = known_numbers(model)
-        present = {effect.name for effect in model.effects}
-        self.absent: tuple[type[StructureEffect], ...] = tuple(
+    def __init__(self, model: ForceModel, given: ForceModel) -> None:
+        self.model, self.given = model, given
+        self.numbers = known_numbers(given)
+        present = {effect.name for effect in given.effects}
+        self.searched: tuple[type[StructureEffect], ...] = tuple(
             effect for effect in catalogue().values() if issubclass(effect, StructureEffect)
-            and model.offers(effect) and effect.name not in present)
+            and given.offers(effect) and effect.name not in present)
 
     @abstractmethod
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.
 
         `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
-        other widths of turning over would change in every drive, and `OF_JOINTS` in all passive
-        joints; `HOMING` per metre that each drive is measured too far; the coefficients of each
-        effect of `absent` by its name, and of those that the model has after `PRESENT`. What a
-        kind of model does not have is left out.
+        other widths of turning over would change in every drive, and last a part that is alike
+        in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
+        each drive is measured too far; the coefficients of each effect of `searched` by its name,
+        and after `BARE` as they were if friction did not follow the loads; those of effects
+        that the given model has after `PRESENT`. What a kind of model does not have is left out.
 
         Parameters
         ----------
         forces : Forces
-            Of the model at one chunk.
+            Of the model at one chunk, before its sensors.
         """
 
     def sensed(self, column: Array, state: Any) -> Array:
@@ -115,3 +123,25 @@ class Sensitivities(ABC):
             if isinstance(effect, MeasurementEffect):
                 column = effect.sensed(column, state.time, self.model.drives)
         return column
+
+
+def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array) -> list[Array]:
+    """Return what dry friction that turns over otherwise changes, (N, D) each.
+
+    Parameters
+    ----------
+    dry : (N, D) array
+        Its size in full motion [N].
+    velocity, direction : (N, D) array
+        [m/s], and its sgn as the model has it.
+    width : float or (D,) array
+        Of the model's sgn [m/s].
+
+    Returns
+    -------
+    list
+        A column for each of `DRIVE_WIDTHS`, odd in the direction; and an even one, for friction
+        that differs by direction while it turns over.
+    """
+    odd = [dry * (smooth_sign(velocity, factor * width) - direction) for factor in DRIVE_WIDTHS]
+    return [*odd, dry * (1 - np.abs(direction))]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals
 
 BINS = 12
 TIME_BINS = 16
@@ -25,9 +25,6 @@ SLOW_SHARES = (0.03, 0.06, 0.12, 0.2, 0.35, 0.55, 0.8)
 LEAST_SHARE = 0.01
 # Friction turns over at a reversal within a speed that is seldom known [m/s].
 REVERSAL_WIDTHS = (0.0003, 0.001, 0.003)
-# A constant and a stretch of time are what noise slower than the record looks like, and no noise
-# model can know that noise from the same record.
-SLOW_NOISE_MARGIN = 10.0
 RIPPLE_PERIODS = (2, 32)  # periods of a force ripple within the drive's travel
 # Widths of smooth bumps, as parts of the stroke, and their standard deviation in widths.
 BUMP_PARTS = (4, 8, 16, 32)
@@ -85,14 +82,9 @@ class Family:
     edges: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
-    def penalty(self) -> float:
-        """Twice the log of the number of tries, and a margin for what slow noise looks like."""
-        return 2 * float(np.log(len(self.patterns) * self.rivals)) + self.margin
-
-    @property
-    def margin(self) -> float:
-        """What is asked for beyond that; it decides whether, not which."""
-        return SLOW_NOISE_MARGIN if self.variable == 'time' else 0.0
+    def is_plain(self) -> bool:
+        """True for a constant and for the direction: effects of the catalogue are just that."""
+        return self.variable == 'direction' or self.patterns[0].kind == 'offset'
 
     def pattern_columns(self, index: int) -> Array:
         """Return the (1 or 2, N) columns of one pattern."""
@@ -300,3 +292,16 @@ def _diagonal(blocks: list[Array]) -> Array:
         result[row:row + block.shape[0], column:column + block.shape[1]] = block
         row, column = row + block.shape[0], column + block.shape[1]
     return result
+
+
+def trial_limits(
+    limit: float, outer: tuple[float, float], edges: Array, width: float,
+) -> Array:
+    """Return trial limits within a share of the way to a limit's neighbouring edges."""
+    grid = np.unique(np.concatenate((edges, np.abs(edges), outer)))
+    below, above = grid[grid < limit - 1e-12], grid[grid > limit + 1e-12]
+    low = below[-1] if len(below) else outer[0]
+    high = above[0] if len(above) else outer[1]
+    share = np.arange(1, 5) / 5 * width
+    return np.unique(np.concatenate((limit - share * (limit - low), [limit],
+                                     limit + share * (high - limit))))

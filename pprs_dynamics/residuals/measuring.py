@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.residuals import Residuals
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct, treated_forces
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.residuals.residuals import Residuals
 
 MOTION = ('position', 'velocity', 'acceleration')
 # Of the names in a table: variables that each drive has for itself, and those that all share.

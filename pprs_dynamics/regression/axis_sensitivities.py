@@ -7,18 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.sensitivities import (
-    DRIVE_WIDTHS,
+from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.model.axis_model import AxisForces, AxisModel, AxisMotion
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.regression.sensitivities import (
     NUMBERS,
     OF_DRIVES,
     RELATIVE_STEP,
     Number,
     Sensitivities,
+    reversal_columns,
 )
-from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
-from pprs_dynamics.mechanism.reversal import smooth_sign
-from pprs_dynamics.model.axis_model import AxisForces, AxisModel, AxisMotion
-from pprs_dynamics.model.model_file import build_model
 
 
 class AxisSensitivities(Sensitivities):
@@ -40,14 +39,14 @@ class AxisSensitivities(Sensitivities):
         dry = sum(effect.dry(state.guide_load) for effect in self.model.effects
                   if isinstance(effect, AxisFriction))
         width = np.asarray(self.model.reversal.velocity)
-        widths = np.stack([self.sensed(dry * (
-            smooth_sign(state.velocity, factor * width) - state.direction), state)
-            for factor in DRIVE_WIDTHS])
+        widths = np.stack([self.sensed(column, state) for column in reversal_columns(
+            dry, state.velocity, state.direction, width)])
         return {NUMBERS: numbers, OF_DRIVES: widths}
 
     def _of_number(self, number: Number, motion: AxisMotion) -> Array:
         """Return the change per standard deviation of a number, (N, 1) [N]."""
-        moved = build_model({**self.model.values, number.key: number.value * (1 + RELATIVE_STEP)})
+        now = self.model.values[number.key]
+        moved = build_model({**self.model.values, number.key: now + RELATIVE_STEP * number.value})
         assert isinstance(moved, AxisModel)
         change = self._own_force(moved, motion) - self._own_force(self.model, motion)
         scaled: Array = change * number.deviation / (RELATIVE_STEP * abs(number.value))

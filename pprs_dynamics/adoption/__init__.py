@@ -1,0 +1,1 @@
+"""Adding an effect to a model: fit, objections, and the loop."""

@@ -1,0 +1,1 @@
+"""Columns of the regression, and the joint fit of all drives under coloured noise."""

@@ -1,0 +1,347 @@
+r"""All drives' errors fitted together: what the model has, what it may lack, and the noise.
+
+With the transformed errors y_d of the drives, columns X_d and noise spectra S_d, a set of columns
+with Gaussian priors of precision Lambda about 0 has the penalised deviance
+
+.. math::
+
+    D = \sum_{d, k} \left( \ln S_d + \frac{r_d^2}{S_d} \right) + c^T \Lambda c
+        + \ln \det (H + \Lambda) - \ln \det \Lambda, \qquad H = \sum_d X_d^T S_d^{-1} X_d,
+
+-2 ln of the likelihood with the coefficients integrated out (restricted likelihood), but for a
+constant. Coefficients and noise are fitted in turn until it stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
+
+LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
+# The fit has converged when a round changes the deviance by less; rounds are bounded.
+CONVERGED, MOST_ROUNDS, NOISE_STEPS = 0.01, 40, 60
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Columns of one term, transformed, with the prior of their coefficients.
+
+    Parameters
+    ----------
+    rows : mapping of drive to (k, n) array
+        DCT coefficients [N]; drives that are not in it feel nothing.
+    precision : (k, k) array
+        Of the Gaussian prior about 0.
+    is_fixed : bool
+        True where the only row has the coefficient 1.
+    """
+
+    rows: Mapping[int, Array]
+    precision: Array
+    is_fixed: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients that are fitted."""
+        return 0 if self.is_fixed else len(self.precision)
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """A fit of blocks.
+
+    Parameters
+    ----------
+    blocks : tuple of Block
+    coefficients : (P,) array
+        Of the base columns, then of the blocks in order.
+    covariance : (P, P) array
+    amplitudes : (D, J + 1) array
+        Of the noise spectra [N^2].
+    deviance : float
+        See the module.
+    squares : (D, B) array
+        Sums of squares that are left in the bands [N^2].
+    """
+
+    blocks: tuple[Block, ...]
+    coefficients: Array
+    covariance: Array
+    amplitudes: Array
+    deviance: float
+    squares: Array
+    places: Mapping[Block, slice] = field(repr=False)
+
+    def of(self, block: Block) -> Array:
+        """Return the coefficients of a block; 1 for a fixed one."""
+        return np.ones(1) if block.is_fixed else self.coefficients[self.places[block]]
+
+
+class Regression:
+    """The errors of a design, transformed, and the fits to them.
+
+    Parameters
+    ----------
+    design : Design
+    error_scale : mapping of drive to float, optional
+        Force that priors of effects allow [N], so that costs of two designs mean the same; by
+        default the rms of the error.
+    """
+
+    def __init__(self, design: Design, error_scale: Mapping[int, float] | None = None) -> None:
+        self.design = design
+        residuals = design.residuals
+        self.bands = FrequencyBands.for_residuals(residuals)
+        self.noise_shapes = NoiseShapes.of(self.bands)
+        every = {d: DriveSeries(residuals, d, self.bands) for d in range(len(design.drives))}
+        self.series = {d: one for d, one in every.items() if one.known.sum() >= LEAST_SAMPLES}
+        self.drives = tuple(self.series)
+        self.counts = np.stack([self.series[d].counts for d in self.drives])
+        self.precision = np.array([column.precision for column in design.base])
+        self.base_index = {d: np.array([k for k, column in enumerate(design.base)
+                                        if d in column.rows], dtype=int) for d in self.drives}
+        # The error is the last row of each drive's base.
+        self.base = {d: series.transform(np.stack(
+            [design.base[k].rows[d][series.index] for k in self.base_index[d]] + [series.error]))
+            for d, series in self.series.items()}
+        self._base_products = {d: self.series[d].products(rows, rows)
+                               for d, rows in self.base.items()}
+        self._products: dict[tuple[Block, Block | None, int], Array] = {}
+        self.error_scale = error_scale or {
+            d: float(np.sqrt(np.mean(rows[-1] ** 2))) for d, rows in self.base.items()}
+
+    @property
+    def samples(self) -> int:
+        """Samples of the drive that has most."""
+        return max(len(series) for series in self.series.values())
+
+    def block(self, rows: Mapping[int, Array], is_fixed: bool = False,
+              precision: Array | None = None) -> Block:
+        """Return a block of rows in time, (k, M) by drive, by default with the g-prior.
+
+        The g-prior lets the force of any combination of the rows be of the size of the error
+        that the drives show: its determinant is ln of the number of samples that a coefficient
+        is worth, so that what slow noise could be as well is cheap and weak by itself.
+        """
+        return self.transformed_block(
+            {d: self.series[d].transform(np.atleast_2d(values)) for d, values in rows.items()
+             if d in self.series}, is_fixed, precision)
+
+    def transformed_block(self, rows: Mapping[int, Array], is_fixed: bool = False,
+                          precision: Array | None = None) -> Block:
+        """Return a block of rows that are transformed already, (k, n) by drive."""
+        if precision is None:
+            precision = self.g_prior({d: values @ values.T for d, values in rows.items()})
+        return Block(rows, precision, is_fixed)
+
+    def g_prior(self, grams: Mapping[int, Array]) -> Array:
+        """Return the precision of coefficients whose rows have these sums of products, (k, k)."""
+        felt = {d: gram for d, gram in grams.items() if np.any(gram)}
+        precision = sum(gram / (len(self.series[d]) * max(self.error_scale[d], 1e-12) ** 2)
+                        for d, gram in felt.items()) / max(len(felt), 1)
+        size = len(next(iter(grams.values()))) if grams else 1
+        precision = np.zeros((size, size)) + precision
+        scale = np.trace(precision) / size
+        return precision + (1e-9 * scale + 1e-300) * np.eye(size)
+
+    def products(self, a: Block, b: Block | None, d: int) -> Array:
+        """Return the band sums of a block's rows with another's, or with the base and error."""
+        key = (a, b, d)
+        if key not in self._products:
+            if b is not None and (b, a, d) in self._products:
+                return self._products[b, a, d].transpose(0, 2, 1)
+            other = self.base[d] if b is None else b.rows[d]
+            self._products[key] = self.series[d].products(a.rows[d], other)
+        return self._products[key]
+
+    def forget(self, kept: Sequence[Block]) -> None:
+        """Drop the products of all blocks but some, to bound the memory of a long search."""
+        wanted = set(kept)
+        self._products = {key: value for key, value in self._products.items()
+                          if key[0] in wanted and (key[1] is None or key[1] in wanted)}
+
+    def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
+        """Return the fit of blocks beside the base columns, the noise fitted with it.
+
+        Parameters
+        ----------
+        blocks : sequence of Block
+        start : (D, J + 1) array, optional
+            Amplitudes of the noise to start from.
+        """
+        system = _System(self, blocks)
+        shapes = self.noise_shapes
+        if start is None:
+            start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
+        amplitudes, before = start, np.inf
+        for _ in range(MOST_ROUNDS):
+            solution = system.solve(shapes.spectrum(amplitudes), self.counts)
+            if abs(before - solution.deviance) < CONVERGED:
+                break
+            before = solution.deviance
+            amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,
+                                         solution.leverage, NOISE_STEPS)
+        return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
+                        solution.deviance, solution.squares, system.places)
+
+    def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
+        """Return the fit of blocks under given noise."""
+        system = _System(self, blocks)
+        solution = system.solve(self.noise_shapes.spectrum(amplitudes), self.counts)
+        return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
+                        solution.deviance, solution.squares, system.places)
+
+    def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
+        """Return the noise of every drive."""
+        period = self.design.residuals.period
+        return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k], period)
+                for k, d in enumerate(self.drives)}
+
+    def weights(self, fit: JointFit, d: int) -> Array:
+        """Return 1 / S at the bands of a drive, (B,) [1/N^2]."""
+        return 1 / self.noise_shapes.spectrum(fit.amplitudes[self.drives.index(d)])
+
+    def whitened(self, fit: JointFit, d: int, rows: Array) -> Array:
+        """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""
+        series = self.series[d]
+        factor = series.spread(np.sqrt(self.weights(fit, d)))
+        white = series.inverse(series.transform(rows) * factor)
+        white[..., ~series.known] = 0.0
+        return white
+
+    def local(self, fit: JointFit, d: int) -> tuple[Array, list[Block]]:
+        """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""
+        felt = [block for block in fit.blocks if d in block.rows and not block.is_fixed]
+        index = [self.base_index[d]]
+        index += [np.arange(fit.places[block].start, fit.places[block].stop) for block in felt]
+        return np.concatenate(index), felt
+
+    def remaining(self, fit: JointFit, d: int) -> Array:
+        """Return the DCT coefficients of what a fit leaves on a drive, (n,) [N]."""
+        rest = self.base[d][-1] - fit.coefficients[self.base_index[d]] @ self.base[d][:-1]
+        for block in fit.blocks:
+            if d in block.rows:
+                rest = rest - fit.of(block) @ block.rows[d]
+        return rest
+
+
+class _DriveSystem:
+    """Band sums of one drive's columns with each other and with the error."""
+
+    def __init__(self, regression: Regression, d: int, blocks: Sequence[Block],
+                 places: Mapping[Block, slice]) -> None:
+        felt = [block for block in blocks if d in block.rows]
+        fixed = [block for block in felt if block.is_fixed]
+        free = [block for block in felt if not block.is_fixed]
+        base = regression._base_products[d]
+        count, first = base.shape[0], base.shape[1] - 1
+        size = first + sum(block.size for block in free)
+        gram = np.empty((count, size, size))
+        side = np.empty((count, size))
+        gram[:, :first, :first] = base[:, :-1, :-1]
+        side[:, :first] = base[:, :-1, -1]
+        squares = base[:, -1, -1].copy()
+        index = [regression.base_index[d]]
+        at = first
+        spots: list[tuple[Block, slice]] = []
+        for block in free:
+            spot = slice(at, at + block.size)
+            with_base = regression.products(block, None, d)
+            gram[:, spot, :first] = with_base[:, :, :-1]
+            gram[:, :first, spot] = with_base[:, :, :-1].transpose(0, 2, 1)
+            side[:, spot] = with_base[:, :, -1]
+            for other, place in [*spots, (block, spot)]:
+                pair = regression.products(block, other, d)
+                gram[:, spot, place] = pair
+                gram[:, place, spot] = pair.transpose(0, 2, 1)
+            spots.append((block, spot))
+            index.append(np.arange(places[block].start, places[block].stop))
+            at += block.size
+        for number, block in enumerate(fixed):
+            with_base = regression.products(block, None, d)[:, 0]
+            side[:, :first] -= with_base[:, :-1]
+            squares += regression.products(block, block, d)[:, 0, 0] - 2 * with_base[:, -1]
+            for other in fixed[:number]:
+                squares += 2 * regression.products(block, other, d)[:, 0, 0]
+            for other, place in spots:
+                side[:, place] -= regression.products(other, block, d)[:, :, 0]
+        self.index = np.concatenate(index)
+        self.gram, self.side, self.squares = gram, side, squares
+        self._flat = gram.reshape(count, -1)
+
+    def weighted(self, weights: Array) -> tuple[Array, Array]:
+        """Return X^T S^-1 X and X^T S^-1 y."""
+        size = len(self.index)
+        return (weights @ self._flat).reshape(size, size), weights @ self.side
+
+    def left(self, coefficients: Array) -> Array:
+        """Return the sums of squares that coefficients leave in the bands, (B,)."""
+        explained = self.gram @ coefficients
+        left: Array = self.squares - 2 * self.side @ coefficients + explained @ coefficients
+        return np.maximum(left, 1e-12 * self.squares)
+
+    def leverage(self, covariance: Array, weights: Array) -> Array:
+        """Return the degrees of freedom spent in the bands, (B,)."""
+        spent: Array = weights * (self._flat @ covariance.ravel())
+        return spent
+
+
+@dataclass(frozen=True)
+class _Solution:
+    coefficients: Array
+    covariance: Array
+    deviance: float
+    squares: Array
+    leverage: Array
+
+
+class _System:
+    """The normal equations of all drives."""
+
+    def __init__(self, regression: Regression, blocks: Sequence[Block]) -> None:
+        place = len(regression.precision)
+        self.places: dict[Block, slice] = {}
+        precision = [np.diag(regression.precision)]
+        for block in blocks:
+            self.places[block] = slice(place, place + block.size)
+            place += block.size
+            if not block.is_fixed:
+                precision.append(block.precision)
+        self.precision = np.zeros((place, place))
+        self.log_precision, at = 0.0, 0
+        for part in precision:
+            self.precision[at:at + len(part), at:at + len(part)] = part
+            at += len(part)
+            if len(part):
+                self.log_precision += float(np.linalg.slogdet(part)[1])
+        self.drives = [_DriveSystem(regression, d, blocks, self.places) for d in regression.drives]
+
+    def solve(self, spectra: Array, counts: Array) -> _Solution:
+        """Return the solution under noise spectra (D, B)."""
+        H, b = self.precision.copy(), np.zeros(len(self.precision))
+        weights = 1 / spectra
+        for k, drive in enumerate(self.drives):
+            gram, side = drive.weighted(weights[k])
+            H[np.ix_(drive.index, drive.index)] += gram
+            b[drive.index] += side
+        scale = 1 / np.sqrt(np.einsum('ii->i', H))
+        factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)))
+        coefficients = scale * cho_solve(factor, scale * b)
+        covariance = cho_solve(factor, np.eye(len(H))) * np.outer(scale, scale)
+        squares = np.stack([drive.left(coefficients[drive.index]) for drive in self.drives])
+        leverage = np.stack([
+            drive.leverage(covariance[np.ix_(drive.index, drive.index)], weights[k])
+            for k, drive in enumerate(self.drives)])
+        log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
+        deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
+                         + coefficients @ self.precision @ coefficients
+                         + log_det - self.log_precision)
+        return _Solution(coefficients, covariance, deviance, squares, leverage)

@@ -1,0 +1,1 @@
+"""Measured minus modelled effort, in time and in frequency, and its noise."""

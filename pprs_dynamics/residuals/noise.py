@@ -1,0 +1,137 @@
+r"""Power spectrum of the noise of each drive: smooth, falling, bounded at zero frequency.
+
+.. math:: S(f) = a_0 + \sum_j \frac{a_j}{1 + (f / f_j)^2}, \qquad a_j \ge 0,
+
+with corners f_j one octave apart, from 1 / (2 T) to half the Nyquist frequency: wide enough for
+white noise, AR(1) noise of any correlation and nearly 1/f noise. No resonance is possible, so a
+vibration stands out, and the spectrum at zero frequency cannot exceed what the lowest
+frequencies show, so a constant force stands out.
+
+The amplitudes maximise the restricted likelihood: with squares r^2 and leverage h of a regression,
+the fixed point a_j <- a_j (sum phi_j r^2 / S^2 / sum phi_j (1 - h) / S)^0.9 climbs to it. The
+constant (k = 0) takes no part: whether it is noise is for the criterion to judge.
+
+References
+----------
+D. A. Harville, Maximum likelihood approaches to variance component estimation, J. Am. Stat.
+Assoc. 72 (1977) 320-338 (restricted likelihood, fixed-point iterations).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.residuals.bands import FrequencyBands
+
+EXPONENT = 0.9  # of the fixed point; 1 may oscillate, 0.5 is safe and slow
+LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: from 0 none would return
+
+
+@dataclass(frozen=True)
+class NoiseShapes:
+    """The shapes phi_j that a spectrum is made of, at the bands' frequencies, (J + 1, B).
+
+    Parameters
+    ----------
+    corners : (J,) array
+        f_j [Hz].
+    at_bands : (J + 1, B) array
+        1 and 1 / (1 + (f / f_j)^2).
+    """
+
+    corners: Array
+    at_bands: Array
+
+    @classmethod
+    def of(cls, bands: FrequencyBands) -> NoiseShapes:
+        """Return the shapes for some bands."""
+        lowest, highest = bands.frequency[1], bands.frequency[-1]
+        count = max(int(np.floor(np.log2(highest / lowest))), 1)
+        corners = lowest * 2.0 ** np.arange(count)
+        return cls(corners, _shapes(corners, bands.frequency))
+
+    def spectrum(self, amplitudes: Array) -> Array:
+        """Return S at the bands, (..., B), of amplitudes (..., J + 1) [N^2]."""
+        power: Array = amplitudes @ self.at_bands
+        return power
+
+    def start(self, squares: Array, counts: Array) -> Array:
+        """Return amplitudes to start from, (..., J + 1): a share of the mean square for each."""
+        mean = squares[..., 1:].sum(axis=-1) / np.maximum(counts[..., 1:].sum(axis=-1), 1)
+        amplitudes: Array = np.repeat(
+            np.maximum(mean, 1e-300)[..., None] / len(self.at_bands), len(self.at_bands), axis=-1)
+        return amplitudes
+
+    def improved(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array,
+                 steps: int = 1) -> Array:
+        """Return the amplitudes after some steps of the fixed point, (..., J + 1).
+
+        Parameters
+        ----------
+        amplitudes : (..., J + 1) array
+            [N^2]
+        squares : (..., B) array
+            Sums of squares that a regression leaves in the bands [N^2].
+        counts : (..., B) array
+            Coefficients in the bands.
+        leverage : (..., B) array
+            Degrees of freedom that the regression spends there.
+        """
+        phi = self.at_bands[:, 1:]
+        squares, free = squares[..., 1:], np.maximum(
+            counts[..., 1:] - leverage[..., 1:], 0.02 * counts[..., 1:])
+        least = LEAST_SHARE * squares.sum(axis=-1, keepdims=True) / np.maximum(
+            free.sum(axis=-1, keepdims=True), 1) + 1e-300
+        for _ in range(steps):
+            power = amplitudes @ phi
+            ratio = (squares / power ** 2) @ phi.T / np.maximum((free / power) @ phi.T, 1e-300)
+            amplitudes = np.maximum(amplitudes * ratio ** EXPONENT, least)
+        return amplitudes
+
+
+@dataclass(frozen=True)
+class NoiseSpectrum:
+    """The noise of one drive.
+
+    Parameters
+    ----------
+    corners : (J,) array
+        [Hz]
+    amplitudes : (J + 1,) array
+        a_0, a_1 .. [N^2].
+    period : float
+        Between the samples whose variance the spectrum's mean is [s].
+    """
+
+    corners: Array
+    amplitudes: Array
+    period: float
+
+    def power(self, frequency: Array) -> Array:
+        """Return S at frequencies [Hz]: the variance of a DCT coefficient [N^2]."""
+        power: Array = self.amplitudes @ _shapes(self.corners, np.asarray(frequency, dtype=float))
+        return power
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the samples [N]."""
+        frequency = np.linspace(0.0, 0.5 / self.period, 4097)
+        return float(np.sqrt(np.mean(self.power(frequency))))
+
+    def effective_samples(self, samples: int) -> float:
+        """Return how many independent samples have a mean as uncertain as `samples` of these."""
+        return float(np.clip(samples * self.rms ** 2 / self.power(np.zeros(1))[0], 1, samples))
+
+    @property
+    def slowness(self) -> float:
+        """Return the power at zero frequency over that of the fast noise."""
+        ends = self.power(np.array([0.0, 0.5 / self.period]))
+        return float(ends[0] / ends[1])
+
+
+def _shapes(corners: Array, frequency: Array) -> Array:
+    slow = 1 / (1 + (frequency / corners[:, None]) ** 2)
+    return np.concatenate((np.ones((1, len(frequency))), slow))

@@ -1,0 +1,1 @@
+"""Selection of the missing effects: candidates, criterion, search."""

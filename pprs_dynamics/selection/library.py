@@ -1,0 +1,311 @@
+"""All terms that the catalogue offers for a design, and what each would gain beside a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.regression.design import Term, searched_in_drives
+from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.selection.candidates import EffectCandidate, Placement, Prices
+from pprs_dynamics.selection.decisions import Decisions
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A term and variant that a scan proposes.
+
+    Parameters
+    ----------
+    term : Term
+    names : tuple of str
+    gain : float
+        By which the deviance falls at the noise of the fit.
+    """
+
+    term: Term
+    names: tuple[str, ...]
+    gain: float
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Terms on one drive with equally many rows in the scan.
+
+    Parameters
+    ----------
+    terms : list of n (Term, names)
+    rows : (n, k) int array
+        Places in the drive's rows.
+    gram : (n, k, k, B) array
+        Band sums.
+    precision : (n, k, k) array
+    is_fixed : bool
+    """
+
+    terms: list[tuple[Term, tuple[str, ...]]]
+    rows: np.typing.NDArray[np.int_]
+    gram: Array
+    precision: Array
+    is_fixed: bool
+
+
+class DriveLibrary:
+    """Terms on one drive alone, in every shape tried.
+
+    Parameters
+    ----------
+    regression : Regression
+    d : int
+    """
+
+    def __init__(self, regression: Regression, d: int) -> None:
+        self.regression, self.d = regression, d
+        self.series = regression.series[d]
+        design = regression.design
+        self.trials: dict[str, int] = {}
+        self.terms: list[Term] = []
+        for effect in searched_in_drives(design):
+            if design.acts_on(effect, d) and not _is_felt_everywhere(effect):
+                shapes = effect.trials(design.covered[d])
+                self.trials[effect.name] = len(shapes)
+                self.terms += design.trial_terms(effect, d, shapes)
+        self._crosses: dict[Block, Array] = {}
+
+    @cached_property
+    def rows(self) -> Array:
+        """All rows, transformed, in single precision, (R, n)."""
+        stacked = np.concatenate([term.rows[self.d][:, self.series.index] for term in self.terms])
+        return self.series.transform(stacked.astype(np.float32))
+
+    @cached_property
+    def groups(self) -> list[_Group]:
+        """Terms in all variants that the rows of a scan suffice for."""
+        found: dict[tuple[int, bool], list[tuple[Term, tuple[str, ...], list[int]]]] = {}
+        first = 0
+        for term in self.terms:
+            count = len(term.rows[self.d])
+            if term.is_fixed:
+                found.setdefault((1, True), []).append((term, (), [first]))
+            else:
+                for names in term.effect.variants:
+                    if set(names) <= set(term.effect.scanned):
+                        places = [first + term.names.index(name) for name in names]
+                        found.setdefault((len(places), False), []).append((term, names, places))
+            first += count
+        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
+        groups = []
+        for (size, is_fixed), listed in found.items():
+            rows = np.array([places for _, _, places in listed])
+            gram = np.empty((len(listed), size, size, len(self.series.bands)))
+            for i in range(size):
+                for j in range(i, size):
+                    gram[:, i, j] = gram[:, j, i] = self.series.sums(
+                        self.rows[rows[:, i]] * self.rows[rows[:, j]])
+            precision = gram.sum(axis=-1) / scale
+            trace = np.einsum('nkk->n', precision)[:, None, None] / size
+            precision += (1e-9 * trace + 1e-300) * np.eye(size)
+            groups.append(_Group([(term, names) for term, names, _ in listed], rows, gram,
+                                 precision, is_fixed))
+        return groups
+
+    def _cross(self, block: Block | None) -> Array:
+        """Return band sums of all rows with a block's, or with base and error, (B, R, k)."""
+        key = block or _BASE
+        if key not in self._crosses:
+            if len(self._crosses) > 60:
+                self._crosses = {_BASE: self._crosses[_BASE]}
+            other = self.regression.base[self.d] if block is None else block.rows[self.d]
+            self._crosses[key] = self.series.products(
+                self.rows, other.astype(np.float32)).astype(np.float32)
+        return self._crosses[key]
+
+    def offers(self, fit: JointFit) -> dict[str, Offer]:
+        """Return the best shape and variant of every effect, by name, at the noise of a fit."""
+        if not self.terms:
+            return {}
+        weights = self.regression.weights(fit, self.d)
+        index, felt = self.regression.local(fit, self.d)
+        narrow = weights.astype(np.float32)
+
+        def weighted(block: Block | None) -> Array:
+            cross = self._cross(block)
+            return (narrow @ cross.reshape(len(narrow), -1)).reshape(cross.shape[1:]).astype(float)
+
+        with_base = weighted(None)
+        known = np.concatenate([with_base[:, :-1], *(weighted(block) for block in felt)], axis=1)
+        side = with_base[:, -1] - known @ fit.coefficients[index]
+        for block in fit.blocks:
+            if block.is_fixed and self.d in block.rows:
+                side -= weighted(block)[:, 0]
+        spread = known @ fit.covariance[np.ix_(index, index)]
+        best: dict[str, Offer] = {}
+        for group in self.groups:
+            S = group.gram @ weights - spread[group.rows] @ known[group.rows].transpose(0, 2, 1)
+            gains = term_gains(S, side[group.rows], group.precision, group.is_fixed)
+            for at in np.argsort(-gains):
+                term, names = group.terms[at]
+                name = term.effect.name
+                if name not in best or best[name].gain < gains[at]:
+                    best[name] = Offer(term, names, float(gains[at]))
+        return best
+
+
+_BASE = Block({}, np.zeros((0, 0)))
+
+
+class Library:
+    """All candidates of a design.
+
+    Parameters
+    ----------
+    regression : Regression
+    decisions : Decisions
+    """
+
+    def __init__(self, regression: Regression, decisions: Decisions) -> None:
+        self.regression, self.decisions = regression, decisions
+        design = regression.design
+        self.prices = Prices(len(catalogue()), len(regression.drives), regression.samples,
+                             decisions.effect_odds, decisions.wrong_sign_odds)
+        self._placements: dict[Hashable, Placement] = {}
+        self._turning: dict[Placement, Array | None] = {}
+        self.local = {d: DriveLibrary(regression, d) for d in regression.drives}
+        felt = [effect for effect in searched_in_drives(design) if _is_felt_everywhere(effect)]
+        self.spanning = [self.placement(design.term(effect, d, {}), names)
+                         for effect in felt for d in regression.drives
+                         if design.acts_on(effect, d) for names in effect.variants]
+        self.structure = [self.placement(term, names) for term in design.structure
+                          if any(np.any(rows) for rows in term.rows.values())
+                          for names in term.effect.variants]
+
+    def placement(self, term: Term, names: tuple[str, ...]) -> Placement:
+        """Return a term with the coefficients that are to be fitted."""
+        key = (term.effect, term.drive, names, tuple(sorted(term.shape.items())))
+        if key not in self._placements:
+            self._placements[key] = self._placed(term, names)
+        return self._placements[key]
+
+    def placed(self, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],
+               names: tuple[str, ...]) -> Placement:
+        """Return an effect on a drive or in the structure, of one shape."""
+        key = (effect, drive, names, tuple(sorted(shape.items())))
+        found = self._placements.get(key)
+        return found or self.placement(
+            self.regression.design.find_term(effect, drive, shape), names)
+
+    def turning_rows(self, placement: Placement) -> Array | None:
+        """Return what its friction changes by where it turns over otherwise, (k, w, n).
+
+        By its coefficients; None for what is no friction or knows its past.
+        """
+        if placement not in self._turning:
+            self._turning[placement] = self._turning_rows(placement)
+        return self._turning[placement]
+
+    def _turning_rows(self, placement: Placement) -> Array | None:
+        design, term, d = self.regression.design, placement.term, placement.drive
+        if d is None or not term.effect.is_friction:
+            return None
+        units = np.eye(len(term.names))[[term.names.index(name) for name in placement.names]]
+        rows = np.stack([design.reversal_rows(term, unit) for unit in units])
+        return self.regression.series[d].transform(rows) if np.any(rows) else None
+
+    def _placed(self, term: Term, names: tuple[str, ...]) -> Placement:
+        regression = self.regression
+        chosen = [0] if term.is_fixed else [term.names.index(name) for name in names]
+        rows = {d: values[chosen] for d, values in term.rows.items()}
+        block = regression.block(rows, term.is_fixed,
+                                 np.zeros((0, 0)) if term.is_fixed else None)
+        bare = None
+        if term.bare is not None:
+            bare = {d: regression.series[d].transform(values[chosen] - rows[d])
+                    for d, values in term.bare.items() if d in regression.series}
+        tried = (self.local[term.drive].trials.get(term.effect.name, 1)
+                 if term.drive is not None else 1)
+        return Placement(term, () if term.is_fixed else names, block,
+                         self.prices.of_placement(term.effect, tried), bare)
+
+    def full(self, offer: Offer) -> Placement:
+        """Return the placement of an offer, with the rows of the exact term."""
+        term = offer.term
+        return self.placed(term.effect, term.drive, term.shape, offer.names)
+
+    def candidate(self, effect: type[CatalogueEffect],
+                  placements: Sequence[Placement]) -> EffectCandidate:
+        """Return an effect with the price of its name and drives."""
+        ordered = tuple(sorted(placements, key=lambda one: -1 if one.drive is None else one.drive))
+        price = self.prices.of_name()
+        if ordered[0].drive is not None:
+            price += self.prices.of_drives(len(ordered))
+        return EffectCandidate(effect, ordered, price)
+
+    def block_gain(self, fit: JointFit, block: Block) -> float:
+        """Return by how much the deviance falls with one more block, at the noise of a fit."""
+        regression = self.regression
+        size = len(next(iter(block.rows.values())))
+        S, b = np.zeros((size, size)), np.zeros(size)
+        taken = np.zeros((size, len(fit.coefficients)))
+        for d in block.rows:
+            weights = regression.weights(fit, d)
+            index, felt = regression.local(fit, d)
+
+            def weighted(other: Block | None, d: int = d, weights: Array = weights) -> Array:
+                found: Array = np.tensordot(weights, regression.products(block, other, d), 1)
+                return found
+
+            with_base = weighted(None)
+            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in felt)], axis=1)
+            S += weighted(block)
+            b += with_base[:, -1] - known @ fit.coefficients[index]
+            for one in fit.blocks:
+                if one.is_fixed and d in one.rows:
+                    b -= weighted(one)[:, 0]
+            taken[:, index] += known
+        S -= taken @ fit.covariance @ taken.T
+        return float(term_gains(S[None], b[None], block.precision[None], block.is_fixed)[0])
+
+
+def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
+    """Return by how much the deviance falls with each of n terms, (n,).
+
+    Parameters
+    ----------
+    S : (n, k, k) array
+        Whitened sums of products of the rows, less what is fitted already.
+    b : (n, k) array
+        Whitened sums of products with what is left.
+    precision : (n, k, k) array
+        Of the prior.
+    is_fixed : bool
+        True where the coefficient is 1.
+    """
+    if is_fixed:
+        fixed: Array = 2 * b[:, 0] - S[:, 0, 0]
+        return fixed
+    posterior = (S + S.transpose(0, 2, 1)) / 2 + precision
+    # What is fitted already can take all of a row, to rounding; then only the prior is left.
+    floor = 1e-6 * np.einsum('nkk->nk', precision)
+    diagonal = np.einsum('nkk->nk', posterior)
+    np.einsum('nkk->nk', posterior)[:] = np.maximum(diagonal, floor)
+    scale = 1 / np.sqrt(np.einsum('nkk->nk', posterior))
+    scaled = posterior * scale[:, :, None] * scale[:, None, :]
+    values, axes = np.linalg.eigh(scaled)
+    kept = values > 1e-7
+    along = np.einsum('nkj,nk->nj', axes, b * scale)
+    quadratic = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
+    log_det = (np.sum(np.log(np.maximum(values, 1e-7)), axis=1) - 2 * np.sum(np.log(scale), axis=1)
+               - np.linalg.slogdet(precision)[1])
+    gains: Array = quadratic - log_det
+    return gains
+
+
+def _is_felt_everywhere(effect: type[DriveEffect]) -> bool:
+    return issubclass(effect, MeasurementEffect) and effect.shifts_positions()

@@ -1,0 +1,421 @@
+"""Search for the set of effects with the lowest cost.
+
+The cost of a set is its penalised deviance (`regression.joint_fit`) plus the prices of what was
+chosen (`Prices`). From the best set, effects are added, placed on other drives, dropped, replaced
+and merged, until no neighbour is better. A scan at the noise of a fit proposes, a fit with its own
+noise decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import replace
+from itertools import chain, combinations
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.effects.drive_effect import DriveEffect
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.selection.candidates import (
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+    Placement,
+    UnknownCandidate,
+    set_key,
+)
+from pprs_dynamics.selection.decisions import Decisions
+from pprs_dynamics.selection.library import Library
+from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
+
+MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
+REPLACEMENTS = 3  # candidates tried in the place of one or of two
+SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
+LEAST_IMPROVEMENT = 0.1  # in cost, for which a search goes on
+# Lowest score of a proposal, and how much worse than the best a replacement may look at the best
+# one's noise: its own noise may favour it by about as much.
+PROPOSED, REPLACED = -12.0, 15.0
+
+# Corners of the noise below this share of the highest count as slow; what is left of them.
+FAST_SHARE, SLOW_LEFT = 0.1, 1e-3
+
+Candidates = tuple[Candidate, ...]
+
+
+class Search:
+    """A search over the candidates of one design.
+
+    Parameters
+    ----------
+    regression : Regression
+    decisions : Decisions
+    progress : callable, optional
+        Called with the share of the work that is done.
+    with_unknown : bool
+        Patterns of no catalogue take part.
+    """
+
+    def __init__(self, regression: Regression, decisions: Decisions,
+                 progress: Callable[[float], None] | None = None,
+                 with_unknown: bool = True) -> None:
+        self.regression, self.decisions = regression, decisions
+        self.library = Library(regression, decisions)
+        self.patterns = ([PatternLibrary(self.library, d) for d in regression.drives]
+                         if with_unknown else [])
+        self.evaluated: dict[Hashable, CandidateSet] = {}
+        self._report = progress or (lambda share: None)
+
+    @property
+    def best(self) -> CandidateSet:
+        """The set of lowest cost so far."""
+        return min(self.evaluated.values(), key=lambda found: found.cost)
+
+    def run(self, start: Candidates = ()) -> CandidateSet:
+        """Return the best set that the search reaches."""
+        self.evaluate(())
+        if start:
+            self._refined(self.evaluate(start))
+        done = 1.0
+        while True:
+            done *= 0.7
+            self._report(1 - done)
+            before = self.best.cost
+            self._try(self._additions())
+            if self.best.cost > before - LEAST_IMPROVEMENT:
+                self._try(self._replacements())
+                if self.best.cost > before - LEAST_IMPROVEMENT:
+                    break
+            self._simplify()
+        self._report(1.0)
+        return self.best
+
+    def evaluate(self, candidates: Candidates, near: CandidateSet | None = None) -> CandidateSet:
+        """Return a set, fitted; one that was fitted before is not fitted again."""
+        key = set_key(candidates)
+        if key not in self.evaluated:
+            start = near.fit.amplitudes if near is not None else (
+                self.evaluated[frozenset()].fit.amplitudes if self.evaluated else None)
+            self.evaluated[key] = self._fitted(candidates, start)
+        return self.evaluated[key]
+
+    def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        fit = self.regression.fit(blocks, start)
+        doubtful = self._doubtful_blocks(candidates, fit)
+        if doubtful:
+            fit = self.regression.fit([*blocks, *chain(*doubtful.values())], fit.amplitudes)
+        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+
+    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
+                         ) -> dict[Placement, tuple[Block, ...]]:
+        """Return columns for what effects leave open, in proportion to their fitted force.
+
+        Whether friction follows the loads that an effect adds; and how friction turns over. Each
+        has a coefficient of unit prior.
+        """
+        found = {}
+        for candidate in candidates:
+            for placement in candidate.placements if isinstance(candidate, EffectCandidate) else ():
+                c, blocks = fit.of(placement.block), []
+                if placement.bare is not None:
+                    rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
+                    blocks.append(Block(rows, np.eye(1)))
+                turning = self.library.turning_rows(placement)
+                if turning is not None:
+                    assert placement.drive is not None
+                    blocks.append(Block({placement.drive: np.tensordot(c, turning, 1)},
+                                        np.eye(turning.shape[1])))
+                if blocks:
+                    found[placement] = tuple(blocks)
+        return found
+
+    def _at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
+        """Return a smaller set under the noise of a larger one: what a replacement starts from."""
+        placements = {placement for candidate in candidates
+                      if isinstance(candidate, EffectCandidate)
+                      for placement in candidate.placements}
+        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in placements}
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        fit = self.regression.at([*blocks, *chain(*doubtful.values())], found.fit.amplitudes)
+        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+
+    def price(self, candidates: Candidates, fit: JointFit) -> float:
+        """Return the price of all that was chosen, and of signs that are unphysical."""
+        total = 0.0
+        for candidate in candidates:
+            total += candidate.total_price
+            if isinstance(candidate, EffectCandidate):
+                total += sum(self.library.prices.of_signs(
+                    candidate.effect, placement.values(fit.of(placement.block)))
+                    for placement in candidate.placements)
+        return total
+
+    # Moves
+
+    def _try(self, sets: Iterable[tuple[Candidates, CandidateSet]]) -> None:
+        """Fit sets, each from the noise of a near one, and refine the shapes of the best two."""
+        new = []
+        for candidates, near in sets:
+            if set_key(candidates) not in self.evaluated and self._is_bounded(candidates):
+                new.append(self.evaluate(candidates, near))
+        for found in sorted(new, key=lambda one: one.cost)[:2]:
+            if found.cost < self.best.cost + 4 * self.decisions.rival_margin:
+                self._refined(found)
+
+    @staticmethod
+    def _is_bounded(candidates: Candidates) -> bool:
+        unknown = sum(isinstance(candidate, UnknownCandidate) for candidate in candidates)
+        return unknown <= MOST_UNKNOWN and len(candidates) - unknown <= MOST_EFFECTS
+
+    def _additions(self) -> list[tuple[Candidates, CandidateSet]]:
+        """Return sets with one candidate more, or on more drives, from the best few sets."""
+        found: list[tuple[Candidates, CandidateSet]] = []
+        ranked = sorted(self.evaluated.values(), key=lambda one: one.cost)
+        for rank, base in enumerate(ranked[:int(self.decisions.beam)]):
+            count = int(self.decisions.proposals) if rank == 0 else 2
+            found += [(candidates, base) for candidates in self.proposals(base, count)]
+            if rank == 0:
+                fast = self._with_fast_noise(base)
+                found += [(candidates, fast) for candidates in self.proposals(fast, REPLACEMENTS)]
+                for near in (base, fast) if self.patterns else ():
+                    patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
+                    found += [((*base.candidates, pattern), near) for pattern in patterns]
+        return found
+
+    def _with_fast_noise(self, base: CandidateSet) -> CandidateSet:
+        """Return a set under the noise that the higher frequencies alone would tell.
+
+        The slow part of a noise spectrum may be what is missing. It only proposes.
+        """
+        amplitudes = base.fit.amplitudes.copy()
+        corners = self.regression.noise_shapes.corners
+        amplitudes[:, 1:][:, corners < FAST_SHARE * corners[-1]] *= SLOW_LEFT
+        return replace(base, fit=self.regression.at(base.fit.blocks, amplitudes))
+
+    def proposals(self, base: CandidateSet, count: int, drive: int | None = None,
+                  least: float = PROPOSED) -> list[Candidates]:
+        """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
+
+        Parameters
+        ----------
+        base : CandidateSet
+        count : int
+        drive : int, optional
+            Only effects on this one.
+        least : float
+            By which the cost must fall at the set's noise.
+        """
+        scored: list[tuple[float, Callable[[], Candidates]]] = []
+        for effect, found in self._scan(base, drive).items():
+            old = next((c for c in base.effects if c.effect is effect), None)
+            score, chosen = self._best_drives(effect, found, old)
+            if score > least and chosen:
+                scored.append((score, self._joined(base, effect, chosen, old)))
+        scored.sort(key=lambda one: -one[0])
+        return [make() for _, make in scored[:count]]
+
+    def _scan(self, base: CandidateSet, drive: int | None = None,
+              ) -> dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]]:
+        """Return gains less prices of placements, by effect; one for each drive."""
+        library, fit = self.library, base.fit
+        taken = {(c.effect, placement.drive) for c in base.effects for placement in c.placements}
+        found: dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]] = {}
+        for d, local in library.local.items() if drive is None else [(drive, library.local[drive])]:
+            for offer in local.offers(fit).values():
+                effect = offer.term.effect
+                if (effect, d) not in taken:
+                    price = library.prices.of_placement(effect, local.trials[effect.name])
+                    found.setdefault(effect, []).append(
+                        (offer.gain - price, lambda offer=offer: library.full(offer)))
+        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
+        for placement in (*library.structure, *library.spanning) if drive is None else ():
+            key = (placement.term.effect, placement.drive)
+            if key not in taken:
+                net = library.block_gain(fit, placement.block) - placement.price
+                if key not in best or net > best[key][0]:
+                    best[key] = (net, placement)
+        for (effect, _), (net, placement) in best.items():
+            found.setdefault(effect, []).append((net, lambda placement=placement: placement))
+        return found
+
+    def _best_drives(
+        self, effect: type[CatalogueEffect],
+        found: list[tuple[float, Callable[[], Placement]]], old: EffectCandidate | None,
+    ) -> tuple[float, list[Callable[[], Placement]]]:
+        """Return the drives on which an effect pays, and the score of all together."""
+        prices = self.library.prices
+        found = sorted(found, key=lambda one: -one[0])
+        if not issubclass(effect, DriveEffect):
+            return found[0][0] - prices.of_name(), [found[0][1]]
+        there = len(old.placements) if old else 0
+        before = prices.of_drives(there) if there else -prices.of_name()
+        nets = np.cumsum([net for net, _ in found])
+        scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
+        best = int(np.argmax(scores))
+        return float(scores[best]), [make for _, make in found[:best + 1]]
+
+    def _joined(self, base: CandidateSet, effect: type[CatalogueEffect],
+                chosen: Sequence[Callable[[], Placement]], old: EffectCandidate | None,
+                ) -> Callable[[], Candidates]:
+        def make() -> Candidates:
+            placements = [*(old.placements if old else ()), *(one() for one in chosen)]
+            kept = tuple(c for c in base.candidates if c is not old)
+            return (*kept, self.library.candidate(effect, placements))
+        return make
+
+    def _replacements(self) -> Iterable[tuple[Candidates, CandidateSet]]:
+        """Yield sets in which something else stands for one or two candidates, or for a drive's.
+
+        Under the noise of the best set, so that a replacement that explains as much is seen to.
+        """
+        best = self.best
+        rests: list[tuple[Candidates, int | None]] = []
+        for size in (1, 2):
+            for gone in combinations(best.candidates, size):
+                if size == 1 or any(isinstance(c, EffectCandidate) for c in gone):
+                    rests.append((tuple(c for c in best.candidates if c not in gone), None))
+        for candidate in best.effects:
+            for placement in candidate.placements if len(candidate.placements) > 1 else ():
+                # On one of its drives it may stand for another effect.
+                less = self.library.candidate(candidate.effect, [
+                    one for one in candidate.placements if one is not placement])
+                rests.append((self._exchanged(best, candidate, less), placement.drive))
+        for rest, drive in rests:
+            base = self._at_noise_of(best, rest)
+            least = base.cost - best.cost - REPLACED
+            for candidates in self.proposals(base, REPLACEMENTS, drive, least):
+                yield candidates, best
+        for candidate in best.effects:
+            for other in self._alternatives(candidate):
+                yield self._exchanged(best, candidate, other), best
+
+    def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
+        """Yield the candidate in the shapes that its own is easily taken for."""
+        effect = candidate.effect
+        if not issubclass(effect, DriveEffect) or not effect.shape:
+            return
+        shapes = [effect.alternatives(placement.term.shape) for placement in candidate.placements]
+        for number in range(min(map(len, shapes))):
+            placements = [self.library.placed(
+                effect, placement.drive, others[number], placement.names)
+                for placement, others in zip(candidate.placements, shapes, strict=True)]
+            yield self.library.candidate(effect, placements)
+
+    def _simplify(self) -> None:
+        """Drop candidates and drives, and try variants, as long as that lowers the cost."""
+        while True:
+            best = self.best
+            for candidates in self._simpler(best):
+                self.evaluate(candidates, best)
+            if self.best.cost > best.cost - LEAST_IMPROVEMENT:
+                return
+            self._refined(self.best)
+
+    def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
+        for candidate in best.candidates:
+            if len(best.candidates) > 1:
+                yield tuple(c for c in best.candidates if c is not candidate)
+            if not isinstance(candidate, EffectCandidate):
+                continue
+            effect = candidate.effect
+            if len(candidate.placements) > 1:
+                for gone in candidate.placements:
+                    if self.drop_cost(best, gone) < 3 * self.decisions.rival_margin:
+                        rest = [one for one in candidate.placements if one is not gone]
+                        yield self._exchanged(best, candidate,
+                                              self.library.candidate(effect, rest))
+            for placement in candidate.placements:
+                for names in effect.variants:
+                    # The others take part in every scan.
+                    if names != placement.names and not set(names) <= set(effect.scanned):
+                        other = self.library.placement(placement.term, names)
+                        rest = [one for one in candidate.placements if one is not placement]
+                        yield self._exchanged(best, candidate, self.library.candidate(
+                            effect, [*rest, other]))
+
+    def drop_cost(self, found: CandidateSet, placement: Placement) -> float:
+        """Return by how much the deviance rises without a placement, at the noise of a fit.
+
+        By the Savage-Dickey ratio of prior and posterior density at 0.
+        """
+        if placement.block.is_fixed:
+            return np.inf
+        place = found.fit.places[placement.block]
+        c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
+        return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
+                     + np.linalg.slogdet(placement.block.precision)[1])
+
+    @staticmethod
+    def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
+        return tuple(new if c is old else c for c in found.candidates)
+
+    def _refined(self, found: CandidateSet) -> CandidateSet:
+        """Return the set with all shapes moved by Gauss-Newton steps that lower the cost."""
+        for _ in range(SHAPE_ROUNDS):
+            moved = self._moved(found)
+            if moved is None:
+                return found
+            after = self.evaluate(moved, found)
+            if after.cost > found.cost - LEAST_IMPROVEMENT:
+                return found
+            found = after
+        return found
+
+    def _moved(self, found: CandidateSet) -> Candidates | None:
+        """Return candidates with shapes after one Gauss-Newton step."""
+        slopes = self.slopes(found)
+        if not slopes:
+            return None
+        fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
+                                 found.fit.amplitudes)
+        moved: dict[Placement, Placement] = {}
+        for placement, block in slopes:
+            effect, d = placement.term.effect, placement.drive
+            assert d is not None
+            assert issubclass(effect, DriveEffect)
+            shape = dict(placement.term.shape)
+            reach = self._reach(placement)
+            for parameter, step in zip(effect.shape, fit.of(block), strict=True):
+                limit = reach[parameter.name]
+                value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
+                shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
+            moved[placement] = self.library.placed(effect, d, shape, placement.names)
+        return tuple(
+            self.library.candidate(c.effect, [moved.get(one, one) for one in c.placements])
+            if isinstance(c, EffectCandidate) else c for c in found.candidates)
+
+    def slopes(self, found: CandidateSet) -> list[tuple[Placement, Block]]:
+        """Return derivatives by the shapes of a set, of unit prior, for the placements with any."""
+        slopes = []
+        for candidate in found.effects:
+            for placement in candidate.placements if candidate.effect.shape else ():
+                c = found.coefficients(placement)
+                if placement.names:
+                    every = np.zeros(len(placement.term.names))
+                    every[[placement.term.names.index(name) for name in placement.names]] = c
+                    c = every
+                assert placement.drive is not None
+                rows = self.regression.design.slope_rows(placement.term, c)
+                slopes.append((placement, self.regression.block(
+                    {placement.drive: rows}, precision=np.eye(len(rows)))))
+        return slopes
+
+    def _reach(self, placement: Placement) -> dict[str, float]:
+        """Return how far each shape parameter may move at once: half the way between trials."""
+        effect, d = placement.term.effect, placement.drive
+        assert d is not None
+        assert issubclass(effect, DriveEffect)
+        trials = effect.trials(self.regression.design.covered[d])
+        reach = {}
+        for parameter in effect.shape:
+            value = placement.term.shape[parameter.name]
+            known = np.array(sorted({trial[parameter.name] for trial in trials}))
+            if len(known) < 2:
+                reach[parameter.name] = 0.5
+                continue
+            at = int(np.clip(np.searchsorted(known, value), 1, len(known) - 1))
+            gap = float(known[at] - known[at - 1])
+            reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
+        return reach
