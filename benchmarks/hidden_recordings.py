@@ -204,7 +204,7 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
         'noise': deviation, 'noise_floor': float(np.sqrt(np.mean(place.treat(noise) ** 2))),
         'drive_width': list(place.settings.drive_width),
         'passive_width': place.settings.passive_width,
-        'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.as_data()}
+        'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.to_json()}
     # As it comes back from a file.
     return place.model, recording, json.loads(json.dumps(truth))
 

@@ -91,7 +91,7 @@ def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> di
         start = time.perf_counter()
         diagnosis = diagnose(model, [recording])
         seconds = time.perf_counter() - start
-        said = diagnosis.as_data()
+        said = diagnosis.to_json()
         selector = getattr(diagnosis, 'selector', None)
         oracle = consult(selector, truth) if selector else {}
     except Exception:  # the table counts it, and the run goes on

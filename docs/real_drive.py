@@ -17,11 +17,11 @@ from emps import IDENTIFICATION, PULSES, find_data, read_emps
 from scipy.signal import butter, decimate, filtfilt
 
 from pprs_dynamics import AxisModel, AxisMotion, PprsError
-from pprs_dynamics.diagnosis.adopt import Adoption, adopt
+from pprs_dynamics.adoption.adopt import Adoption, adopt
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.diagnosis.loop import Walk, adopt_all
+from pprs_dynamics.adoption.loop import AdoptionRun, adopt_all
 from pprs_dynamics.residuals.measuring import measure_residuals
-from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 
@@ -103,8 +103,8 @@ class Story:
     diagnosis: Diagnosis
     asymmetric: Adoption
     ripple: Adoption | None
-    blind: Walk
-    gated: Walk
+    blind: AdoptionRun
+    gated: AdoptionRun
 
 
 def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> Story:
@@ -113,7 +113,7 @@ def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> St
     report('diagnosing')
     diagnosis = diagnose(model, [run])
     report('adopting asymmetric_friction')
-    asymmetric = adopt(model, Offer.of('asymmetric_friction'), [run], force=True,
+    asymmetric = adopt(model, EffectRequest.of('asymmetric_friction'), [run], force=True,
                        diagnosis=diagnosis)
     report('the whole loop, gated by blocks')
     blind = adopt_all(model, [run], diagnosis=diagnosis)
@@ -121,7 +121,7 @@ def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> St
     gated = adopt_all(model, [run], [pulses], diagnosis=diagnosis)
     report('offering a screw ripple')
     try:
-        ripple = adopt(gated.model, Offer.of('force_ripple'), [run], [pulses])
+        ripple = adopt(gated.model, EffectRequest.of('force_ripple'), [run], [pulses])
     except PprsError as error:
         report(str(error))
         ripple = None
@@ -175,7 +175,7 @@ def document(story: Story) -> str:
     return '\n'.join(lines) + '\n\n![Error over velocity and over time](images/real_drive.png)\n'
 
 
-def _ending(walk: Walk) -> str:
+def _ending(walk: AdoptionRun) -> str:
     steps = ', '.join(step.effect for step in walk.adopted) or 'nothing'
     return f'{steps} adopted; ended {walk.ended}: {walk.reason}.'
 

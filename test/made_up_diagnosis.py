@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.diagnosis.adoption import Calibration, Estimate
+from pprs_dynamics.selection.estimates import Calibration, Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect
 from pprs_dynamics.residuals.residuals import Residuals
-from pprs_dynamics.diagnosis.wording import Statement
+from pprs_dynamics.diagnosis.statements import Statement
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.mechanism.robot import DRIVES
 

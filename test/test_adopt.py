@@ -23,11 +23,11 @@ from node_bench import bench
 from ros_processes import environment, executable, node_process
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.diagnosis import loop, objections
-from pprs_dynamics.diagnosis.adopt import Adoption, adopt
+from pprs_dynamics.adoption import loop, objections
+from pprs_dynamics.adoption.adopt import Adoption, adopt
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.residuals.measuring import measure_residuals
-from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
@@ -149,7 +149,7 @@ def test_a_step_taken_back_gives_the_old_file_to_the_byte(files: Files) -> None:
 
 
 def offered(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
-    return adopt(DriveModel.load(files.model), Offer.of(text), files.recordings[:1], validation,
+    return adopt(DriveModel.load(files.model), EffectRequest.of(text), files.recordings[:1], validation,
                  diagnosis=files.diagnosis, **options)
 
 
@@ -200,7 +200,7 @@ def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Reco
 def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
     model, recording = synthetic({}, **{
         'effects.active': [HIDDEN], f'effects.{HIDDEN}.slide_1.force': 0.4})
-    answer = adopt(model, Offer.of(f'{HIDDEN}:lift_2'), [recording])
+    answer = adopt(model, EffectRequest.of(f'{HIDDEN}:lift_2'), [recording])
     assert not answer.adopted
     assert f'the recordings show {HIDDEN} on slide_1, not on lift_2' in answer.reason
 
@@ -211,19 +211,19 @@ LESS = {f'effects.load_friction.lift_{k}.coefficient': -0.1 for k in (1, 2, 3)}
 def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     hidden = {'effects.active': ['load_friction'], **LESS}
     model, recording = synthetic({}, **hidden)
-    answer = adopt(model, Offer.of('load_friction'), [recording])
+    answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert not answer.adopted
     assert 'would push along the motion' in answer.reason
     rough = {'friction.drives.coulomb': [0.05, 0.05, 0.05, 0.2, 0.2, 0.2]}
     model, recording = synthetic(rough, **rough, **hidden)
-    answer = adopt(model, Offer.of('load_friction'), [recording])
+    answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert answer.adopted, answer.reason
     assert answer.parameters['lift_1.coefficient'].value == pytest.approx(-0.1, rel=0.05)
 
 
 def test_where_nothing_is_missing_nothing_is_added() -> None:
     model, recording = synthetic({})
-    answer = adopt(model, Offer.of('platform_inertia'), [recording])
+    answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
     assert not answer.adopted
     assert 'do not call for it' in answer.reason
 
@@ -380,9 +380,9 @@ def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> N
 
 
 def test_an_offer_is_read_in_one_way() -> None:
-    offer = Offer.of('coulomb_friction: lift_2,slide_1,lift_2')
+    offer = EffectRequest.of('coulomb_friction: lift_2,slide_1,lift_2')
     assert offer.drives == ('slide_1', 'lift_2')
-    assert replace(offer, drives=None) == Offer.of('coulomb_friction')
+    assert replace(offer, drives=None) == EffectRequest.of('coulomb_friction')
 
 
 @pytest.mark.parametrize(('text', 'named'), [('coulomb_friction:slide_1,lift_1', 'slide_1'),
@@ -396,6 +396,6 @@ def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence(text: str, n
     noise = 0.05 * np.random.default_rng(1).normal(size=(2000, 6))
     recording = Recording.from_arrays('heave', time, forces.mechanism.position, None,
                                       forces.total + noise)
-    answer = adopt(model, Offer.of(text), [recording])
+    answer = adopt(model, EffectRequest.of(text), [recording])
     assert not answer.adopted
     assert f'{named} hardly moved in the recordings' in answer.reason

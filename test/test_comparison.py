@@ -18,7 +18,7 @@ from pprs_dynamics.diagnosis.noise import (
     fit_noise,
     unrepeated,
 )
-from pprs_dynamics.diagnosis.profiles import error_profile, error_spectrum
+from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
 
 PERIOD = 0.01

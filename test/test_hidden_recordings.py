@@ -121,7 +121,7 @@ class Answer:
     def __init__(self, data: dict[str, Any]) -> None:
         self.data = data
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         return self.data
 
 

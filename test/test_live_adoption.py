@@ -24,8 +24,8 @@ from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from pprs_dynamics.diagnosis.adopt import adopt
-from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.adoption.adopt import adopt
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.model_file import read_parameters
@@ -53,7 +53,7 @@ class Robot:
     def __init__(self, score: ModuleType, folder: Path) -> None:
         robot = score.Robot(score.Case('effects', (HIDDEN,), 7, 3.0, width=1.0))
         first, self.replayed = robot.recordings()
-        answer = adopt(robot.model, Offer.of(HIDDEN), [first])
+        answer = adopt(robot.model, EffectRequest.of(HIDDEN), [first])
         assert answer.adopted, answer.reason
         self.noise = robot.noise
         self.before, self.after = folder / 'before.yaml', folder / 'after.yaml'

@@ -14,7 +14,7 @@ from ros_processes import environment, executable
 from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
 from pprs_dynamics.regression.design import Design, sensitivities_of
 from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.trial import Offer, OfferError
+from pprs_dynamics.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.measurement.reconstruction import reconstruct
 from pprs_dynamics.measurement.recording import Recording, write_recording
@@ -208,10 +208,10 @@ def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None
 
 
 def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:
-    with pytest.raises(OfferError, match='payload_mass does not act in a single axis'):
-        Offer.of('payload_mass').require_place(build_model(VALUES))
-    with pytest.raises(OfferError, match='one of axis'):
-        Offer.of('viscous_friction:lift_1', (AXIS,))
+    with pytest.raises(EffectRequestError, match='payload_mass does not act in a single axis'):
+        EffectRequest.of('payload_mass').require_place(build_model(VALUES))
+    with pytest.raises(EffectRequestError, match='one of axis'):
+        EffectRequest.of('viscous_friction:lift_1', (AXIS,))
 
 
 def test_compare_tells_the_error_of_the_axis(folder: Path) -> None:

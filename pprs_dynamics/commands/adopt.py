@@ -18,8 +18,8 @@ from pprs_dynamics.commands.recordings import (
     read_validation,
     show_findings,
 )
-from pprs_dynamics.diagnosis.adopt import adopt
-from pprs_dynamics.diagnosis.trial import Offer
+from pprs_dynamics.adoption.adopt import adopt
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_page import adoption_page
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     base = check_output(options.output, options.model)
     model = load_model(base)
-    offer = Offer.of(options.effect, model.drives)
+    offer = EffectRequest.of(options.effect, model.drives)
     offer.require_place(model)
     recordings = read_all(options, screen, model.drives)
     validation = read_validation(options, screen, model.drives)
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
                        lambda share: progress(share, 1.0))
     screen.print(adoption_view(answer))
     if options.json:
-        write_json(options.json, answer.as_data())
+        write_json(options.json, answer.to_json())
     if options.report:
         page = adoption_page(answer, recordings, validation)
         screen.print(f'page: {escape(str(page.write(options.report)))}')

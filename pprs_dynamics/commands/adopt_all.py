@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from pprs_dynamics.commands.ledger_entry import Book, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.diagnosis.loop import REFUSED, adopt_all
+from pprs_dynamics.adoption.loop import REFUSED, adopt_all
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_writer import write_model
@@ -41,7 +41,7 @@ def adopt_what_was_found(
         screen.print(adoption_view(step))
     screen.print(f'[bold]{walk.ended}[/]: {escape(walk.reason)}')
     if options.json:
-        write_json(options.json, {**diagnosis.as_data(), 'adoption': walk.as_data()})
+        write_json(options.json, {**diagnosis.to_json(), 'adoption': walk.to_json()})
     if walk.adopted or walk.ended != REFUSED:
         write_model(options.output, walk.model.values, base)
         count = len(walk.adopted)

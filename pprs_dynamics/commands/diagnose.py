@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     words = word_diagnosis(diagnosis)
     screen.print(diagnosis_view(diagnosis, words))
     if options.json:
-        write_json(options.json, diagnosis.as_data())
+        write_json(options.json, diagnosis.to_json())
     if options.report:
         with progress_bar(screen, 'page') as progress:
             after, _ = measure_residuals(diagnosis.adopted, recordings, progress)

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
         return 1
     screen.print(history_view(steps))
     if options.json:
-        write_json(options.json, {'steps': [step.as_data() for step in steps]})
+        write_json(options.json, {'steps': [step.to_json() for step in steps]})
     if options.report and options.report.endswith('.png'):
         screen.print(f'picture: {escape(str(draw_history(options.report, steps)))}')
     elif options.report:

@@ -10,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 
 from pprs_dynamics import __version__
-from pprs_dynamics.diagnosis.adopt import Adoption
-from pprs_dynamics.diagnosis.paired_errors import rms_by_drive
+from pprs_dynamics.adoption.adopt import Adoption
+from pprs_dynamics.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording

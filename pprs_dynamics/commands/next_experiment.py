@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     write_poses(options.output, motion)
     screen.print(experiment_view(experiment))
     if options.json:
-        write_json(options.json, {**experiment.as_data(), 'purpose': options.purpose,
+        write_json(options.json, {**experiment.to_json(), 'purpose': options.purpose,
                                   'seed': options.seed, 'rate': options.rate,
                                   'output': options.output})
     if options.report:

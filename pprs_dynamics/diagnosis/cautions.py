@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.noise import effective_samples
-from pprs_dynamics.diagnosis.scan import Scan
-from pprs_dynamics.diagnosis.selection import Selection, Selector
 from pprs_dynamics.regression.design import Design
+from pprs_dynamics.selection.candidates import CandidateSet
+from pprs_dynamics.selection.search import Search
 
 if TYPE_CHECKING:
     from pprs_dynamics.diagnosis.found_effects import FoundEffect
@@ -24,22 +22,22 @@ FILTERED = 0.05  # high frequencies of the effort over those of white noise
 
 
 def find_cautions(
-    design: Design, regression: Regression, selector: Selector, selection: Selection,
-    effects: Sequence[FoundEffect],
+    search: Search, best: CandidateSet, effects: Sequence[FoundEffect],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
-    return (*_length(design, regression, selection), *_motion(design),
-            *_filtered(design), *_unexcited(selector, selection), *_bounds(effects))
+    return (*_length(search, best), *_motion(search.design), *_filtered(search.design),
+            *_unexcited(search, best), *_bounds(effects))
 
 
-def _length(design: Design, regression: Regression, selection: Selection) -> list[str]:
+def _length(search: Search, best: CandidateSet) -> list[str]:
+    design, regression = search.design, search.regression
     residuals = design.residuals
     duration = len(residuals) * residuals.period
     if duration < SHORT:
         return [f'the recordings last {duration:.3g} s together: too short to tell effects from '
                 'slow noise; record at least 20 s']
-    worth = {d: effective_samples(noise, int(regression.series[d].known.sum()))
-             for d, noise in selection.fit.noises.items()}
+    worth = {d: noise.effective_samples(int(regression.series[d].known.sum()))
+             for d, noise in regression.noise(best.fit).items()}
     poor = [design.drives[d] for d, count in worth.items() if count < FEW_SAMPLES]
     if poor:
         least = min(worth.values())
@@ -90,14 +88,14 @@ def _filtered(design: Design) -> list[str]:
             'time_delay and hysteresis that are the filter\'s']
 
 
-def _unexcited(selector: Selector, selection: Selection) -> list[str]:
+def _unexcited(search: Search, best: CandidateSet) -> list[str]:
     """Return effects that this motion would not show even at a size that matters."""
-    scan = Scan(selector.library, (), selection.fit.noises)
+    regression = search.regression
     weak = []
-    for term in selector.library.structure:
-        S, _, _ = scan.projected(term.rows)
+    for term in search.design.structure:
+        own = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])
-        sizes = np.diag(S) * scales ** 2
+        sizes = np.diag(own) * scales ** 2
         if np.any(sizes < UNEXCITED):
             names = [c.name for c, size in zip(term.effect.coefficients, sizes, strict=True)
                      if size < UNEXCITED]

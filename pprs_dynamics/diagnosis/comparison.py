@@ -9,21 +9,13 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.localisation import MOST_SAMPLES, Localisation, localise
-from pprs_dynamics.diagnosis.noise import (
-    effective_samples,
-    find_repetition,
-    fit_noise,
-    unrepeated,
-)
-from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.residuals.residuals import Residuals
 
 # What is left beyond noise is nothing to speak of below this share of the noise itself: the
 # noise is known to about a tenth, and sqrt(1.1^2 - 1) = 0.46.
 NOISE_SHARE = 0.46
 GOOD, POOR = 0.05, 0.2  # relative unexplained error below which a model is good, above poor
-LEAST_TO_FIT = 50  # samples for a noise model
 # Of the effort's size, below which a changing effort is rounding.
 CONSTANT = 1e-9
 
@@ -48,7 +40,7 @@ class DriveComparison:
     effective_samples : float
         Independent samples whose mean would be as uncertain.
     noise_floor : float
-        rms of what neither repeats nor depends on anything known [N].
+        rms of the noise: of the spectrum that is fitted beside all patterns [N].
     unexplained : float
         Root of rms squared minus noise floor squared [N].
     parts : mapping of str to float
@@ -113,7 +105,6 @@ def compare(residuals: Residuals, localisation: Localisation | None = None) -> C
         Its result where it is known already; what it finds is not noise.
     """
     where = localisation or localise(residuals)
-    repetition = _repetition(residuals)
     drives: dict[str, DriveComparison] = {}
     squares = efforts = 0.0
     count = 0
@@ -123,7 +114,7 @@ def compare(residuals: Residuals, localisation: Localisation | None = None) -> C
             continue
         error = residuals.error[known, index]
         effort = residuals.measured[known, index]
-        drives[name] = _compare_drive(residuals, index, name, where, repetition)
+        drives[name] = _compare_drive(residuals, index, name, where)
         squares += float(error @ error)
         efforts += float(np.sum((effort - effort.mean()) ** 2))
         count += len(error)
@@ -135,7 +126,7 @@ def compare(residuals: Residuals, localisation: Localisation | None = None) -> C
 
 
 def _compare_drive(
-    residuals: Residuals, index: int, name: str, where: Localisation, repetition: int | None,
+    residuals: Residuals, index: int, name: str, where: Localisation,
 ) -> DriveComparison:
     known = np.isfinite(residuals.measured[:, index])
     error, effort = residuals.error[known, index], residuals.measured[known, index]
@@ -144,58 +135,22 @@ def _compare_drive(
     constant = swing <= CONSTANT * max(float(np.abs(effort).max()), CONSTANT)
     relative = float('nan') if constant else rms / swing
     explained = float('nan') if constant else 1 - float(np.var(error)) / swing ** 2
-    floor = _noise_floor(residuals, index, name, where, repetition, rms)
+    findings = where.drives.get(name)
+    noise = findings.noise if findings is not None else None
+    level = next((one for one in findings.statements if one.kind == 'level'), None) if (
+        findings is not None) else None
+    floor = rms if noise is None else min(rms, noise.rms_at(residuals.period))
+    if level is not None:
+        floor = float(np.sqrt(max(floor ** 2 - level.mean_square, 0.0)))
     unexplained = float(np.sqrt(max(rms ** 2 - floor ** 2, 0.0)))
     parts = {part: _rms(values[known, index] - values[known, index].mean())
              for part, values in residuals.parts.items()}
     grade = _grade(unexplained, floor, swing, constant, parts)
     return DriveComparison(
         rms, relative, bias, peak, swing, explained, len(error),
-        _effective(residuals, index), floor, unexplained, parts, grade,
+        float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
+        unexplained, parts, grade,
         f'{name}: {_verdict(rms, swing, relative, floor, unexplained, parts, grade)}')
-
-
-def _effective(residuals: Residuals, index: int) -> float:
-    error = residuals.error[:, index]
-    known = int(np.isfinite(error).sum())
-    if known < LEAST_TO_FIT or not error[np.isfinite(error)].any():
-        return float(known)
-    search = DriveSearch(residuals, index)
-    return min(effective_samples(fit_noise(search.error, search.stretches), known), float(known))
-
-
-def _noise_floor(
-    residuals: Residuals, index: int, name: str, where: Localisation, repetition: int | None,
-    rms: float,
-) -> float:
-    """Return the rms of what does not repeat; without a repetition, of what nothing explains.
-
-    What the search for patterns leaves is an upper bound (a pattern too weak to stand out counts
-    as noise), what does not repeat a lower one (noise slower than the repetition is missed).
-    """
-    floor = rms
-    findings = where.drives.get(name)
-    if findings is not None and findings.statements:
-        # Averaging over thinned samples has taken white noise out of what remains; what was
-        # explained has not changed by it.
-        thin = residuals.thinned(MOST_SAMPLES)
-        before = thin.error[findings.index, index]
-        known = np.isfinite(before)
-        gone = _rms(before[known]) ** 2 - _rms(findings.remaining[known]) ** 2
-        floor = float(np.sqrt(max(rms ** 2 - max(gone, 0.0), 0.0)))
-    if repetition is not None:
-        error = residuals.error[:, index]
-        if np.isfinite(error[repetition:] - error[:-repetition]).sum() >= LEAST_TO_FIT:
-            floor = min(floor, unrepeated(error, repetition))
-    return floor
-
-
-def _repetition(residuals: Residuals) -> int | None:
-    position = residuals.variables.get('position')
-    one = bool(np.all(residuals.segment == residuals.segment[0]))
-    if position is None or not one or len(position) < LEAST_TO_FIT:
-        return None
-    return find_repetition(position.reshape(len(position), -1))
 
 
 def _grade(

@@ -3,34 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.adoption import (
-    Calibration,
-    calibrations,
-    contributed_force,
-    estimate_all,
-    estimate_present,
-    fitted_model,
-)
 from pprs_dynamics.diagnosis.cautions import find_cautions
-from pprs_dynamics.diagnosis.form import form_allowance
-from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, joined, listed
-from pprs_dynamics.diagnosis.joint_fit import JointFit, Regression
-from pprs_dynamics.diagnosis.judging import Judged, actives_of
-from pprs_dynamics.diagnosis.paired_errors import rms
-from pprs_dynamics.diagnosis.selection import Selector
-from pprs_dynamics.diagnosis.stages import Stage, Way, find_way
-from pprs_dynamics.diagnosis.unexplained import Unexplained, allowed_by_model, find_unexplained
-from pprs_dynamics.diagnosis.wording import Statement
+from pprs_dynamics.diagnosis.found_effects import (
+    FoundEffect,
+    RankedEffect,
+    RankedSet,
+    WithinModelError,
+)
+from pprs_dynamics.diagnosis.localisation import levels
+from pprs_dynamics.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.residuals.paired_errors import rms
 from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.selection.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.selection.decisions import DECISIONS, Decisions
+from pprs_dynamics.selection.estimates import Calibration, calibrations, estimate
+from pprs_dynamics.selection.expansion import (
+    Selection,
+    exact_forces,
+    fitted_model,
+    linear_prediction,
+    select,
+)
+from pprs_dynamics.selection.form import Remainder, without_remainders
+from pprs_dynamics.selection.held_out import hold_out
+from pprs_dynamics.selection.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.selection.search import Search
+
+MOST_SETS = 8  # that are told with their costs
+SURE = 2.0  # standard deviations by which a number must have moved to be told
 
 
 @dataclass(frozen=True)
@@ -41,14 +51,15 @@ class Diagnosis:
     ----------
     verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
     effects : tuple of FoundEffect
-        In the order of adoption.
+        Those with most evidence first.
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
     candidates, suspects : tuple of RankedEffect
     depends_on : tuple of Statement
         What no effect explains.
-    of_form : tuple of Statement
-        Remainders that are the form of an adopted effect.
+    within_model_error : tuple of WithinModelError
+    sets : tuple of RankedSet
+        The best sets of the search, the best first.
     calibrated : tuple of Calibration
         Numbers that moved within their tolerances.
     warnings, notes : tuple of str
@@ -59,12 +70,18 @@ class Diagnosis:
     residuals : Residuals
         Of the model as given.
     remaining : (M, D) array
-        What is left with the effects [N].
+        What `adopted` leaves [N].
+    noise : mapping of str to NoiseSpectrum
+        By drive.
+    noise_floors : mapping of str to float
+        Root of the mean square of the noise of each drive [N].
     noise_floor : float
-        Root of the mean square of the noise, over drives [N].
+        The same over drives [N].
     held_out_on : {'blocks', 'validation'}
-    selector : Selector, optional
-        The columns and fits of the first search, for looking closer.
+    selection : Selection, optional
+        The searches, for looking closer.
+    chosen : CandidateSet, optional
+        What was adopted of them.
     """
 
     verdict: str
@@ -73,7 +90,8 @@ class Diagnosis:
     candidates: tuple[RankedEffect, ...]
     suspects: tuple[RankedEffect, ...]
     depends_on: tuple[Statement, ...]
-    of_form: tuple[Statement, ...]
+    within_model_error: tuple[WithinModelError, ...]
+    sets: tuple[RankedSet, ...]
     calibrated: tuple[Calibration, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
@@ -81,32 +99,35 @@ class Diagnosis:
     adopted: ForceModel
     residuals: Residuals
     remaining: Array
+    noise: dict[str, NoiseSpectrum]
+    noise_floors: dict[str, float]
     noise_floor: float
     held_out_on: str = 'blocks'
-    selector: Selector | None = field(default=None, repr=False, compare=False)
+    selection: Selection | None = field(default=None, repr=False, compare=False)
+    chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the JSON of the interface, and what the README adds to it."""
         return {
             'verdict': self.verdict,
-            'effects': [one.as_data() for one in self.effects],
+            'effects': [one.to_json() for one in self.effects],
             'indistinguishable': [list(names) for names in self.indistinguishable],
-            'candidates': [one.as_data() for one in self.candidates],
+            'candidates': [one.to_json() for one in self.candidates],
             'depends_on': [
                 {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
                  'range': None if s.range is None else list(s.range), 'text': s.text}
                 for s in self.depends_on],
-            'suspects': [{'name': s.name, 'drives': listed(s.drives), 'evidence': s.evidence}
+            'suspects': [{key: value for key, value in s.to_json().items() if key != 'error_after'}
                          for s in self.suspects],
-            'calibrated': [{'key': c.label, 'before': c.before, 'after': c.after, 'std': c.std,
-                            'unit': c.unit} for c in self.calibrated],
+            'sets': [one.to_json() for one in self.sets],
+            'calibrated': [one.to_json() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
-            'warnings': list(self.warnings)}
+            'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
 
 def diagnose(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
@@ -119,6 +140,7 @@ def diagnose(
         Never fitted: held-out errors are taken on them, instead of on blocks.
     progress : callable, optional
         Called with the share of the work that is done.
+    decisions : Decisions, optional
 
     Raises
     ------
@@ -126,104 +148,167 @@ def diagnose(
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    way = find_way(model, recordings, lambda share: report(0.85 * share))
-    first, bent, stage = way.first, way.bent, way.last
-    early = _effects_of(first, bent, validate) if bent else []
-    allowed = sum((form_allowance(one.effect, one.force) for one in early),
-                  allowed_by_model(first.design))
-    unexplained = find_unexplained(stage.selector, stage.selection, allowed)
-    report(0.95)
-    return _answer(way, early, unexplained, validate)
+    selection = select(model, recordings, decisions, lambda share: report(0.9 * share))
+    diagnosis = _Answer(selection, recordings, validate, decisions).diagnosis()
+    report(1.0)
+    return diagnosis
 
 
-def _answer(way: Way, early: list[FoundEffect], unexplained: Unexplained,
-            validate: Sequence[Recording]) -> Diagnosis:
-    first, stage = way.first, way.last
-    regression, fit = stage.regression, stage.selection.fit
-    known = {one.candidate.name for one in way.bent}
-    late = _effects_of(stage, sorted(
-        stage.selection.adopted, key=lambda one: one.candidate.name not in known), validate)
-    for k, one in enumerate(early):
-        early[k] = replace(one, parameters=estimate_present(regression, fit, one.name).parameters)
-    if early and late:
-        late[0] = replace(late[0], error_before=early[-1].error_after,
-                          held_out_before=early[-1].held_out_after)
-    elif late and stage is not first:
-        error, held_out = _errors_as_given(first, validate)
-        late[0] = replace(late[0], error_before=error, held_out_before=held_out)
-    drives = first.design.drives
-    effects = joined(early, late, drives)
-    sets = tuple((name, *others) for name, others in way.rivals.items() if others)
-    verdict = ('unknown' if unexplained.statements else 'ambiguous' if sets
-               else 'effect' if effects else 'adequate')
-    moved = [c for c in calibrations(regression, fit, first.design.model)
-             if abs(c.after - c.before) > 2 * c.std]
-    noise = np.concatenate([rest[regression.series[d].known] for d, rest in fit.rest.items()])
-    return Diagnosis(
-        verdict, tuple(effects), sets,
-        tuple(_ranked(one, drives, first.regression) for one in first.selection.candidates),
-        tuple(_ranked(one, drives, regression) for one in stage.selection.suspects),
-        unexplained.statements, unexplained.of_form, tuple(moved),
-        find_cautions(stage.design, regression, stage.selector, stage.selection, effects),
-        first.design.notes, first.design.model, fitted_model(regression, fit),
-        first.design.residuals, unexplained.remaining, float(np.sqrt(np.mean(noise ** 2))),
-        'validation' if validate else 'blocks', first.selector)
+class _Answer:
+    """Turns a selection into an answer."""
+
+    def __init__(self, selection: Selection, recordings: Sequence[Recording],
+                 validate: Sequence[Recording], decisions: Decisions) -> None:
+        self.selection, self.decisions = selection, decisions
+        self.recordings, self.validate = recordings, validate
+        self.search: Search = selection.last
+        self.design = self.search.design
+        self.best = selection.best
+        self.kept, self.remainders = without_remainders(self.search, self.best)
+        self.drives = self.design.drives
+
+    def diagnosis(self) -> Diagnosis:
+        search, regression = self.search, self.search.regression
+        first = self.selection.first.design
+        widths = estimate_widths(search, self.kept)
+        adopted = with_widths(fitted_model(self.design, self.kept), self.design, widths)
+        remaining = first.residuals.measured - exact_forces(self.design, adopted, self.recordings)
+        noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
+        floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
+                  for d in regression.drives}
+        rivals = self._rivals()
+        depends = self._depends_on(noise)
+        sets = tuple((name, *others) for name, others in rivals.items() if others)
+        effects = self._effects(remaining)
+        verdict = ('unknown' if depends else 'ambiguous' if sets
+                   else 'effect' if effects else 'adequate')
+        moved = [one for one in calibrations(search, self.kept, widths)
+                 if abs(one.after - one.before) > SURE * one.std]
+        return Diagnosis(
+            verdict, tuple(effects), sets, self._candidates(), self._suspects(), depends,
+            tuple(self._within_model_error(one) for one in self.remainders), self._sets(),
+            tuple(moved), find_cautions(search, self.best, effects), first.notes,
+            first.given, adopted, first.residuals, remaining, noise, floors,
+            float(np.sqrt(np.mean(np.square(list(floors.values()))))),
+            'validation' if self.validate else 'blocks', self.selection, self.kept)
+
+    def _effects(self, remaining: Array) -> list[FoundEffect]:
+        """Return what is adopted, with the errors as one after the other is added."""
+        search = self.search
+        evidence = {c: self._without(c).cost - self.kept.cost for c in self.kept.effects}
+        ordered = sorted(self.kept.effects, key=lambda c: -evidence[c])
+        if not ordered:
+            return []
+        unknown = self.kept.unknowns
+        steps = [search.evaluate((*ordered[:k], *unknown), self.kept)
+                 for k in range(len(ordered))] + [self.kept]
+        errors = [_rms(self.selection.first.design.residuals.error),
+                  *(_rms(search.regression.residuals.measured - linear_prediction(search, step))
+                    for step in steps[1:-1]), _rms(remaining)]
+        if self.validate:
+            given = self.selection.first.design.given
+            models = [given, *(fitted_model(self.design, step) for step in steps[1:])]
+            held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
+        else:
+            held_out = [hold_out(search, step).error for step in steps]
+        near = [one for one in search.evaluated.values()
+                if one.cost < self.best.cost + self.decisions.rival_margin]
+        found = []
+        for k, candidate in enumerate(ordered):
+            said = estimate(search, self.kept, candidate, near)
+            found.append(FoundEffect(
+                candidate.effect, self._names(candidate), said.parameters, evidence[candidate],
+                errors[k], errors[k + 1], held_out[k], held_out[k + 1],
+                self.kept.force(candidate, remaining.shape), said.at_bound))
+        return found
+
+    def _without(self, candidate: Candidate) -> CandidateSet:
+        return self.search.evaluate(tuple(c for c in self.kept.candidates if c is not candidate),
+                                    self.kept)
+
+    def _rivals(self) -> dict[str, list[str]]:
+        """Return, for each adopted effect, what stands for it in sets that are nearly as good."""
+        mine = {c.name for c in self.kept.effects}
+        ignored = {one.candidate.name for one in self.remainders}
+        rivals: dict[str, list[str]] = {name: [] for name in mine}
+        for other in self.selection.ranked:
+            if other.cost > self.best.cost + self.decisions.rival_margin:
+                break
+            theirs = {c.name for c in other.effects} - ignored
+            missing, instead = mine - theirs, theirs - mine
+            for name in missing:
+                rivals[name] += [one for one in sorted(instead) if one not in rivals[name]]
+        return rivals
+
+    def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
+        statements = []
+        libraries = {library.d: library for library in self.search.patterns}
+        for candidate in self.kept.unknowns:
+            evidence = self._without(candidate).cost - self.kept.cost
+            for d, block in candidate.parts.items():
+                statements.append(word_statement(
+                    self.drives[d], libraries[d], candidate, self.kept.fit.of(block), evidence,
+                    ()))
+        statements += levels(self.search.regression.residuals, dict(noise),
+                             self.decisions).values()
+        return tuple(sorted(statements, key=lambda one: -one.evidence))
+
+    def _candidates(self) -> tuple[RankedEffect, ...]:
+        """Return the effects that were fitted as the only one, the best first."""
+        search = self.selection.first
+        none = search.evaluated[frozenset()]
+        best: dict[str, CandidateSet] = {}
+        for one in search.evaluated.values():
+            if len(one.candidates) == 1 and one.effects:
+                name = one.effects[0].name
+                if name not in best or one.cost < best[name].cost:
+                    best[name] = one
+        return tuple(sorted((self._ranked(search, one, one.effects[0], none.cost - one.cost)
+                             for one in best.values()), key=lambda one: -one.evidence))
+
+    def _suspects(self) -> tuple[RankedEffect, ...]:
+        """Return effects that nearly pay beside those adopted: slow noise would do as well."""
+        mine = {c.key for c in self.best.candidates}
+        found: dict[str, RankedEffect] = {}
+        for one in self.search.evaluated.values():
+            more = [c for c in one.effects if c.key not in mine]
+            behind = one.cost - self.best.cost
+            if (len(more) == 1 and len(one.candidates) == len(mine) + 1
+                    and 0 < behind < self.decisions.rival_margin / 2
+                    and more[0].name not in {c.name for c in self.best.effects}):
+                ranked = self._ranked(self.search, one, more[0], -behind)
+                if more[0].name not in found or found[more[0].name].evidence < ranked.evidence:
+                    found[more[0].name] = ranked
+        return tuple(sorted(found.values(), key=lambda one: -one.evidence))
+
+    def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
+                evidence: float) -> RankedEffect:
+        error = _rms(search.regression.residuals.measured - linear_prediction(search, found))
+        return RankedEffect(candidate.name, self._names(candidate), evidence, error)
+
+    def _sets(self) -> tuple[RankedSet, ...]:
+        found: dict[frozenset[str], RankedSet] = {}
+        for one in self.selection.ranked:
+            names = tuple((c.name, self._names(c)) for c in one.candidates)
+            key = frozenset(name for name, _ in names)
+            if key not in found:
+                found[key] = RankedSet(names, one.cost - self.best.cost)
+            if len(found) == MOST_SETS:
+                break
+        return tuple(found.values())
+
+    def _within_model_error(self, remainder: Remainder) -> WithinModelError:
+        force = remainder.found.force(remainder.candidate, self.design.residuals.measured.shape)
+        return WithinModelError(
+            remainder.candidate.name, self._names(remainder.candidate),
+            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+
+    def _names(self, candidate: Candidate) -> tuple[str, ...] | None:
+        drives = candidate.drives
+        return None if drives is None else tuple(self.drives[d] for d in drives)
 
 
-def _errors_as_given(first: Stage, validate: Sequence[Recording]) -> tuple[float, float]:
-    """Return the error of the model as given, and the one on what it was not fitted to [N]."""
-    error = first.regression.error((), np.zeros(len(first.design.base)))
-    if validate:
-        return error, rms(measure_residuals(first.design.model, validate)[0])
-    return error, first.regression.held_out_error((), first.selection.fit.noises)
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.nanmean(values ** 2)))
 
 
-def _effects_of(stage: Stage, adopted: Sequence[Judged], validate: Sequence[Recording],
-                ) -> list[FoundEffect]:
-    """Return what a stage adopted, with the errors as one after the other is added."""
-    design, regression, fit = stage.design, stage.regression, stage.selection.fit
-    drives, base = design.drives, len(design.base)
-    steps = [_fit_of_first(stage, adopted, k) for k in range(len(adopted) + 1)]
-    errors = [regression.error((), np.zeros(base)),
-              *(regression.error(step.active, step.coefficients) for step in steps[1:])]
-    if validate:
-        models = [design.model, *(fitted_model(regression, step) for step in steps[1:])]
-        held_out = [rms(measure_residuals(one, validate)[0]) for one in models]
-    else:
-        held_out = [regression.held_out_error(step.active, step.noises) for step in steps]
-    places: dict[int, tuple[int, int]] = {}
-    place = base
-    for number, active in enumerate(fit.active):
-        places[id(active)] = (place, number)
-        place += active.size
-    estimates = estimate_all(regression, fit)
-    effects = []
-    for k, one in enumerate(adopted):
-        mine = [estimates[places[id(active)][1]] for active in one.candidate.active]
-        own = np.concatenate([fit.coefficients[places[id(active)][0]:][:active.size]
-                              for active in one.candidate.active])
-        effects.append(FoundEffect(
-            one.candidate.effect, _names(one, drives),
-            {key: value for found in mine for key, value in found.parameters.items()},
-            one.evidence, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-            contributed_force(design, one.candidate.active, own),
-            tuple(key for found in mine for key in found.at_bound)))
-    return effects
-
-
-def _fit_of_first(stage: Stage, adopted: Sequence[Judged], count: int) -> JointFit:
-    """Return the fit of the first adopted effects."""
-    selection = stage.selection
-    if count == len(selection.adopted):
-        return selection.fit
-    return stage.regression.fit(actives_of(adopted[:count]), selection.fit.noises, iterations=1)
-
-
-def _ranked(one: Judged, drives: tuple[str, ...], regression: Regression) -> RankedEffect:
-    return RankedEffect(one.candidate.name, _names(one, drives), one.evidence,
-                        regression.error(one.fit.active, one.fit.coefficients))
-
-
-def _names(one: Judged, drives: tuple[str, ...]) -> tuple[str, ...] | None:
-    found = one.candidate.drives
-    return None if found is None else tuple(drives[d] for d in sorted(found))

@@ -1,13 +1,15 @@
-"""What a diagnosis says of one effect: found, or ranked among the candidates."""
+"""Parts of a diagnosis: effects that were found, ranked sets, and what is within model error."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.adoption import Estimate
 from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.selection.estimates import Estimate
+
+Drives = tuple[str, ...] | None
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class FoundEffect:
         On which it sits; None for the structure.
     parameters : dict of str to Estimate
     evidence : float
-        Twice the gain in log-likelihood, less penalty and margin.
+        By which the cost of the best set rises without it.
     error_before, error_after, held_out_before, held_out_after : float
         [N], with the effects before it, and with it as well.
     force : (M, D) array
@@ -31,7 +33,7 @@ class FoundEffect:
     """
 
     effect: type[CatalogueEffect]
-    drives: tuple[str, ...] | None
+    drives: Drives
     parameters: dict[str, Estimate]
     evidence: float
     error_before: float
@@ -46,10 +48,10 @@ class FoundEffect:
         """Name in the catalogue."""
         return self.effect.name
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
-                'parameters': {key: one.as_data() for key, one in self.parameters.items()},
+                'parameters': {key: one.to_json() for key, one in self.parameters.items()},
                 'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
@@ -60,35 +62,58 @@ class RankedEffect:
     """A candidate for the first place, or a suspect."""
 
     name: str
-    drives: tuple[str, ...] | None
+    drives: Drives
     evidence: float
     error_after: float
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives), 'evidence': self.evidence,
                 'error_after': self.error_after}
 
 
-def joined(early: list[FoundEffect], late: list[FoundEffect], order: tuple[str, ...],
-            ) -> list[FoundEffect]:
-    """Return all effects; what comes late on further drives is the same effect."""
-    effects = list(early)
-    for one in late:
-        k = next((k for k, other in enumerate(early) if other.name == one.name), None)
-        if k is None:
-            effects.append(one)
-            continue
-        old, last = effects[k], len(early) - 1
-        effects[k] = replace(
-            old, drives=tuple(sorted({*(old.drives or ()), *(one.drives or ())}, key=order.index)),
-            parameters={**old.parameters, **one.parameters}, evidence=old.evidence + one.evidence,
-            force=old.force + one.force, at_bound=(*old.at_bound, *one.at_bound))
-        effects[last] = replace(effects[last], error_after=one.error_after,
-                                held_out_after=one.held_out_after)
-    return effects
+@dataclass(frozen=True)
+class RankedSet:
+    """A set of effects with its cost.
+
+    Parameters
+    ----------
+    names : tuple of (name, drives)
+        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
+    cost : float
+        Above that of the best set; lower is better.
+    """
+
+    names: tuple[tuple[str, Drives], ...]
+    cost: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what the README adds to the interface."""
+        return {'cost': self.cost, 'effects': [
+            {'name': name, 'drives': listed(drives)} for name, drives in self.names]}
 
 
-def listed(drives: tuple[str, ...] | None) -> list[str] | None:
+@dataclass(frozen=True)
+class WithinModelError:
+    """What was found and may be no more than the lack of fit of adopted effects.
+
+    Parameters
+    ----------
+    name : str
+        Of an effect, or `unknown, VARIABLE`.
+    drives : tuple of str or None
+    rms : float
+        Of its force on the drive where it is largest [N].
+    of : tuple of str
+        Whose lack of fit it may be.
+    """
+
+    name: str
+    drives: Drives
+    rms: float
+    of: tuple[str, ...]
+
+
+def listed(drives: Drives) -> list[str] | None:
     """Return names of drives for JSON."""
     return None if drives is None else list(drives)

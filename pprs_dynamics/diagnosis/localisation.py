@@ -1,41 +1,35 @@
-"""Where the model fails: statements that stand against correlated noise, the strongest first.
+"""Where the model fails: patterns of each drive's error that stand out against its noise.
 
-Per drive, patterns along every variable are proposed under two noise models, compared by
-likelihoods in which the noise is refitted (`search`), and the best is stated where its gain, less
-the price of the number of tries, exceeds what white innovations would reach in one of two hundred
-recordings, over all drives, variables and ranges together. What was stated is taken out with all
-that its variable can carry, and the search goes on; then the scatter of what remains is searched.
+The same noise, criterion and patterns as in the search for missing effects, without any effect:
+per drive, the pattern that lowers the cost most is stated, what its variable can carry is taken
+out with it, and the search goes on until nothing lowers the cost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm, rankdata
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.noise import NoiseModel, effective_samples
-from pprs_dynamics.diagnosis.parallel import each
-from pprs_dynamics.diagnosis.search import FINE, Candidate, DriveSearch
-from pprs_dynamics.diagnosis.wording import Statement, word_statement
+from pprs_dynamics.diagnosis.statements import Statement, word_scatter, word_statement
+from pprs_dynamics.parallel import each
+from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.selection.candidates import Prices, UnknownCandidate
+from pprs_dynamics.selection.decisions import DECISIONS, Decisions
 from pprs_dynamics.selection.patterns import Pattern
+from pprs_dynamics.selection.search import with_fast_noise
+from pprs_dynamics.selection.unknown import PatternLibrary
 
-FALSE_ALARMS = 0.005
-DRAWS = 64
-MOST_SAMPLES = 16_000
+MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
 LEAST_SAMPLES = 100
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
-PROPOSALS = (5, 7)  # under the noise of the error itself, and of what a rich regression leaves
-# A second statement lives on what the first left over, and an imperfect first leaves something.
-MARGIN = 10.0
-FINELY = 3  # of the best patterns are given limits to the sample
-REVISIONS = 2  # of the proposals, once a pattern stands
-# Patterns so near in log-likelihood, doubled, are told with the one that is stated: odds of 20.
-TIE = 6.0
+PROPOSALS = 4  # fitted in full, of each scan
 REVERSAL_SHARE = 0.12  # of the samples, the slowest, that friction may leave out at reversals
 LEAST_SCATTER = 1.5  # ratio of variances worth a statement
 
@@ -47,21 +41,12 @@ class DriveFindings:
     Parameters
     ----------
     statements : tuple of Statement
-    noise : NoiseModel or None
+    noise : NoiseSpectrum or None
         Of what remains; None with too few samples to search.
-    remaining : (N,) array
-        The error at `index` without what was stated [N].
-    index : (N,) int array
-        Samples (of the thinned residuals) that were searched.
-    columns : (C, N) array
-        All that the variables of the statements can carry.
     """
 
     statements: tuple[Statement, ...]
-    noise: NoiseModel | None
-    remaining: Array
-    index: np.typing.NDArray[np.int_]
-    columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    noise: NoiseSpectrum | None
 
 
 @dataclass(frozen=True)
@@ -72,258 +57,199 @@ class Localisation:
     ----------
     statements : tuple of Statement
     drives : mapping of str to DriveFindings
-    threshold : float
-        What a score had to exceed.
     """
 
     statements: tuple[Statement, ...]
     drives: dict[str, DriveFindings]
-    threshold: float
 
 
-@dataclass
-class _Open:
-    """A drive while it is searched."""
-
-    search: DriveSearch
-    null: Array
-    proposed: list[Candidate]
-    noise: NoiseModel
-    columns: Array
-    stated: list[tuple[Candidate, tuple[str, ...]]] = field(default_factory=list)
-
-
-def localise(
-    residuals: Residuals, *, false_alarms: float = FALSE_ALARMS, seed: int = 0,
-    progress: Callable[[float], None] | None = None, known: Localisation | None = None,
-    changed: Collection[str] = (),
-) -> Localisation:
+def localise(residuals: Residuals, decisions: Decisions = DECISIONS,
+             progress: Callable[[float], None] | None = None) -> Localisation:
     """Return where the error of each drive lies, as far as noise would not do the same.
 
     Parameters
     ----------
     residuals : Residuals
         Averaged to at most 16 000 samples first; what is faster than that is not seen.
-    false_alarms : float
-        Share of recordings with a perfect model in which any statement may appear.
-    seed : int
-        Of the draws that the threshold comes from.
+    decisions : Decisions
     progress : callable, optional
         Called with the share of the work that is done.
-    known : Localisation, optional
-        Of residuals that differ on the `changed` drives only: the others keep their findings.
-    changed : collection of str
     """
     thin = residuals.thinned(MOST_SAMPLES)
-    rng = np.random.default_rng(seed)
     report = progress or (lambda share: None)
-    seeds = rng.spawn(len(thin.drives))
-
-    def open_drive(drive: int) -> _Open | None:
-        if (np.isfinite(thin.measured[:, drive]).sum() < LEAST_SAMPLES
-                or (known and thin.drives[drive] not in changed)):
-            return None
-        search = DriveSearch(thin, drive)
-        return _open(search, seeds[drive]) if _has_error(search) else None
-
-    opened = each(open_drive, range(len(thin.drives)))
-    report(0.4)
-    threshold = known.threshold if known else _threshold(
-        [state.null for state in opened if state], false_alarms)
-    done: list[str] = []
+    done: list[int] = []
 
     def search_drive(drive: int) -> DriveFindings:
-        name, state = thin.drives[drive], opened[drive]
-        if known and name not in changed:
-            return known.drives[name]
-        found = (DriveFindings((), None, np.zeros(0), np.zeros(0, dtype=int)) if state is None
-                 else _search(name, state, threshold))
-        done.append(name)
-        report(0.4 + 0.6 * len(done) / len(thin.drives))
+        found = _search(thin, drive, decisions)
+        done.append(drive)
+        report(len(done) / len(thin.drives))
         return found
 
     drives = dict(zip(thin.drives, each(search_drive, range(len(thin.drives))), strict=True))
+    for name, statement in levels(thin, {
+            name: found.noise for name, found in drives.items()}, decisions).items():
+        drives[name] = replace(drives[name], statements=(*drives[name].statements, statement))
     ranked = sorted((statement for findings in drives.values()
-                     for statement in findings.statements), key=lambda s: -s.evidence)
-    return Localisation(tuple(ranked), drives, threshold)
+                     for statement in findings.statements), key=lambda one: -one.evidence)
+    return Localisation(tuple(ranked), drives)
 
 
-def _has_error(search: DriveSearch) -> bool:
-    effort = float(np.nanmax(np.abs(search.residuals.measured[:, search.drive])))
-    return bool(np.abs(search.error).max() > ROUNDING * effort)
+def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
+           decisions: Decisions) -> dict[str, Statement]:
+    """Return statements on drives whose slow noise is far above its peers'.
 
-
-def _open(search: DriveSearch, rng: np.random.Generator) -> _Open:
-    none = np.zeros((0, len(search.error)))
-    noise = search.fit(none).noise
-    draws = rng.normal(size=(len(search.error), DRAWS))
-    proposed, null = search.propose(noise, none, draws)
-    return _Open(search, null, proposed, noise, none)
-
-
-def _threshold(nulls: list[Array], false_alarms: float) -> float:
-    """Return what the largest gain over all drives exceeds with that probability.
-
-    Largest of many chi-squared variates are Gumbel distributed; its two moments need fewer
-    draws than a quantile far out.
+    Against the same drive's fast noise, so that drives of different sizes are compared.
     """
-    if not nulls:
-        return np.inf
-    scale = np.array([np.std(null) * np.sqrt(6) / np.pi for null in nulls])
-    place = np.array([np.mean(null) for null in nulls]) - np.euler_gamma * scale
-    low, high = float(place.min()), float(place.max() + 100 * scale.max())
-    for _ in range(60):
-        middle = (low + high) / 2
-        inside = np.exp(-np.exp(-(middle - place) / scale).sum())
-        low, high = (middle, high) if inside < 1 - false_alarms else (low, middle)
-    return high
+    slow = {name: noise.rms / noise.fast_rms for name, noise in noises.items()
+            if noise is not None and noise.fast_rms > 0}
+    found = {}
+    for name, ratio in slow.items():
+        peers = [other for key, other in slow.items() if key != name]
+        noise = noises[name]
+        if len(peers) < 2 or noise is None:
+            continue
+        usual = float(np.median(peers))
+        if ratio > decisions.level_ratio * usual:
+            square = (ratio ** 2 - usual ** 2) * noise.fast_rms ** 2
+            share = square / noise.rms ** 2
+            found[name] = Statement(
+                name, 'time', None, float(min(share, 1.0)), 1.0,
+                f'{name}: its error drifts {ratio / usual:.1f} times as much as that of the other '
+                f'drives, {np.sqrt(square):.2g} N rms, with no pattern that stands out',
+                0.0, 'level', float(np.sqrt(square)), float(square))
+    return found
 
 
-def _search(name: str, state: _Open, threshold: float) -> DriveFindings:
-    search = state.search
-    while len(state.stated) < MOST_STATEMENTS:
-        needed = threshold + (MARGIN if state.stated else 0.0)
-        winner, rivals = _best(state, needed)
-        if winner is None or winner.fit is None:
+def _search(residuals: Residuals, drive: int, decisions: Decisions) -> DriveFindings:
+    measured = residuals.measured[:, drive]
+    known = np.isfinite(measured)
+    if known.sum() < LEAST_SAMPLES:
+        return DriveFindings((), None)
+    regression = Regression(residuals, drives=(drive,))
+    if drive not in regression.series:
+        return DriveFindings((), None)
+    error = residuals.error[known, drive]
+    if np.abs(error).max() <= ROUNDING * np.abs(measured[known]).max():
+        return DriveFindings((), None)
+    prices = replace(Prices.of(regression, decisions), drives=len(residuals.drives))
+    library = PatternLibrary(regression, prices, drive, with_plain_forms=True)
+    fit = regression.fit(())
+    stated: list[tuple[UnknownCandidate, JointFit, float, tuple[str, ...]]] = []
+    blocks: list[Block] = []
+    while len(stated) < MOST_STATEMENTS:
+        winner = _best(library, fit, blocks, {one[0].family.variable for one in stated})
+        if winner is None:
             break
-        state.stated.append((winner, rivals))
-        state.columns = np.concatenate((state.columns, _carried(search, winner)))
-        state.noise = search.fit(state.columns).noise
-        state.proposed, _ = search.propose(state.noise, state.columns)
-    fit = search.fit(state.columns)
-    remaining = search.error - fit.coefficients @ state.columns
-    statements = [word_statement(name, search, candidate, rivals)
-                  for candidate, rivals in state.stated]
-    needed = threshold + (MARGIN if state.stated else 0.0)
-    scatter = _scatter(search, search.whiten(fit.noise, remaining), needed,
-                       {candidate.family.variable for candidate, _ in state.stated})
+        candidate, found, evidence, rivals = winner
+        stated.append((candidate, found, evidence, rivals))
+        blocks += [*candidate.blocks, *_carried(library, candidate)]
+        fit = regression.fit(blocks, found.amplitudes)
+    statements = [word_statement(residuals.drives[drive], library, candidate,
+                                 found.of(candidate.parts[drive]), evidence, rivals)
+                  for candidate, found, evidence, rivals in stated]
+    scatter = _scatter(library, fit, {one[0].family.variable for one in stated})
     if scatter is not None:
-        statements.append(word_statement(name, search, scatter, ()))
-    return DriveFindings(tuple(statements), fit.noise, remaining, search.index, state.columns)
+        statements.append(word_scatter(residuals.drives[drive], library, *scatter))
+    return DriveFindings(tuple(statements), regression.noise(fit)[drive])
 
 
-def _best(state: _Open, needed: float) -> tuple[Candidate | None, tuple[str, ...]]:
-    """Return the best pattern above the threshold, and the variables that do nearly as well."""
-    search = state.search
-    stated = {candidate.family.variable for candidate, _ in state.stated}
-    rich, _ = search.propose(search.rich_noise, state.columns)
-    always = [c for c in (*state.proposed, *rich)
-              if c.pattern.kind in ('friction', 'one_way', 'line', 'offset')]
-    # Whitening cuts a line that the noise model has learnt; the error itself still shows it.
-    line = search.line(search.error * np.hanning(len(search.error)))
-    listed = [(c, state.noise) for c in state.proposed[:PROPOSALS[0]]]
-    listed += [(c, search.rich_noise) for c in rich[:PROPOSALS[1]]]
-    if max((c.proposal for c, _ in listed), default=0.0) > 0.5 * needed:
-        listed += [(c, state.noise) for c in (*always, *([line] if line else ()))]
-    chosen: dict[tuple[str, Pattern], Candidate] = {}
-    for candidate, noise in listed:
-        key = (candidate.family.variable, candidate.pattern)
-        new = candidate.family.variable not in stated or candidate.pattern.kind == 'line'
-        if key not in chosen and new and candidate.proposal > 0:
-            chosen[key] = search.refine(candidate, noise, state.columns)
-    if not chosen:
-        return None, ()
-    scored = search.compare(list(chosen.values()), state.columns)
-    fine = [search.refine(c, c.fit.noise, state.columns, FINE) for c in scored[:FINELY]
-            if c.fit is not None and c.score + c.family.penalty > 0]
-    scored = sorted(scored + search.compare(fine, state.columns), key=lambda c: -c.score)
-    for revision in range(REVISIONS):
-        standing = [c for c in scored if c.score >= needed]
-        if not standing:
-            return None, ()
-        winner = max(standing, key=_weight)
-        assert winner.fit is not None
-        # Beside a good pattern the noise is nearly the true one, and shows better patterns.
-        noise, fresh = winner.fit.noise, []
-        seen = chosen if revision else {}
-        for candidate in search.propose(noise, state.columns)[0][:PROPOSALS[1]]:
-            key = (candidate.family.variable, candidate.pattern)
-            if candidate.family.variable not in stated and key not in seen:
-                chosen[key] = search.refine(candidate, noise, state.columns)
-                fresh.append(chosen[key])
-        if not fresh:
-            break
-        better = search.compare(fresh, state.columns)
-        fine = [search.refine(c, noise, state.columns, FINE) for c in better[:FINELY]]
-        scored = sorted(scored + better + search.compare(fine, state.columns),
-                        key=lambda candidate: -candidate.score)
-    winner = scored[0]
-    if _is_friction(winner, search):
+def _best(library: PatternLibrary, fit: JointFit, blocks: list[Block], stated: set[str],
+          ) -> tuple[UnknownCandidate, JointFit, float, tuple[str, ...]] | None:
+    """Return the pattern that lowers the cost most, with its fit, evidence and rivals."""
+    regression = library.regression
+    chosen: dict[object, tuple[UnknownCandidate, JointFit]] = {}
+    for near in (fit, with_fast_noise(regression, fit)):
+        for candidate, score in library.proposals(near, PROPOSALS, always=True):
+            variable = candidate.family.variable
+            if (variable in stated and candidate.pattern.kind != 'line') or score < -30:
+                continue
+            chosen.setdefault(candidate.key, (candidate, near))
+    scored = []
+    for candidate, near in chosen.values():
+        refined = library.refined(candidate, near)
+        found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
+        scored.append((fit.deviance - found.deviance - refined.price, refined, found))
+    scored.sort(key=lambda one: -one[0])
+    if not scored or scored[0][0] <= 0:
+        return None
+    evidence, winner, found = scored[0]
+    if _is_friction(winner, library):
         # What follows the sign of all but the slowest motion is the direction's.
-        winner = next((c for c in scored if c.pattern.kind == 'friction' and c.score >= needed),
-                      winner)
+        evidence, winner, found = next(
+            (one for one in scored if one[1].pattern.kind == 'friction' and one[0] > 0), scored[0])
+    margin = library.prices.decisions.rival_margin
     kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
-    rivals = [c.family.variable for c in scored
-              if _weight(c) > _weight(winner) - TIE and c.family.variable not in kin]
-    return winner, tuple(dict.fromkeys(rivals))
+    rivals = [one.family.variable for score, one, _ in scored
+              if score > evidence - margin and one.family.variable not in kin]
+    return winner, found, evidence, tuple(dict.fromkeys(rivals))
 
 
-def _weight(candidate: Candidate) -> float:
-    return candidate.score + candidate.family.margin
-
-
-def _is_friction(winner: Candidate, search: DriveSearch) -> bool:
+def _is_friction(winner: UnknownCandidate, library: PatternLibrary) -> bool:
     if winner.family.variable != 'velocity' or winner.pattern.kind != 'directed_range':
         return False
-    speed = np.abs(search.values('velocity'))
+    speed = np.abs(library.values('velocity'))
     assert winner.pattern.limits is not None
     low, high = winner.pattern.limits
     return high >= speed.max() and bool(np.mean(speed < low) <= REVERSAL_SHARE)
 
 
-def _carried(search: DriveSearch, winner: Candidate) -> Array:
-    """Return all columns that belong to what was stated."""
+def _carried(library: PatternLibrary, winner: UnknownCandidate) -> list[Block]:
+    """Return all columns that the variable of a statement can carry, as one block each."""
     if winner.pattern.kind in ('line', 'offset'):
-        return winner.columns
+        return []
     variables = {winner.family.variable}
     if winner.family.variable in ('velocity', 'direction'):
         variables = {'velocity', 'direction'}
-    blocks = [family.columns for family in search.families
-              if family.variable in variables and not family.paired]
-    return np.concatenate((winner.columns, *blocks))
+    return [library.family_block(family) for family in library.families
+            if family.variable in variables and not family.paired]
 
 
-def _scatter(
-    search: DriveSearch, innovations: Array, needed: float, stated: set[str],
-) -> Candidate | None:
-    """Return the range in which innovations are larger than elsewhere, if any stands out.
+def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
+             ) -> tuple[str, Pattern, Array, float] | None:
+    """Return the range in which the noise is larger than elsewhere, if any stands out.
 
-    Ranks of their size stand for the sizes, so that noise need not be Gaussian.
+    Ranks of the sizes of innovations stand for them, so that noise need not be Gaussian.
     """
-    known = search.known
-    scores = np.zeros(len(innovations))
+    regression, d = library.regression, library.d
+    series = regression.series[d]
+    white = regression.whitened(fit, d, series.inverse(regression.remaining(fit, d)))
+    known = series.known
+    scores = np.zeros(len(white))
     n = int(known.sum())
-    ranked = norm.ppf((rankdata(np.abs(innovations[known])) - 0.5) / n)
+    ranked = norm.ppf((rankdata(np.abs(white[known])) - 0.5) / n)
     # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
     scores[known] = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
-    best: Candidate | None = None
-    for family in search.families:
+    best: tuple[float, str, Pattern, Array] | None = None
+    for family in library.families:
         if family.paired or family.variable in stated or len(family.columns) == 1:
             continue
         # Bins do not overlap, so that sums over patterns are sums over their bins.
         members = family.columns[:, known] > 0.5
-        inside, totals = family.weights @ members.sum(axis=1), family.weights @ (
-            members @ scores[known])
-        gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - family.penalty
+        inside = family.weights @ members.sum(axis=1)
+        totals = family.weights @ (members @ scores[known])
+        gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - library.price(family)
         for at in np.argsort(-gains):
             pattern, gain = family.patterns[at], float(gains[at])
-            if gain <= max(needed, best.score if best else 0.0):
+            if gain <= max(0.0, best[0] if best else 0.0):
                 break
             if pattern.kind not in ('range', 'fast') or totals[at] <= 0:
                 continue
             column = family.pattern_columns(int(at))[0]
             held = column[known] > 0.5
-            ratio = (np.mean(innovations[known][held] ** 2)
-                     / max(float(np.mean(innovations[known][~held] ** 2)), 1e-300))
+            ratio = (np.mean(white[known][held] ** 2)
+                     / max(float(np.mean(white[known][~held] ** 2)), 1e-300))
             if ratio >= LEAST_SCATTER:
-                best = Candidate(family, Pattern('scatter', pattern.limits, float(ratio)),
-                                 column[None], gain, gain)
+                best = (gain, family.variable, Pattern('scatter', pattern.limits, float(ratio)),
+                        column)
     if best is None:
         return None
-    # Scatter that comes and goes by itself, or gaps that were bridged, make sizes go together.
-    held = known & (best.columns[0] > 0.5)
-    for part in (held, known & ~held):
-        scores[part] -= scores[part].mean()
-    worth = effective_samples(search.fit_noise(scores), n) / n
-    score = worth * (best.score + best.family.penalty) - best.family.penalty
-    return replace(best, score=score) if score > needed else None
+    gain, variable, pattern, column = best
+    # Scatter that comes and goes by itself makes sizes go together: they are worth fewer samples.
+    centred = scores.copy()
+    for part in (known & (column > 0.5), known & ~(column > 0.5)):
+        centred[part] -= centred[part].mean()
+    lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
+    worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
+    price = library.prices.of_pattern(1, 1, 1)
+    score = worth * (gain + price) - price
+    return (variable, pattern, column, score) if score > 0 else None

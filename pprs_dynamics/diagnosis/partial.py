@@ -10,9 +10,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.diagnosis.noise import fit_noise
-from pprs_dynamics.diagnosis.profiles import Profile, error_profile
+from pprs_dynamics.residuals.profiles import Profile, error_profile
 from pprs_dynamics.diagnosis.search import DriveSearch
-from pprs_dynamics.diagnosis.wording import UNITS
+from pprs_dynamics.diagnosis.statements import UNITS
 from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.selection.patterns import bin_edges
 

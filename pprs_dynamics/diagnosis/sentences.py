@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.adoption import Calibration, Estimate
+from pprs_dynamics.selection.estimates import Calibration, Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect
 from pprs_dynamics.diagnosis.quantities import (

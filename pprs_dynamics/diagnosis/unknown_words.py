@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pprs_dynamics.diagnosis.quantities import sentence
-from pprs_dynamics.diagnosis.wording import WORDS, Statement
+from pprs_dynamics.diagnosis.statements import WORDS, Statement
 
 # What it could come from, and how to look, by what the error depends on.
 LEADS = {

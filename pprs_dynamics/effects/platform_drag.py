@@ -21,6 +21,7 @@ class PlatformDrag(BodyEffect):
     """Force c v against the velocity of o, and moment c_r omega against the turning."""
 
     name: ClassVar[str] = 'platform_drag'
+    is_friction: ClassVar[bool] = True
     linear = (
         Parameter('coefficient', 'c', 'N s/m', 'force per velocity of the platform', -1e6, 1e6,
                   scale=1.0),

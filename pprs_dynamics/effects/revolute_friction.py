@@ -29,6 +29,7 @@ class RevoluteFriction(PassiveJointEffect):
     """
 
     name: ClassVar[str] = 'revolute_friction'
+    is_friction: ClassVar[bool] = True
     linear = (
         Parameter('viscous', 'c_r+', 'N m s/rad', 'moment per angular velocity of the joint',
                   -1e4, 1e4, scale=0.01),

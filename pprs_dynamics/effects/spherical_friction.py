@@ -30,6 +30,7 @@ class SphericalFriction(PassiveJointEffect):
     """
 
     name: ClassVar[str] = 'spherical_friction'
+    is_friction: ClassVar[bool] = True
     linear = (
         Parameter('viscous', 'c_s+', 'N m s/rad', 'moment per angular velocity of the joint',
                   -1e4, 1e4, scale=0.01),

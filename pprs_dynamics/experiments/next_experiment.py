@@ -54,7 +54,7 @@ class Bout:
     expected: float
     probability: float
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {'truth': self.truth, 'rival': self.rival, 'evidence_now': self.now,
                 'expected_evidence': self.expected, 'probability': self.probability}
@@ -80,7 +80,7 @@ class Accuracy:
     before: float
     after: float
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {'label': self.label, 'unit': self.unit, 'scale': self.scale,
                 'std_before': self.before, 'std_after': self.after}
@@ -166,15 +166,15 @@ class Experiment:
             'commission': 'This motion measures the model\'s numbers and shows all common '
                           'effects.'}[self.kind] + last
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the JSON of the interface, and what the documentation adds to it."""
         return {'separates': [list(pair) for pair in self.separates],
                 'does_not_separate': [list(pair) for pair in self.fails],
                 'expected_evidence': self.expected_evidence,
                 'question': self.kind, 'subjects': list(self.subjects),
                 'hidden': list(self.hidden), 'text': self.text,
-                'contests': [one.as_data() for one in self.bouts],
-                'accuracy': [one.as_data() for one in self.accuracies],
+                'contests': [one.to_json() for one in self.bouts],
+                'accuracy': [one.to_json() for one in self.accuracies],
                 'limits': self.limits, 'duration': self.duration}
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.parallel import each
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.experiments.climbing import climb
 from pprs_dynamics.experiments.criteria import Contest, misfits_of
@@ -27,6 +26,7 @@ from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.experiments.question import Question
 from pprs_dynamics.mechanism.paths import HOME
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.parallel import each
 
 HARMONICS = 4  # of each degree of freedom
 SLOWEST_TOP = 5  # the highest harmonic of the slowest motions

@@ -83,7 +83,7 @@ class Step:
     previous: Mapping[str, Any] = field(default_factory=dict)
     added: tuple[str, ...] = ()
 
-    def as_data(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return the step for JSON."""
         data = {one.name: getattr(self, one.name) for one in fields(self)}
         data['drives'] = list(self.drives) or None

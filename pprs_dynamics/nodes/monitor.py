@@ -8,7 +8,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from pprs_dynamics.diagnosis.live import Compared, LiveComparison
+from pprs_dynamics.residuals.live import Compared, LiveComparison
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import conversions

@@ -21,9 +21,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.base_columns import BaseColumn
 from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
+from pprs_dynamics.residuals.residuals import Residuals
 
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less; rounds are bounded.
@@ -86,31 +87,37 @@ class JointFit:
 
 
 class Regression:
-    """The errors of a design, transformed, and the fits to them.
+    """Errors of drives, transformed, and the fits to them.
 
     Parameters
     ----------
-    design : Design
+    residuals : Residuals
+    base : sequence of BaseColumn
+        That take part in every fit.
+    drives : sequence of int, optional
+        Of the residuals; by default all that have enough samples.
     error_scale : mapping of drive to float, optional
         Force that priors of effects allow [N], so that costs of two designs mean the same; by
         default the rms of the error.
     """
 
-    def __init__(self, design: Design, error_scale: Mapping[int, float] | None = None) -> None:
-        self.design = design
-        residuals = design.residuals
+    def __init__(self, residuals: Residuals, base: Sequence[BaseColumn] = (),
+                 drives: Sequence[int] | None = None,
+                 error_scale: Mapping[int, float] | None = None) -> None:
+        self.residuals, self.columns = residuals, tuple(base)
         self.bands = FrequencyBands.for_residuals(residuals)
         self.noise_shapes = NoiseShapes.of(self.bands)
-        every = {d: DriveSeries(residuals, d, self.bands) for d in range(len(design.drives))}
+        every = {d: DriveSeries(residuals, d, self.bands)
+                 for d in (range(len(residuals.drives)) if drives is None else drives)}
         self.series = {d: one for d, one in every.items() if one.known.sum() >= LEAST_SAMPLES}
         self.drives = tuple(self.series)
         self.counts = np.stack([self.series[d].counts for d in self.drives])
-        self.precision = np.array([column.precision for column in design.base])
-        self.base_index = {d: np.array([k for k, column in enumerate(design.base)
+        self.precision = np.array([column.precision for column in self.columns])
+        self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
                                         if d in column.rows], dtype=int) for d in self.drives}
         # The error is the last row of each drive's base.
         self.base = {d: series.transform(np.stack(
-            [design.base[k].rows[d][series.index] for k in self.base_index[d]] + [series.error]))
+            [self.columns[k].rows[d][series.index] for k in self.base_index[d]] + [series.error]))
             for d, series in self.series.items()}
         self._base_products = {d: self.series[d].products(rows, rows)
                                for d, rows in self.base.items()}
@@ -201,9 +208,15 @@ class Regression:
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""
-        period = self.design.residuals.period
+        period = self.residuals.period
         return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k], period)
                 for k, d in enumerate(self.drives)}
+
+    def noise_floor(self, fit: JointFit, d: int) -> float:
+        """Return the root of the mean square of a drive's noise over its coefficients [N]."""
+        k = self.drives.index(d)
+        power = self.noise_shapes.spectrum(fit.amplitudes[k])
+        return float(np.sqrt(self.counts[k] @ power / max(self.counts[k].sum(), 1)))
 
     def weights(self, fit: JointFit, d: int) -> Array:
         """Return 1 / S at the bands of a drive, (B,) [1/N^2]."""
@@ -231,6 +244,79 @@ class Regression:
             if d in block.rows:
                 rest = rest - fit.of(block) @ block.rows[d]
         return rest
+
+    def gain(self, fit: JointFit, block: Block) -> float:
+        """Return by how much the deviance falls with one more block, at the noise of a fit."""
+        S, b, _ = self._beside(fit, block)
+        return float(term_gains(S[None], b[None], block.precision[None], block.is_fixed)[0])
+
+    def own_information(self, fit: JointFit, block: Block) -> Array:
+        """Return the information on a block's coefficients that a fit leaves, (k, k)."""
+        return self._beside(fit, block)[0]
+
+    def own_share(self, fit: JointFit, block: Block) -> float:
+        """Return the least share of a column's whitened square that a fit cannot take."""
+        S, _, plain = self._beside(fit, block)
+        return float(np.min(np.diag(S) / np.maximum(plain, 1e-300)))
+
+    def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
+        """Return own sums of products, those with what is left, and full squares of a block."""
+        size = len(next(iter(block.rows.values())))
+        S, b = np.zeros((size, size)), np.zeros(size)
+        taken = np.zeros((size, len(fit.coefficients)))
+        for d in block.rows:
+            weights = self.weights(fit, d)
+            index, felt = self.local(fit, d)
+
+            def weighted(other: Block | None, d: int = d, weights: Array = weights) -> Array:
+                pair = self.products(block, other, d)
+                found: Array = (weights @ pair.reshape(len(weights), -1)).reshape(pair.shape[1:])
+                return found
+
+            with_base = weighted(None)
+            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in felt)], axis=1)
+            S += weighted(block)
+            b += with_base[:, -1] - known @ fit.coefficients[index]
+            for one in fit.blocks:
+                if one.is_fixed and d in one.rows:
+                    b -= weighted(one)[:, 0]
+            taken[:, index] += known
+        plain = np.diag(S).copy()
+        return S - taken @ fit.covariance @ taken.T, b, plain
+
+
+def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
+    """Return by how much the deviance falls with each of n terms, (n,).
+
+    Parameters
+    ----------
+    S : (n, k, k) array
+        Whitened sums of products of the rows, less what is fitted already.
+    b : (n, k) array
+        Whitened sums of products with what is left.
+    precision : (n, k, k) array
+        Of the prior.
+    is_fixed : bool
+        True where the coefficient is 1.
+    """
+    if is_fixed:
+        fixed: Array = 2 * b[:, 0] - S[:, 0, 0]
+        return fixed
+    posterior = (S + S.transpose(0, 2, 1)) / 2 + precision
+    # What is fitted already can take all of a row, to rounding; then only the prior is left.
+    floor = 1e-6 * np.einsum('nkk->nk', precision)
+    diagonal = np.einsum('nkk->nk', posterior)
+    np.einsum('nkk->nk', posterior)[:] = np.maximum(diagonal, floor)
+    scale = 1 / np.sqrt(np.einsum('nkk->nk', posterior))
+    scaled = posterior * scale[:, :, None] * scale[:, None, :]
+    values, axes = np.linalg.eigh(scaled)
+    kept = values > 1e-7
+    along = np.einsum('nkj,nk->nj', axes, b * scale)
+    quadratic = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
+    log_det = (np.sum(np.log(np.maximum(values, 1e-7)), axis=1) - 2 * np.sum(np.log(scale), axis=1)
+               - np.linalg.slogdet(precision)[1])
+    gains: Array = quadratic - log_det
+    return gains
 
 
 class _DriveSystem:

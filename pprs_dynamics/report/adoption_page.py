@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.adopt import Adoption
+from pprs_dynamics.adoption.adopt import Adoption
 from pprs_dynamics.diagnosis.error_steps import ErrorStep
-from pprs_dynamics.diagnosis.paired_errors import rms_by_drive
+from pprs_dynamics.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.report.adoption_tables import error_rows, headline, parameter_rows

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.panel import Panel
 from rich.table import Table
 
-from pprs_dynamics.diagnosis.adopt import VALIDATION, Adoption
+from pprs_dynamics.adoption.adopt import VALIDATION, Adoption
 
 
 def adoption_view(answer: Adoption) -> Group:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.comparison import Comparison
-from pprs_dynamics.diagnosis.profiles import error_profile, error_spectrum
+from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.report.page import plotly_objects
 from pprs_dynamics.residuals.residuals import Residuals
 

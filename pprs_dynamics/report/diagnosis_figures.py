@@ -16,8 +16,8 @@ from pprs_dynamics.diagnosis.partial import (
     remaining_profile,
     remaining_residuals,
 )
-from pprs_dynamics.diagnosis.profiles import error_spectrum
-from pprs_dynamics.diagnosis.wording import UNITS, WORDS, Statement
+from pprs_dynamics.residuals.profiles import error_spectrum
+from pprs_dynamics.diagnosis.statements import UNITS, WORDS, Statement
 from pprs_dynamics.report.comparison_figures import ERROR, LINES, MEASURED, MODEL, curve
 from pprs_dynamics.report.page import plotly_objects
 from pprs_dynamics.residuals.residuals import Residuals

@@ -19,7 +19,7 @@ Assoc. 72 (1977) 320-338 (restricted likelihood, fixed-point iterations).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.residuals.bands import FrequencyBands
 
 EXPONENT = 0.9  # of the fixed point; 1 may oscillate, 0.5 is safe and slow
+# Corners go on below the lowest frequency of the record: 1/f noise does, and a constant has to
+# stand out against that.
+OCTAVES_BELOW = 1
+SLOW_SHARE = 0.1  # of the highest corner, below which noise counts as slow
 LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: from 0 none would return
 
 
@@ -48,10 +52,15 @@ class NoiseShapes:
     @classmethod
     def of(cls, bands: FrequencyBands) -> NoiseShapes:
         """Return the shapes for some bands."""
-        lowest, highest = bands.frequency[1], bands.frequency[-1]
+        lowest, highest = bands.frequency[1] / 2 ** OCTAVES_BELOW, bands.frequency[-1]
         count = max(int(np.floor(np.log2(highest / lowest))), 1)
         corners = lowest * 2.0 ** np.arange(count)
         return cls(corners, _shapes(corners, bands.frequency))
+
+    @property
+    def is_slow(self) -> np.typing.NDArray[np.bool_]:
+        """True for the corners that count as slow noise, (J,)."""
+        return self.corners < SLOW_SHARE * self.corners[-1]
 
     def spectrum(self, amplitudes: Array) -> Array:
         """Return S at the bands, (..., B), of amplitudes (..., J + 1) [N^2]."""
@@ -118,18 +127,49 @@ class NoiseSpectrum:
     @property
     def rms(self) -> float:
         """Root of the mean square of the samples [N]."""
-        frequency = np.linspace(0.0, 0.5 / self.period, 4097)
-        return float(np.sqrt(np.mean(self.power(frequency))))
+        # The mean of 1 / (1 + (f / f_j)^2) up to the Nyquist frequency is an arc tangent.
+        ratio = 0.5 / (self.period * self.corners)
+        means = np.concatenate(([1.0], np.arctan(ratio) / ratio))
+        return float(np.sqrt(self.amplitudes @ means))
+
+    def rms_at(self, period: float) -> float:
+        """Return the rms of samples `period` apart [s], of which these are means [N]."""
+        # Averaging took white noise out; what is slower it left.
+        white = np.zeros_like(self.amplitudes)
+        white[0] = self.amplitudes[0] * (self.period / period - 1)
+        return replace(self, amplitudes=self.amplitudes + white).rms
 
     def effective_samples(self, samples: int) -> float:
         """Return how many independent samples have a mean as uncertain as `samples` of these."""
         return float(np.clip(samples * self.rms ** 2 / self.power(np.zeros(1))[0], 1, samples))
 
+    def covariance(self, samples: int, period: float) -> Array:
+        """Return the autocovariance at lags 0 .. samples - 1 of samples `period` apart [N^2]."""
+        lag = period * np.arange(samples)
+        # A Lorentzian spectrum belongs to an exponential covariance.
+        rate = 2 * np.pi * self.corners
+        values: Array = (self.amplitudes[1:] * rate / 2 * self.period) @ np.exp(
+            -rate[:, None] * lag)
+        values[0] = self.rms_at(period) ** 2
+        return values
+
     @property
-    def slowness(self) -> float:
-        """Return the power at zero frequency over that of the fast noise."""
-        ends = self.power(np.array([0.0, 0.5 / self.period]))
-        return float(ends[0] / ends[1])
+    def slow_rms(self) -> float:
+        """Root of the mean square of what has a corner far below the highest [N]."""
+        return self._rms_of(np.concatenate(([False], self._is_slow)))
+
+    @property
+    def fast_rms(self) -> float:
+        """Root of the mean square of the rest [N]."""
+        return self._rms_of(np.concatenate(([True], ~self._is_slow)))
+
+    @property
+    def _is_slow(self) -> np.typing.NDArray[np.bool_]:
+        return self.corners < SLOW_SHARE * self.corners[-1]
+
+    def _rms_of(self, chosen: np.typing.NDArray[np.bool_]) -> float:
+        part = replace(self, amplitudes=np.where(chosen, self.amplitudes, 0.0))
+        return part.rms
 
 
 def _shapes(corners: Array, frequency: Array) -> Array:

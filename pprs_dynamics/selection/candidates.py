@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.design import Term
-from pprs_dynamics.regression.joint_fit import Block, JointFit
+from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.selection.decisions import Decisions
 from pprs_dynamics.selection.patterns import Family, Pattern
 
 
@@ -232,19 +234,22 @@ class Prices:
     drives : int
     samples : int
         Of a drive.
-    effect_odds, wrong_sign_odds : float
-        See `Decisions`.
+    decisions : Decisions
     """
 
     names: int
     drives: int
     samples: int
-    effect_odds: float
-    wrong_sign_odds: float
+    decisions: Decisions
+
+    @classmethod
+    def of(cls, regression: Regression, decisions: Decisions) -> Prices:
+        """Return the prices for the drives and samples of a regression."""
+        return cls(len(catalogue()), len(regression.drives), regression.samples, decisions)
 
     def of_name(self) -> float:
         """Return the price of one more effect, whichever."""
-        return 2 * log(self.names) - 2 * log(self.effect_odds)
+        return 2 * log(self.names) - 2 * log(self.decisions.effect_odds)
 
     def of_drives(self, count: int) -> float:
         """Return the price of a choice of drives: how many, and which."""
@@ -260,8 +265,13 @@ class Prices:
             price += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
         return price
 
+    def of_pattern(self, families: int, patterns: int, drives: int) -> float:
+        """Return the price of an unknown pattern among those tried on each drive."""
+        return (self.of_name() + self.of_drives(drives) + 2 * log(families) + 2 * log(patterns)
+                - 2 * log(self.decisions.unknown_odds))
+
     def of_signs(self, effect: type[CatalogueEffect], values: Mapping[str, Any]) -> float:
         """Return the price of parameters that are unphysical by their sign."""
         wrong = any(values.get(name, bound) < bound
                     for name, bound in effect.unphysical_below.items())
-        return -2 * log(self.wrong_sign_odds) if wrong else 0.0
+        return -2 * log(self.decisions.wrong_sign_odds) if wrong else 0.0

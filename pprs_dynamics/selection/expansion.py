@@ -27,7 +27,6 @@ from pprs_dynamics.regression.base_columns import (
     within,
 )
 from pprs_dynamics.regression.design import Design, Point
-from pprs_dynamics.regression.joint_fit import Regression
 from pprs_dynamics.selection.candidates import (
     Candidate,
     CandidateSet,
@@ -86,8 +85,8 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
-    first = search = Search(Regression(design), decisions,
-                            lambda share: report(0.25 + 0.35 * share))
+    first = search = Search(design, decisions,
+                            progress=lambda share: report(0.25 + 0.35 * share))
     best = search.run()
     for number in range(MOST_EXPANSIONS):
         try:
@@ -98,12 +97,31 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
         except PprsError:
             break  # values that no model may have: the linear form is all there is
         start = 0.6 + 0.4 * number / MOST_EXPANSIONS
-        regression = Regression(around, search.regression.error_scale)
-        search = Search(regression, decisions,
+        search = Search(around, decisions, search.regression.error_scale,
                         lambda share, s=start: report(s + 0.4 / MOST_EXPANSIONS * share))
         best = search.run(rebuilt(search, best))
     report(1.0)
     return Selection(first, search, best)
+
+
+def expanded(search: Search, found: CandidateSet, recordings: Sequence[Recording],
+             decisions: Decisions) -> tuple[Search, CandidateSet]:
+    """Return the same set around its own fitted model, and the search that holds it.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    for _ in range(MOST_EXPANSIONS):
+        point = point_of(search.design, search, found)
+        if squared_difference(search, found, point.model, recordings) < LEAST_DIFFERENCE:
+            break
+        around = search.design.around(point, recordings)
+        search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
+        search.evaluate(())
+        found = search.refined(search.evaluate(rebuilt(search, found)))
+    return search, found
 
 
 def point_of(design: Design, search: Search, found: CandidateSet) -> Point:
@@ -115,7 +133,7 @@ def point_of(design: Design, search: Search, found: CandidateSet) -> Point:
         For values that no model may have.
     """
     base = found.fit.coefficients[:len(design.base)].copy()
-    for k, column in enumerate(search.regression.design.base):
+    for k, column in enumerate(search.design.base):
         if isinstance(column, ReversalShape):
             base[k] = 0.0
     effects = []
@@ -163,7 +181,7 @@ def placement_values(design: Design, found: CandidateSet, placement: Placement) 
 def squared_difference(search: Search, found: CandidateSet, model: ForceModel,
                        recordings: Sequence[Recording]) -> float:
     """Return the whitened squares of the exact forces of a fitted model less the linear ones."""
-    regression, design = search.regression, search.regression.design
+    regression, design = search.regression, search.design
     linear = linear_prediction(search, found)
     exact = exact_forces(design, model, recordings)
     total = 0.0
@@ -175,7 +193,7 @@ def squared_difference(search: Search, found: CandidateSet, model: ForceModel,
 
 def linear_prediction(search: Search, found: CandidateSet) -> Array:
     """Return the forces that the linear fit predicts, reversals as the model has them, (M, D)."""
-    design = search.regression.design
+    design = search.design
     prediction = design.residuals.model.copy()
     for column, c in zip(design.base, found.fit.coefficients, strict=False):
         if not isinstance(column, ReversalShape):

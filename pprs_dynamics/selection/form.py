@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.joint_fit import Block
 from pprs_dynamics.selection.candidates import (
     Candidate,
     CandidateSet,
     EffectCandidate,
-    UnknownCandidate,
 )
 from pprs_dynamics.selection.search import Search
 
@@ -58,6 +58,9 @@ def _share_of_allowance(search: Search, found: CandidateSet, candidate: Candidat
                         ) -> tuple[float, tuple[str, ...]]:
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
     decisions = search.decisions
+    # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
+    exact = isinstance(candidate, EffectCandidate) and not candidate.effect.idealised
+    share = decisions.own_form_share if exact else decisions.form_share
     drives = {d for block in candidate.blocks for d in block.rows}
     allowed, names = 0.0, []
     for other in found.effects:
@@ -65,8 +68,12 @@ def _share_of_allowance(search: Search, found: CandidateSet, candidate: Candidat
             continue
         size = sum(whitened_square(search, found, block, drives) for block in other.blocks)
         if size > 0:
-            allowed += (decisions.form_share ** 2) * size
+            allowed += share ** 2 * size
             names.append(other.name)
+    for effect in search.design.given.effects:
+        if isinstance(effect, CatalogueEffect) and effect.idealised:
+            allowed += share ** 2 * _square_of_part(search, found, effect.name, drives)
+            names.append(effect.name)
     own = decisions.own_form_share ** 2 * _own_friction(search, found, drives)
     if own > allowed:
         names = ["the model's own friction"]
@@ -98,22 +105,15 @@ def whitened_square(search: Search, found: CandidateSet, block: Block, drives: s
 
 def _own_friction(search: Search, found: CandidateSet, drives: set[int]) -> float:
     """Return the whitened square of the friction that the given model has on some drives."""
-    regression = search.regression
-    parts = regression.design.residuals.parts
-    total = 0.0
-    for d in drives:
-        own = sum((force[:, d] for name, force in parts.items() if name.endswith('friction')),
-                  np.zeros(len(regression.design.residuals)))
-        white = regression.whitened(found.fit, d, own)
-        total += float(white @ white)
-    return total
+    own = [effect.name for effect in search.design.given.effects
+           if not isinstance(effect, CatalogueEffect) and effect.name.endswith('friction')]
+    return sum(_square_of_part(search, found, name, drives) for name in own)
 
 
-def is_unknown(candidate: Candidate) -> bool:
-    """Return whether a candidate is of no catalogue."""
-    return isinstance(candidate, UnknownCandidate)
-
-
-def effects_of(found: CandidateSet) -> tuple[EffectCandidate, ...]:
-    """Return the catalogue's effects of a set, those with the most force beyond others first."""
-    return tuple(sorted(found.effects, key=lambda one: -beyond_others(found, one)))
+def _square_of_part(search: Search, found: CandidateSet, name: str, drives: set[int]) -> float:
+    """Return the whitened square of a part of the given model's force on some drives."""
+    force = search.regression.residuals.parts.get(name)
+    if force is None:
+        return 0.0
+    white = [search.regression.whitened(found.fit, d, force[:, d]) for d in drives]
+    return sum(float(one @ one) for one in white)

@@ -9,17 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.regression.design import Term, searched_in_drives
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.regression.design import Design, Term, searched_in_drives
+from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression, term_gains
 from pprs_dynamics.selection.candidates import EffectCandidate, Placement, Prices
-from pprs_dynamics.selection.decisions import Decisions
 
 
 @dataclass(frozen=True)
-class Offer:
+class ScannedTerm:
     """A term and variant that a scan proposes.
 
     Parameters
@@ -62,14 +60,14 @@ class DriveLibrary:
 
     Parameters
     ----------
+    design : Design
     regression : Regression
     d : int
     """
 
-    def __init__(self, regression: Regression, d: int) -> None:
+    def __init__(self, design: Design, regression: Regression, d: int) -> None:
         self.regression, self.d = regression, d
         self.series = regression.series[d]
-        design = regression.design
         self.trials: dict[str, int] = {}
         self.terms: list[Term] = []
         for effect in searched_in_drives(design):
@@ -127,7 +125,7 @@ class DriveLibrary:
                 self.rows, other.astype(np.float32)).astype(np.float32)
         return self._crosses[key]
 
-    def offers(self, fit: JointFit) -> dict[str, Offer]:
+    def offers(self, fit: JointFit) -> dict[str, ScannedTerm]:
         """Return the best shape and variant of every effect, by name, at the noise of a fit."""
         if not self.terms:
             return {}
@@ -146,7 +144,7 @@ class DriveLibrary:
             if block.is_fixed and self.d in block.rows:
                 side -= weighted(block)[:, 0]
         spread = known @ fit.covariance[np.ix_(index, index)]
-        best: dict[str, Offer] = {}
+        best: dict[str, ScannedTerm] = {}
         for group in self.groups:
             S = group.gram @ weights - spread[group.rows] @ known[group.rows].transpose(0, 2, 1)
             gains = term_gains(S, side[group.rows], group.precision, group.is_fixed)
@@ -154,7 +152,7 @@ class DriveLibrary:
                 term, names = group.terms[at]
                 name = term.effect.name
                 if name not in best or best[name].gain < gains[at]:
-                    best[name] = Offer(term, names, float(gains[at]))
+                    best[name] = ScannedTerm(term, names, float(gains[at]))
         return best
 
 
@@ -166,18 +164,17 @@ class Library:
 
     Parameters
     ----------
+    design : Design
     regression : Regression
-    decisions : Decisions
+        Of its residuals and base columns.
+    prices : Prices
     """
 
-    def __init__(self, regression: Regression, decisions: Decisions) -> None:
-        self.regression, self.decisions = regression, decisions
-        design = regression.design
-        self.prices = Prices(len(catalogue()), len(regression.drives), regression.samples,
-                             decisions.effect_odds, decisions.wrong_sign_odds)
+    def __init__(self, design: Design, regression: Regression, prices: Prices) -> None:
+        self.design, self.regression, self.prices = design, regression, prices
         self._placements: dict[Hashable, Placement] = {}
         self._turning: dict[Placement, Array | None] = {}
-        self.local = {d: DriveLibrary(regression, d) for d in regression.drives}
+        self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
         felt = [effect for effect in searched_in_drives(design) if _is_felt_everywhere(effect)]
         self.spanning = [self.placement(design.term(effect, d, {}), names)
                          for effect in felt for d in regression.drives
@@ -199,7 +196,7 @@ class Library:
         key = (effect, drive, names, tuple(sorted(shape.items())))
         found = self._placements.get(key)
         return found or self.placement(
-            self.regression.design.find_term(effect, drive, shape), names)
+            self.design.find_term(effect, drive, shape), names)
 
     def turning_rows(self, placement: Placement) -> Array | None:
         """Return what its friction changes by where it turns over otherwise, (k, w, n).
@@ -211,7 +208,7 @@ class Library:
         return self._turning[placement]
 
     def _turning_rows(self, placement: Placement) -> Array | None:
-        design, term, d = self.regression.design, placement.term, placement.drive
+        design, term, d = self.design, placement.term, placement.drive
         if d is None or not term.effect.is_friction:
             return None
         units = np.eye(len(term.names))[[term.names.index(name) for name in placement.names]]
@@ -233,7 +230,7 @@ class Library:
         return Placement(term, () if term.is_fixed else names, block,
                          self.prices.of_placement(term.effect, tried), bare)
 
-    def full(self, offer: Offer) -> Placement:
+    def full(self, offer: ScannedTerm) -> Placement:
         """Return the placement of an offer, with the rows of the exact term."""
         term = offer.term
         return self.placed(term.effect, term.drive, term.shape, offer.names)
@@ -246,65 +243,6 @@ class Library:
         if ordered[0].drive is not None:
             price += self.prices.of_drives(len(ordered))
         return EffectCandidate(effect, ordered, price)
-
-    def block_gain(self, fit: JointFit, block: Block) -> float:
-        """Return by how much the deviance falls with one more block, at the noise of a fit."""
-        regression = self.regression
-        size = len(next(iter(block.rows.values())))
-        S, b = np.zeros((size, size)), np.zeros(size)
-        taken = np.zeros((size, len(fit.coefficients)))
-        for d in block.rows:
-            weights = regression.weights(fit, d)
-            index, felt = regression.local(fit, d)
-
-            def weighted(other: Block | None, d: int = d, weights: Array = weights) -> Array:
-                found: Array = np.tensordot(weights, regression.products(block, other, d), 1)
-                return found
-
-            with_base = weighted(None)
-            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in felt)], axis=1)
-            S += weighted(block)
-            b += with_base[:, -1] - known @ fit.coefficients[index]
-            for one in fit.blocks:
-                if one.is_fixed and d in one.rows:
-                    b -= weighted(one)[:, 0]
-            taken[:, index] += known
-        S -= taken @ fit.covariance @ taken.T
-        return float(term_gains(S[None], b[None], block.precision[None], block.is_fixed)[0])
-
-
-def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
-    """Return by how much the deviance falls with each of n terms, (n,).
-
-    Parameters
-    ----------
-    S : (n, k, k) array
-        Whitened sums of products of the rows, less what is fitted already.
-    b : (n, k) array
-        Whitened sums of products with what is left.
-    precision : (n, k, k) array
-        Of the prior.
-    is_fixed : bool
-        True where the coefficient is 1.
-    """
-    if is_fixed:
-        fixed: Array = 2 * b[:, 0] - S[:, 0, 0]
-        return fixed
-    posterior = (S + S.transpose(0, 2, 1)) / 2 + precision
-    # What is fitted already can take all of a row, to rounding; then only the prior is left.
-    floor = 1e-6 * np.einsum('nkk->nk', precision)
-    diagonal = np.einsum('nkk->nk', posterior)
-    np.einsum('nkk->nk', posterior)[:] = np.maximum(diagonal, floor)
-    scale = 1 / np.sqrt(np.einsum('nkk->nk', posterior))
-    scaled = posterior * scale[:, :, None] * scale[:, None, :]
-    values, axes = np.linalg.eigh(scaled)
-    kept = values > 1e-7
-    along = np.einsum('nkj,nk->nj', axes, b * scale)
-    quadratic = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
-    log_det = (np.sum(np.log(np.maximum(values, 1e-7)), axis=1) - 2 * np.sum(np.log(scale), axis=1)
-               - np.linalg.slogdet(precision)[1])
-    gains: Array = quadratic - log_det
-    return gains
 
 
 def _is_felt_everywhere(effect: type[DriveEffect]) -> bool:

@@ -15,14 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.residuals.bins import BINS, bin_edges, populated_edges
 from pprs_dynamics.residuals.residuals import Residuals
 
-BINS = 12
 TIME_BINS = 16
 # Shares of the samples that lie below the speeds where bins of the velocity end.
 SLOW_SHARES = (0.03, 0.06, 0.12, 0.2, 0.35, 0.55, 0.8)
-# A bin must hold this share of the samples, else its mean is that of an incident.
-LEAST_SHARE = 0.01
 # Friction turns over at a reversal within a speed that is seldom known [m/s].
 REVERSAL_WIDTHS = (0.0003, 0.001, 0.003)
 RIPPLE_PERIODS = (2, 32)  # periods of a force ripple within the drive's travel
@@ -120,31 +118,11 @@ def build_families(residuals: Residuals, drive: int) -> list[Family]:
     return families
 
 
-def bin_edges(values: Array, bins: int) -> Array:
-    """Return edges halfway between equal widths and equal numbers of samples."""
-    even = np.linspace(values.min(), values.max(), bins + 1)
-    edges = 0.5 * (even + np.quantile(values, np.linspace(0, 1, bins + 1)))
-    return _populated(values, edges)
-
-
 def speed_edges(velocity: Array) -> Array:
     """Return edges of speed, from 0, that resolve slow motion."""
     speed = np.abs(velocity)
     edges = np.concatenate(([0.0], np.quantile(speed, SLOW_SHARES), [speed.max()]))
-    return _populated(speed, edges)
-
-
-def _populated(values: Array, edges: Array) -> Array:
-    kept = [edges[0]]
-    least = LEAST_SHARE * len(values)
-    ordered = np.sort(values)
-    rank = np.searchsorted(ordered, edges)
-    last = 0
-    for edge, position in zip(edges[1:-1], rank[1:-1], strict=True):
-        if position - last >= least and len(values) - position >= least:
-            kept.append(edge)
-            last = position
-    return np.array([*kept, edges[-1]])
+    return populated_edges(speed, edges)
 
 
 def _maybe(
@@ -218,7 +196,7 @@ def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
 
 def _velocity(name: str, values: Array, sign: Array | None, rivals: int) -> Family:
     speeds = speed_edges(values)
-    edges = _populated(values, np.concatenate((-speeds[:0:-1], speeds)))
+    edges = populated_edges(values, np.concatenate((-speeds[:0:-1], speeds)))
     edges[0], edges[-1] = min(edges[0], values.min()), max(edges[-1], values.max())
     bins = _indicators(values, edges)
     fast = values / np.abs(values).max()

@@ -8,7 +8,7 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, combinations
 
@@ -17,12 +17,14 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
 from pprs_dynamics.selection.candidates import (
     Candidate,
     CandidateSet,
     EffectCandidate,
     Placement,
+    Prices,
     UnknownCandidate,
     set_key,
 )
@@ -38,8 +40,7 @@ LEAST_IMPROVEMENT = 0.1  # in cost, for which a search goes on
 # one's noise: its own noise may favour it by about as much.
 PROPOSED, REPLACED = -12.0, 15.0
 
-# Corners of the noise below this share of the highest count as slow; what is left of them.
-FAST_SHARE, SLOW_LEFT = 0.1, 1e-3
+SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
 Candidates = tuple[Candidate, ...]
 
@@ -49,21 +50,26 @@ class Search:
 
     Parameters
     ----------
-    regression : Regression
+    design : Design
     decisions : Decisions
+    error_scale : mapping of drive to float, optional
+        See `Regression`.
     progress : callable, optional
         Called with the share of the work that is done.
     with_unknown : bool
         Patterns of no catalogue take part.
     """
 
-    def __init__(self, regression: Regression, decisions: Decisions,
+    def __init__(self, design: Design, decisions: Decisions,
+                 error_scale: Mapping[int, float] | None = None,
                  progress: Callable[[float], None] | None = None,
                  with_unknown: bool = True) -> None:
-        self.regression, self.decisions = regression, decisions
-        self.library = Library(regression, decisions)
-        self.patterns = ([PatternLibrary(self.library, d) for d in regression.drives]
-                         if with_unknown else [])
+        self.design, self.decisions = design, decisions
+        self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
+        prices = Prices.of(self.regression, decisions)
+        self.library = Library(design, self.regression, prices)
+        self.patterns = ([PatternLibrary(self.regression, prices, d)
+                          for d in self.regression.drives] if with_unknown else [])
         self.evaluated: dict[Hashable, CandidateSet] = {}
         self._report = progress or (lambda share: None)
 
@@ -76,7 +82,7 @@ class Search:
         """Return the best set that the search reaches."""
         self.evaluate(())
         if start:
-            self._refined(self.evaluate(start))
+            self.refined(self.evaluate(start))
         done = 1.0
         while True:
             done *= 0.7
@@ -162,7 +168,7 @@ class Search:
                 new.append(self.evaluate(candidates, near))
         for found in sorted(new, key=lambda one: one.cost)[:2]:
             if found.cost < self.best.cost + 4 * self.decisions.rival_margin:
-                self._refined(found)
+                self.refined(found)
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
@@ -177,22 +183,12 @@ class Search:
             count = int(self.decisions.proposals) if rank == 0 else 2
             found += [(candidates, base) for candidates in self.proposals(base, count)]
             if rank == 0:
-                fast = self._with_fast_noise(base)
+                fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
                 found += [(candidates, fast) for candidates in self.proposals(fast, REPLACEMENTS)]
                 for near in (base, fast) if self.patterns else ():
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
                     found += [((*base.candidates, pattern), near) for pattern in patterns]
         return found
-
-    def _with_fast_noise(self, base: CandidateSet) -> CandidateSet:
-        """Return a set under the noise that the higher frequencies alone would tell.
-
-        The slow part of a noise spectrum may be what is missing. It only proposes.
-        """
-        amplitudes = base.fit.amplitudes.copy()
-        corners = self.regression.noise_shapes.corners
-        amplitudes[:, 1:][:, corners < FAST_SHARE * corners[-1]] *= SLOW_LEFT
-        return replace(base, fit=self.regression.at(base.fit.blocks, amplitudes))
 
     def proposals(self, base: CandidateSet, count: int, drive: int | None = None,
                   least: float = PROPOSED) -> list[Candidates]:
@@ -233,12 +229,52 @@ class Search:
         for placement in (*library.structure, *library.spanning) if drive is None else ():
             key = (placement.term.effect, placement.drive)
             if key not in taken:
-                net = library.block_gain(fit, placement.block) - placement.price
+                net = self.regression.gain(fit, placement.block) - placement.price
                 if key not in best or net > best[key][0]:
                     best[key] = (net, placement)
         for (effect, _), (net, placement) in best.items():
             found.setdefault(effect, []).append((net, lambda placement=placement: placement))
         return found
+
+    def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
+                ) -> CandidateSet | None:
+        """Return the best set of one effect alone, on some drives or where it pays.
+
+        None where the model has it everywhere already.
+        """
+        base = self.evaluated[frozenset()]
+        fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
+        for near in (base, fast):
+            found = self._scan(near).get(effect, [])
+            if drives is None:
+                chosen = self._best_drives(effect, found, None)[1] if found else []
+            else:
+                chosen = [make for _, make in found if make().drive in drives]
+            if chosen:
+                candidate = self.library.candidate(effect, [make() for make in chosen])
+                self.refined(self.evaluate((candidate,), near))
+        while True:
+            alone = [one for one in self.evaluated.values() if one.candidates]
+            if not alone:
+                return None
+            best = min(alone, key=lambda one: one.cost)
+            for candidate in (*self._alternatives(best.effects[0]),
+                              *(self._variants(best.effects[0]))):
+                self.evaluate((candidate,), best)
+            after = min((one for one in self.evaluated.values() if one.candidates),
+                        key=lambda one: one.cost)
+            if after.cost > best.cost - LEAST_IMPROVEMENT:
+                return best
+            self.refined(after)
+
+    def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
+        """Yield the candidate with other coefficients of one placement."""
+        for placement in candidate.placements:
+            for names in candidate.effect.variants:
+                if names != placement.names and not placement.term.is_fixed:
+                    rest = [one for one in candidate.placements if one is not placement]
+                    yield self.library.candidate(candidate.effect, [
+                        *rest, self.library.placement(placement.term, names)])
 
     def _best_drives(
         self, effect: type[CatalogueEffect],
@@ -311,7 +347,7 @@ class Search:
                 self.evaluate(candidates, best)
             if self.best.cost > best.cost - LEAST_IMPROVEMENT:
                 return
-            self._refined(self.best)
+            self.refined(self.best)
 
     def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
         for candidate in best.candidates:
@@ -351,7 +387,7 @@ class Search:
     def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
         return tuple(new if c is old else c for c in found.candidates)
 
-    def _refined(self, found: CandidateSet) -> CandidateSet:
+    def refined(self, found: CandidateSet) -> CandidateSet:
         """Return the set with all shapes moved by Gauss-Newton steps that lower the cost."""
         for _ in range(SHAPE_ROUNDS):
             moved = self._moved(found)
@@ -397,7 +433,7 @@ class Search:
                     every[[placement.term.names.index(name) for name in placement.names]] = c
                     c = every
                 assert placement.drive is not None
-                rows = self.regression.design.slope_rows(placement.term, c)
+                rows = self.design.slope_rows(placement.term, c)
                 slopes.append((placement, self.regression.block(
                     {placement.drive: rows}, precision=np.eye(len(rows)))))
         return slopes
@@ -407,7 +443,7 @@ class Search:
         effect, d = placement.term.effect, placement.drive
         assert d is not None
         assert issubclass(effect, DriveEffect)
-        trials = effect.trials(self.regression.design.covered[d])
+        trials = effect.trials(self.design.covered[d])
         reach = {}
         for parameter in effect.shape:
             value = placement.term.shape[parameter.name]
@@ -419,3 +455,13 @@ class Search:
             gap = float(known[at] - known[at - 1])
             reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
         return reach
+
+
+def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
+    """Return a fit under the noise that the higher frequencies alone would tell.
+
+    The slow part of a noise spectrum may be what is missing. It only proposes.
+    """
+    amplitudes = fit.amplitudes.copy()
+    amplitudes[:, 1:][:, regression.noise_shapes.is_slow] *= SLOW_LEFT
+    return regression.at(fit.blocks, amplitudes)

@@ -8,18 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import log
 
 import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression, term_gains
+from pprs_dynamics.residuals.bins import LEAST_SHARE
 from pprs_dynamics.residuals.residuals import Residuals
-from pprs_dynamics.selection.candidates import UnknownCandidate
-from pprs_dynamics.selection.library import Library, term_gains
+from pprs_dynamics.selection.candidates import Prices, UnknownCandidate
 from pprs_dynamics.selection.patterns import (
-    LEAST_SHARE,
     Family,
     Pattern,
     build_families,
@@ -58,19 +56,19 @@ class PatternLibrary:
 
     Parameters
     ----------
-    library : Library
-        Of the same regression, for prices.
+    regression : Regression
+    prices : Prices
     d : int
     with_plain_forms : bool
         Also what effects of the catalogue are exactly: a constant, friction, a ripple.
     """
 
-    def __init__(self, library: Library, d: int, with_plain_forms: bool = False) -> None:
-        self.library, self.d = library, d
-        self.regression: Regression = library.regression
-        self.series = self.regression.series[d]
+    def __init__(self, regression: Regression, prices: Prices, d: int,
+                 with_plain_forms: bool = False) -> None:
+        self.regression, self.prices, self.d = regression, prices, d
+        self.series = regression.series[d]
         self.with_plain_forms = with_plain_forms
-        residuals = self.regression.design.residuals
+        residuals = regression.residuals
         index = self.series.index
         self.residuals = Residuals(
             residuals.drives, residuals.time[index], residuals.segment[index],
@@ -96,16 +94,23 @@ class PatternLibrary:
             found.append(_Scanned(family, columns, gram, precision))
         return found
 
+    @property
+    def families(self) -> list[Family]:
+        """All families that are searched."""
+        return [scanned.family for scanned in self._scanned]
+
+    def family_block(self, family: Family) -> Block:
+        """Return all columns of a family as one block: any curve along its variable."""
+        return self.regression.transformed_block({self.d: self.series.transform(family.columns)})
+
     def price(self, family: Family, drives: int = 1) -> float:
         """Return the price of a pattern of a family: that it is unknown, where, and which."""
-        prices = self.library.prices
-        return (prices.of_name() + prices.of_drives(drives) - 2 * log(
-            self.library.decisions.unknown_odds) + 2 * log(max(len(family.patterns), 1))
-            + 2 * log(family.rivals) + 2 * log(max(len(self._scanned), 1)))
+        return self.prices.of_pattern(max(len(self._scanned), 1) * family.rivals,
+                                      max(len(family.patterns), 1), drives)
 
     def candidate(self, family: Family, pattern: Pattern, rows: Array) -> UnknownCandidate:
         """Return a pattern with its columns (1 or 2, M at the series' samples)."""
-        full = np.zeros((len(rows), len(self.regression.design.residuals)))
+        full = np.zeros((len(rows), len(self.regression.residuals)))
         full[:, self.series.index] = rows
         block = self.regression.transformed_block({self.d: self.series.transform(rows)})
         return UnknownCandidate(family, pattern, {self.d: full}, {self.d: block},
@@ -113,7 +118,7 @@ class PatternLibrary:
 
     def on_more_drives(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
         """Return the candidate on all drives on which it pays, if all share its variable."""
-        residuals = self.regression.design.residuals
+        residuals = self.regression.residuals
         shared = candidate.family.variable in ('time', 'frequency') or (
             residuals.variables.get(candidate.family.variable, np.zeros((0, 0))).ndim == 1)
         if not shared or candidate.pattern.kind.startswith('directed'):
@@ -122,7 +127,7 @@ class PatternLibrary:
         for d in self.regression.drives:
             if d not in parts:
                 block = self.regression.block({d: candidate.rows[self.d]})
-                gains[d] = block, self.library.block_gain(fit, block)
+                gains[d] = block, self.regression.gain(fit, block)
         for d in sorted(gains, key=lambda d: -gains[d][1]):
             block, gain = gains[d]
             more = self.price(candidate.family, len(parts) + 1) - self.price(
@@ -134,8 +139,18 @@ class PatternLibrary:
                                 {d: parts[d] for d in order},
                                 self.price(candidate.family, len(parts)))
 
-    def proposals(self, fit: JointFit, count: int) -> list[tuple[UnknownCandidate, float]]:
-        """Return the best patterns of different variables with their gains less their prices."""
+    def proposals(self, fit: JointFit, count: int, always: bool = False,
+                  ) -> list[tuple[UnknownCandidate, float]]:
+        """Return the best patterns of different variables with their gains less their prices.
+
+        Parameters
+        ----------
+        fit : JointFit
+            At whose noise.
+        count : int
+        always : bool
+            Beyond `count`, those for which there is a plain word: a constant, friction.
+        """
         weights = self.regression.weights(fit, self.d)
         index, felt = self.regression.local(fit, self.d)
         series = self.series
@@ -163,13 +178,15 @@ class PatternLibrary:
             scored.append((float(gains[best]) - self.price(family), scanned, best))
         scored.sort(key=lambda one: -one[0])
         found = []
-        for score, scanned, best in scored[:count]:
+        for rank, (score, scanned, best) in enumerate(scored):
             family = scanned.family
+            if rank >= count and not (always and family.is_plain):
+                continue
             found.append((self.candidate(family, family.patterns[best],
                                          family.pattern_columns(best)), score))
         line = self.line(fit)
         if line is not None:
-            found.append((line, self.library.block_gain(fit, line.blocks[0]) - line.price))
+            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.price))
         return sorted(found, key=lambda one: -one[1])
 
     def line(self, fit: JointFit) -> UnknownCandidate | None:

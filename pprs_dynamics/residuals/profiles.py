@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
-from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.residuals.bins import BINS, bin_edges
+from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
-from pprs_dynamics.selection.patterns import BINS, bin_edges
 
 
 @dataclass(frozen=True)
@@ -54,29 +54,25 @@ class Spectrum:
 
 
 def error_profile(
-    residuals: Residuals, drive: int, variable: str, noise: NoiseModel | None = None,
-    bins: int = BINS,
+    residuals: Residuals, drive: int, variable: str, noise: NoiseSpectrum, bins: int = BINS,
 ) -> Profile | None:
     """Return the mean error over bins of a variable, or None where it is unknown or constant.
 
     Parameters
     ----------
-    noise : NoiseModel, optional
-        Of the error; fitted to it where not given, which counts what is systematic as slow
-        noise and so makes the uncertainty larger, not smaller.
+    noise : NoiseSpectrum
+        Of the drive.
     """
     error, values = residuals.error[:, drive], residuals.variable(variable, drive)
     if values is None or np.ptp(values) == 0:
         return None
-    search = DriveSearch(residuals, drive)
-    noise = noise or fit_noise(search.error, search.stretches)
     edges = bin_edges(values, bins)
     count = len(edges) - 1
     place = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, count - 1)
     known = np.isfinite(error)
     mean, spread, rms = (np.full(count, np.nan) for _ in range(3))
     samples = np.zeros(count, dtype=int)
-    covariance = noise.covariance(len(error))
+    covariance = noise.covariance(len(error), residuals.period)
     for k in range(count):
         held = known & (place == k)
         samples[k] = held.sum()
@@ -87,26 +83,22 @@ def error_profile(
     return Profile(edges, mean, spread, rms, samples)
 
 
-def error_spectrum(residuals: Residuals, drive: int, noise: NoiseModel | None = None) -> Spectrum:
+def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Spectrum:
     """Return the spectrum of the drive's error, averaged over its stretches, Hann window."""
     from scipy.signal import welch
 
-    search = DriveSearch(residuals, drive)
-    longest = max(part.stop - part.start for part in search.stretches)
-    noise = noise or fit_noise(search.error, search.stretches)
+    series = DriveSeries(residuals, drive, FrequencyBands.for_residuals(residuals))
+    longest = max(part.stop - part.start for part in series.stretches)
     size = max(min(longest, 4096), min(longest, 16))
     powers, weights = [], []
-    for part in search.stretches:
+    for part in series.stretches:
         if part.stop - part.start >= size:
-            frequency, power = welch(search.error[part], 1 / residuals.period, nperseg=size,
+            frequency, power = welch(series.error[part], 1 / residuals.period, nperseg=size,
                                      detrend=False)
             powers.append(power)
             weights.append(part.stop - part.start)
-    grid = size * (1 + 4 * len(noise.filter) // size)
-    background = 2 * residuals.period * noise.spectrum(grid)
-    at = np.linspace(0, 1 / (2 * residuals.period), len(background))
     return Spectrum(frequency, np.average(powers, axis=0, weights=weights),
-                    np.interp(frequency, at, background))
+                    2 * noise.period * noise.power(frequency))
 
 
 def _variance_of_mean(held: np.typing.NDArray[np.bool_], covariance: Array) -> float:

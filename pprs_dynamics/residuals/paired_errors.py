@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.joint_fit import BLOCKS, LEAST_SAMPLES
-from pprs_dynamics.diagnosis.noise import NoiseModel
-from pprs_dynamics.diagnosis.search import DriveSearch
+from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
 
-SAME_PERIOD = 0.05  # relative, for noise of one recording to be that of another
+BLOCKS = 10
+LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 
 
 def rms(residuals: Residuals) -> float:
@@ -21,35 +21,33 @@ def rms(residuals: Residuals) -> float:
 
 
 def rms_by_drive(residuals: Residuals) -> dict[str, float]:
-    """Return the same for every drive that was measured [N]."""
+    """Return the root of the mean squared error of every drive that was measured [N]."""
     return {drive: float(np.sqrt(np.nanmean(residuals.error[:, d] ** 2)))
             for d, drive in enumerate(residuals.drives)
             if np.isfinite(residuals.error[:, d]).any()}
 
 
-def block_gains(before: Residuals, after: Residuals, noises: Mapping[int, NoiseModel],
-                period: float) -> Array:
+def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseSpectrum]) -> Array:
     """Return what a model takes off the whitened squared error of each block, (B,).
 
     Parameters
     ----------
     before, after : Residuals
         Of two models on the same recordings.
-    noises : mapping of drive to NoiseModel
-        Fitted at a period [s]; where the recordings have another, it is fitted to `after`.
-    period : float
+    noises : mapping of str to NoiseSpectrum
+        By drive.
     """
     edges = np.linspace(0, len(before), BLOCKS + 1)
+    bands = FrequencyBands.for_residuals(before)
     gains = np.zeros(BLOCKS)
-    for d in range(len(before.drives)):
-        searches = [DriveSearch(residuals, d) for residuals in (before, after)]
-        if any(search.known.sum() < LEAST_SAMPLES for search in searches):
-            continue
-        same = abs(after.period / period - 1) < SAME_PERIOD and d in noises
-        noise = noises[d] if same else searches[1].fit_noise(searches[1].error)
-        for sign, search in zip((1, -1), searches, strict=True):
-            squares = search.whiten(noise, search.error) ** 2
-            block = np.searchsorted(edges, search.index, side='right') - 1
+    for d, name in enumerate(before.drives):
+        for sign, residuals in ((1, before), (-1, after)):
+            series = DriveSeries(residuals, d, bands)
+            if name not in noises or series.known.sum() < LEAST_SAMPLES:
+                continue
+            root = np.sqrt(noises[name].power(series.frequency))
+            squares = series.inverse(series.transform(series.error) / root) ** 2 * series.known
+            block = np.searchsorted(edges, series.index, side='right') - 1
             gains += sign * np.bincount(block, squares, BLOCKS)
     return gains
 

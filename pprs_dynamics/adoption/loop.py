@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
-from pprs_dynamics.diagnosis.adopt import Adoption, adopt, original
+from pprs_dynamics.adoption.adopt import Adoption, adopt, original
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.diagnosis.form import FORM_SHARE
 from pprs_dynamics.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.diagnosis.trial import Offer
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 
@@ -19,7 +18,7 @@ REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
 
 
 @dataclass(frozen=True)
-class Walk:
+class AdoptionRun:
     """What was adopted, one after the other, and why it ended.
 
     Parameters
@@ -31,7 +30,7 @@ class Walk:
     model : ForceModel
         With all that was adopted.
     last : Diagnosis
-        Of the model where the walk ended.
+        Of the model where the run ended.
     """
 
     steps: tuple[Adoption, ...]
@@ -45,22 +44,22 @@ class Walk:
         """The steps that were taken."""
         return tuple(step for step in self.steps if step.adopted)
 
-    def as_data(self) -> dict[str, Any]:
-        """Return the walk for JSON."""
+    def to_json(self) -> dict[str, Any]:
+        """Return the run for JSON."""
         return {'ended': self.ended, 'reason': self.reason,
-                'steps': [step.as_data() for step in self.steps]}
+                'steps': [step.to_json() for step in self.steps]}
 
 
 def adopt_all(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     record: Callable[[Adoption], ForceModel] = lambda adoption: adoption.after,
     progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
-) -> Walk:
+) -> AdoptionRun:
     """Adopt what recordings call for, until a diagnosis finds nothing, or cannot tell.
 
     Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
     error, and which of them it is another recording must show. What is refused is left out
-    until something else has been adopted, and the walk goes on with what else was found.
+    until something else has been adopted, and the run goes on with what else was found.
 
     Parameters
     ----------
@@ -83,7 +82,7 @@ def adopt_all(
     """
     report = progress or (lambda what, share: None)
     steps: list[Adoption] = []
-    taken: list[FoundEffect] = []
+    taken = 0
     refused: list[Adoption] = []
     if diagnosis is not None and original(model) is not model:
         diagnosis = None
@@ -91,18 +90,18 @@ def adopt_all(
         if diagnosis is None:
             diagnosis = diagnose(original(model), recordings, (),
                                  lambda share: report('diagnosing', share))
-        found = _next(diagnosis, taken, {step.offer.effect.name for step in refused})
+        found = _next(diagnosis, {step.effect for step in refused})
         if found is None and refused:
-            reasons = '; '.join(f'{step.offer.effect.name}: {step.reason}' for step in refused)
-            return Walk(tuple(steps), REFUSED, reasons, model, diagnosis)
-        if found is None or len(taken) == MOST_STEPS:
+            reasons = '; '.join(f'{step.effect}: {step.reason}' for step in refused)
+            return AdoptionRun(tuple(steps), REFUSED, reasons, model, diagnosis)
+        if found is None or taken == MOST_STEPS:
             ended = 'unknown' if diagnosis.depends_on else 'adequate'
             reason = (f'what remains no effect of the catalogue explains: '
                       f'{diagnosis.depends_on[0].text}' if diagnosis.depends_on
                       else 'nothing that is left stands out against noise')
-            return Walk(tuple(steps), ended, reason, model, diagnosis)
+            return AdoptionRun(tuple(steps), ended, reason, model, diagnosis)
         name = found.name
-        step = adopt(model, Offer(found.effect, found.drives), recordings, validate,
+        step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,
                      progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
                      diagnosis=diagnosis)
         steps.append(step)
@@ -110,33 +109,18 @@ def adopt_all(
             refused.append(step)
             continue
         model = record(step)
-        taken.append(found)
+        taken += 1
         refused.clear()
         if step.rivals:
-            return Walk(tuple(steps), AMBIGUOUS, f'{", ".join(step.rivals)} would explain these '
+            return AdoptionRun(tuple(steps), AMBIGUOUS, f'{", ".join(step.rivals)} would explain these '
                         f'recordings as well as {name}: pprs next-experiment tells which motion '
                         'separates them', model, diagnosis)
         diagnosis = None
 
 
-def _next(diagnosis: Diagnosis, taken: Sequence[FoundEffect], refused: Set[str],
-          ) -> FoundEffect | None:
+def _next(diagnosis: Diagnosis, refused: Set[str]) -> FoundEffect | None:
     """Return what to adopt: those that are certain first, an ambiguous one as the last."""
-    new = [one for one in diagnosis.effects
-           if one.name not in refused and not _is_form(one, taken)]
+    new = [one for one in diagnosis.effects if one.name not in refused]
     ambiguous = {name for names in diagnosis.indistinguishable for name in names}
     certain = [one for one in new if one.name not in ambiguous]
     return next(iter(certain or new), None)
-
-
-def _is_form(one: FoundEffect, taken: Sequence[FoundEffect]) -> bool:
-    """Return whether an effect is what the form of an adopted one leaves.
-
-    Every effect is an idealisation; within one diagnosis the selection judges likewise.
-    """
-    for other in taken:
-        shared = (one.drives is None or other.drives is None
-                  or set(one.drives) & set(other.drives))
-        if shared and one.evidence < FORM_SHARE * other.evidence:
-            return True
-    return False

@@ -6,65 +6,65 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.adoption.fit_effect import EffectFit
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.adoption import Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.diagnosis.paired_errors import certainty
-from pprs_dynamics.diagnosis.scan import OWN_SHARE
-from pprs_dynamics.diagnosis.selection import FIRST_ERRORS, FURTHER_ERRORS
-from pprs_dynamics.diagnosis.trial import Offer, Trial
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.axis_friction import AxisFriction
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.passive_friction import PassiveFriction
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.residuals.paired_errors import certainty
 from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.selection.estimates import Estimate
 
 SURE = 2.0  # standard deviations
 MOVING = 5.0  # widths in which friction turns over
 BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
-# Not friction: what they do below the bound no other force makes good.
-NOT_FRICTION = ('drive_inertia', 'revolute_stiffness')
+# Standard errors of the blocks' losses by which the first effect, and further ones, must gain.
+FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
+OWN_SHARE = 1e-6  # of a column's whitened square, below which nothing tells its coefficient
 
 
-def of_other_effects(offer: Offer, trial: Trial, diagnosis: Diagnosis) -> list[str]:
+def of_other_effects(request: EffectRequest, fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
     """Return whether the recordings call for another effect, or for none."""
-    mine = next((one for one in diagnosis.effects if one.name == offer.name), None)
+    mine = next((one for one in diagnosis.effects if one.name == request.name), None)
     if mine is not None:
-        missed = [drive for drive in trial.drives or () if drive not in (mine.drives or ())]
+        missed = [drive for drive in fitted.drives or () if drive not in (mine.drives or ())]
         if mine.drives and missed:
-            return [f'the recordings show {offer.name} on {", ".join(mine.drives)}, not on '
+            return [f'the recordings show {request.name} on {", ".join(mine.drives)}, not on '
                     f'{", ".join(missed)}']
-        return _evidence(trial, diagnosis)
-    if any(offer.name in names for names in diagnosis.indistinguishable):
-        return _evidence(trial, diagnosis)
+        return _evidence(fitted, diagnosis)
+    if any(request.name in names for names in diagnosis.indistinguishable):
+        return _evidence(fitted, diagnosis)
     if diagnosis.effects:
         best = diagnosis.effects[0]
         on = f' on {", ".join(best.drives)}' if best.drives else ''
         return [f'{best.name}{on} explains these recordings better: evidence '
-                f'{best.evidence:.3g} against {trial.evidence:.3g}']
+                f'{best.evidence:.3g} against {fitted.evidence:.3g}']
     if diagnosis.depends_on:
         return [f'no effect of the catalogue has the form of the error: '
                 f'{diagnosis.depends_on[0].text}']
-    suspect = any(one.name == offer.name for one in diagnosis.suspects)
-    if trial.evidence > 0 and not suspect:
+    suspect = any(one.name == request.name for one in diagnosis.suspects)
+    if fitted.evidence > 0 and not suspect:
         return ['it does not predict parts of the recordings that it was not fitted to']
     why = ': slow noise would explain it as well; repeat the recording' if suspect else ''
-    return [f'these recordings do not call for it: evidence {trial.evidence:.3g}, where 0 is the '
+    return [f'these recordings do not call for it: evidence {fitted.evidence:.3g}, where 0 is the '
             f'threshold{why}']
 
 
-def _evidence(trial: Trial, diagnosis: Diagnosis) -> list[str]:
-    if trial.evidence > 0:
+def _evidence(fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
+    if fitted.evidence > 0:
         return []
     first = diagnosis.effects[0]
-    if first.name != trial.offer.name:
+    if first.name != fitted.request.name:
         return [f'it shows only beside {first.name}: adopt that first (evidence '
-                f'{trial.evidence:.3g} without it, where 0 is the threshold)']
-    return [f'on {", ".join(trial.drives or ("the structure",))} the evidence is '
-            f'{trial.evidence:.3g}, where 0 is the threshold']
+                f'{fitted.evidence:.3g} without it, where 0 is the threshold)']
+    return [f'on {", ".join(fitted.drives or ("the structure",))} the evidence is '
+            f'{fitted.evidence:.3g}, where 0 is the threshold']
 
 
 def of_held_out_error(before: float, after: float, gains: Array, model: ForceModel,
@@ -109,15 +109,20 @@ def of_linearity(promised: float, found: float) -> list[str]:
             f'{promised:.4g} N: its parameters are too far from where they started']
 
 
-def of_identifiability(trial: Trial) -> list[str]:
+def of_identifiability(fitted: EffectFit) -> list[str]:
     """Return whether the recordings tell the parameters at all."""
-    if trial.own_share < OWN_SHARE:
-        return [f'these recordings cannot tell {trial.offer.name} from what the model has: of its '
-                f'square only {trial.own_share:.1e} is its own']
-    told = {key: one for key, one in trial.parameters.items()
-            if not key.endswith('phase') and one.value != 0.0}
+    if fitted.own_share < OWN_SHARE:
+        return [f'these recordings cannot tell {fitted.request.name} from what the model has: of its '
+                f'square only {fitted.own_share:.1e} is its own']
+    angles = {p.name for p in fitted.request.effect.parameters if p.is_angle}
+
+    def is_angle(key: str) -> bool:
+        return key.rpartition('.')[2] in angles
+
+    told = {key: one for key, one in fitted.parameters.items()
+            if not is_angle(key) and one.value != 0.0}
     vague = [key for key, one in told.items() if abs(one.value) < SURE * one.std]
-    linear = {p.name for p in trial.offer.effect.linear or trial.offer.effect.shape}
+    linear = {p.name for p in fitted.request.effect.linear or fitted.request.effect.shape}
     sizes = [key for key in told if key.rpartition('.')[2] in linear] or list(told)
     if sizes and all(key in vague for key in sizes):
         shown = '; '.join(f'{key} = {_with_std(told[key])}' for key in sizes[:3])
@@ -125,11 +130,11 @@ def of_identifiability(trial: Trial) -> list[str]:
     return []
 
 
-def of_physics(trial: Trial, after: Residuals) -> list[str]:
+def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
     """Return whether friction would push, or a stiffness or inertia be negative."""
-    bounds = trial.offer.effect.unphysical_below
+    bounds = fitted.request.effect.unphysical_below
     low = {}
-    for key, one in trial.parameters.items():
+    for key, one in fitted.parameters.items():
         bound = bounds.get(key.rpartition('.')[2])
         if bound is not None and one.value + SURE * one.std < bound:
             low[key] = one
@@ -137,15 +142,15 @@ def of_physics(trial: Trial, after: Residuals) -> list[str]:
         return []
     first = next(iter(low))
     told = f'{first} would be {_with_std(low[first])}'
-    if trial.offer.name in NOT_FRICTION:
+    if not fitted.request.effect.is_friction:
         return [f'{told}, but it must not be negative']
-    pushing = _pushing_drives(trial.model, after)
-    if trial.drives is None:
+    pushing = _pushing_drives(fitted.model, after)
+    if fitted.drives is None:
         shares = pushing.get('', 0.0)
         return [] if shares < PUSHES else [
             f'{told}: with all friction of the model, the joints would give power back in '
             f'{shares:.0%} of the moving time']
-    worst = {drive: pushing[drive] for drive in trial.drives
+    worst = {drive: pushing[drive] for drive in fitted.drives
              if pushing[drive] >= PUSHES and any(key.startswith(f'{drive}.') for key in low)}
     if not worst:
         return []
@@ -167,7 +172,7 @@ def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]
         elif isinstance(effect, PassiveFriction):
             passive += part
         elif (isinstance(effect, CatalogueEffect) and effect.unphysical_below
-              and effect.name not in NOT_FRICTION):
+              and effect.is_friction):
             if isinstance(effect, DriveEffect):
                 own += part
             else:

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.search import Candidate, DriveSearch
+from pprs_dynamics.selection.candidates import UnknownCandidate
+from pprs_dynamics.selection.patterns import Pattern
+from pprs_dynamics.selection.unknown import PatternLibrary
 
 # How a variable is called, and the unit it is read in: factor from SI, and name.
 UNITS = {
-    'position': (1e3, 'mm'), 'velocity': (1e3, 'mm/s'), 'acceleration': (1.0, 'm/s^2'),
+    'position': (1e3, 'mm'), 'velocity': (1e3, 'mm/s'), 'acceleration': (1.0, 'm/s²'),
     'load': (1.0, 'N'), 'rod_angle': (180 / np.pi, 'deg'), 'platform_x': (1e3, 'mm'),
     'platform_y': (1e3, 'mm'), 'platform_z': (1e3, 'mm'), 'platform_tilt': (180 / np.pi, 'deg'),
     'platform_turn': (180 / np.pi, 'deg'), 'time': (1.0, 's'), 'frequency': (1.0, 'Hz'),
@@ -39,9 +41,10 @@ class Statement:
         Of the samples, within the range.
     text : str
     evidence : float
-        Gain in deviance with the noise refitted, less the price of the tries.
+        By which the cost rises without it.
     kind : str
-        Of pattern, see `hypotheses.Pattern`; 'scatter' for a changed variance.
+        Of pattern, see `patterns.Pattern`; 'scatter' for a changed variance, 'level' for noise
+        far above that of the other drives.
     amplitude : float
         Size of the pattern [N].
     mean_square : float
@@ -71,50 +74,72 @@ class Statement:
 
 
 def word_statement(
-    drive: str, search: DriveSearch, candidate: Candidate, rivals: tuple[str, ...],
+    drive: str, library: PatternLibrary, candidate: UnknownCandidate, coefficients: Array,
+    evidence: float, rivals: tuple[str, ...],
 ) -> Statement:
-    """Return the statement that a candidate makes."""
+    """Return the statement that a pattern makes.
+
+    Parameters
+    ----------
+    drive : str
+    library : PatternLibrary
+        Of the drive.
+    candidate : UnknownCandidate
+    coefficients : (1 or 2,) array
+        Fitted [N].
+    evidence : float
+    rivals : tuple of str
+        Variables that would do as well.
+    """
     pattern, variable = candidate.pattern, candidate.family.variable
-    known = search.known
-    error, columns = search.error[known], candidate.columns[:, known]
-    # The coefficients of the pattern alone; adopted columns come first.
-    own = (candidate.fit.coefficients[-len(columns):] if candidate.fit is not None
-           else np.zeros(len(columns)))
-    shape = own @ columns
+    series = library.series
+    known = series.known
+    error = series.error[known]
+    columns = candidate.rows[library.d][:, series.index][:, known]
+    shape = coefficients @ columns
     total = max(float(error @ error), 1e-300)
     limits, share, time = pattern.limits, 0.0, 1.0
     if limits is None:
         share = float(np.clip(1 - (error - shape) @ (error - shape) / total, 0.0, 1.0))
         if pattern.kind == 'line':
-            width = 1 / (len(search.error) * search.residuals.period)
+            width = 1 / (len(series) * library.residuals.period)
             limits = (pattern.scale - width, pattern.scale + width)
     else:
         held = np.abs(columns[0]) > 0.5
         if pattern.kind == 'fading':
-            held = np.abs(search.values(variable)[known]) < limits[1]
+            held = np.abs(library.values(variable)[known]) < limits[1]
         share, time = float(error[held] @ error[held]) / total, float(held.mean())
-    amplitude = float(np.abs(own).max()) if candidate.family.paired is False else float(
-        np.hypot(*own))
-    signed = float(own[0]) if len(own) else 0.0
+    amplitude = float(np.hypot(*coefficients)) if candidate.family.paired else float(
+        np.abs(coefficients).max())
+    signed = float(coefficients[0])
     if pattern.kind == 'fading':
         # Its coefficient belongs to a standstill, which hardly any sample is as near as.
         amplitude = float(np.abs(shape).max())
         signed = float(np.copysign(amplitude, signed))
-    mean_square = float(np.mean(shape ** 2))
-    if pattern.kind == 'scatter':
-        mean_square = total / len(error) * max(share - time, 0.0)
-    sentence = _sentence(candidate, search, signed, amplitude, share, time, shape)
+    sentence = _sentence(variable, pattern, library, signed, amplitude, share, time, shape)
     if rivals:
         sentence += f'; {_listed([_words(name) for name in rivals])} would explain it about as well'
-    return Statement(drive, variable, limits, share, time, f'{drive}: {sentence}',
-                     candidate.score, pattern.kind, amplitude, mean_square, rivals)
+    return Statement(drive, variable, limits, share, time, f'{drive}: {sentence}', evidence,
+                     pattern.kind, amplitude, float(np.mean(shape ** 2)), rivals)
+
+
+def word_scatter(drive: str, library: PatternLibrary, variable: str, pattern: Pattern,
+                 column: Array, evidence: float) -> Statement:
+    """Return the statement that the noise is larger in a range than elsewhere."""
+    known = library.series.known
+    error = library.series.error[known]
+    held = column[known] > 0.5
+    total = max(float(error @ error), 1e-300)
+    share, time = float(error[held] @ error[held]) / total, float(held.mean())
+    sentence = _sentence(variable, pattern, library, 0.0, 0.0, share, time, np.zeros(0))
+    return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {sentence}',
+                     evidence, 'scatter', 0.0, total / len(error) * max(share - time, 0.0))
 
 
 def _sentence(
-    candidate: Candidate, search: DriveSearch, signed: float, amplitude: float, share: float,
-    time: float, shape: Array,
+    variable: str, pattern: Pattern, library: PatternLibrary, signed: float, amplitude: float,
+    share: float, time: float, shape: Array,
 ) -> str:
-    pattern, variable = candidate.pattern, candidate.family.variable
     kind, word = pattern.kind, _words(variable)
     if kind == 'offset':
         return (f'its error has a mean of {signed:+.3g} N over the whole recording, '
@@ -132,10 +157,10 @@ def _sentence(
                 f'{share:.0%} of its squared error')
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
-        low, high = _ends(search, variable, shape, kind == 'directed_growth')
+        low, high = _ends(library, variable, shape, kind == 'directed_growth')
         return (f'its error changes with {word}: {low:+.3g} N at its least, {high:+.3g} N at its '
                 f'greatest{opposed}; this is {share:.0%} of its squared error')
-    place = _place(candidate, search)
+    place = _place(variable, pattern, library)
     where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'
     if kind == 'scatter':
         return (f'{where}; it scatters there {np.sqrt(pattern.scale):.2g} times as much as '
@@ -144,15 +169,14 @@ def _sentence(
     return f'{where}; it is shifted there by {signed:+.3g} N{along}'
 
 
-def _place(candidate: Candidate, search: DriveSearch) -> str:
-    variable, pattern = candidate.family.variable, candidate.pattern
+def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
     assert pattern.limits is not None
     low, high = pattern.limits
     if variable == 'direction':
         return 'in the positive direction' if low >= 0 else 'in the negative direction'
     factor, unit = UNITS[variable.partition(' of ')[0]]
     word = _words(variable)
-    values = search.values(variable)
+    values = library.values(variable)
     speed = pattern.kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')
     if variable.startswith('velocity') and (speed or np.isclose(-low, high)):
         word = word.replace('velocity', 'speed')
@@ -166,11 +190,11 @@ def _place(candidate: Candidate, search: DriveSearch) -> str:
 
 
 def _ends(
-    search: DriveSearch, variable: str, shape: Array, directed: bool,
+    library: PatternLibrary, variable: str, shape: Array, directed: bool,
 ) -> tuple[float, float]:
-    values = search.values(variable)[search.known]
+    values = library.values(variable)[library.series.known]
     if directed:
-        shape = shape * search.values('direction')[search.known]
+        shape = shape * library.values('direction')[library.series.known]
     order = np.argsort(values)
     few = max(1, len(order) // 100)
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
