@@ -8,13 +8,19 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.selection.estimates import Calibration, Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect
-from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.diagnosis.found_effects import (
+    FoundEffect,
+    RankedEffect,
+    RankedSet,
+    WithinModelError,
+)
 from pprs_dynamics.diagnosis.statements import Statement
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.selection.estimates import Calibration, Estimate
 
 SAMPLES, PERIOD = 1500, 0.01
 NOISE = 0.05  # [N]
@@ -74,10 +80,27 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
     fields: dict[str, Any] = {
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'candidates': tuple(
             RankedEffect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
-        'suspects': (), 'depends_on': (), 'of_form': (), 'calibrated': (), 'warnings': (),
+        'suspects': (), 'depends_on': (), 'within_model_error': (), 'sets': (),
+        'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
+        'noise_floors': dict.fromkeys(DRIVES, NOISE),
         'notes': (), 'model': model, 'adopted': model, 'residuals': given,
         'remaining': residuals.error, 'noise_floor': NOISE}
     return Diagnosis(**{**fields, **changes})
+
+
+def white_noise() -> NoiseSpectrum:
+    """Return the noise between model and effort."""
+    return NoiseSpectrum(np.array([1.0]), np.array([NOISE ** 2, 0.0]), PERIOD)
+
+
+def within_model_error(of: str = 'coulomb_friction') -> WithinModelError:
+    """Return a small further effect that may be the lack of fit of another."""
+    return WithinModelError('hysteresis', ('lift_2',), 0.021, (of,))
+
+
+def ranked_sets(*names: str) -> tuple[RankedSet, ...]:
+    """Return sets of one effect each, every one 7 worse than the one before."""
+    return tuple(RankedSet(((name, ('lift_2',)),), 7.0 * k) for k, name in enumerate(names))
 
 
 def calibration(after: float = 1.02) -> Calibration:

@@ -25,15 +25,15 @@ from ros_processes import environment, executable, node_process
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.adoption import loop, objections
 from pprs_dynamics.adoption.adopt import Adoption, adopt
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.adoption.request import EffectRequest
+from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.model.ledger import read_steps
 from pprs_dynamics.model.model_file import build_model, default_parameters, read_parameters
 from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.residuals.measuring import measure_residuals
 
 BENCHMARKS = Path(__file__).parents[1] / 'benchmarks'
 MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'adoption_score')

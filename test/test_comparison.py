@@ -8,16 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
-
-from pprs_dynamics.diagnosis.comparison import compare
-from pprs_dynamics.diagnosis.localisation import Localisation
 from pprs_dynamics.diagnosis.noise import (
     effective_samples,
     find_repetition,
     fit_noise,
     unrepeated,
 )
+from scipy.signal import lfilter
+
+from pprs_dynamics.diagnosis.comparison import compare
+from pprs_dynamics.diagnosis.localisation import Localisation
 from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
 

@@ -86,7 +86,7 @@ def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
 
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
-    added = {'calibrated', 'held_out_on', 'noise_floor', 'warnings'}
+    added = {'calibrated', 'held_out_on', 'noise_floor', 'noise_floors', 'sets', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
         assert set(effect) == {'name', 'drives', 'parameters', 'error_before', 'error_after',
@@ -96,6 +96,10 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
             assert set(parameter) == {'value', 'std', 'unit'}
     for candidate in result['candidates']:
         assert set(candidate) == {'name', 'drives', 'evidence', 'error_after'}
+    assert set(result['noise_floors']) == set(DRIVES)
+    assert result['sets'][0]['cost'] == 0.0
+    assert [one['name'] for one in result['sets'][0]['effects']] == [HIDDEN]
+    assert all(one['cost'] > 0 for one in result['sets'][1:])
     assert result['held_out_on'] == 'validation'
     assert all(isinstance(one, str) for one in result['warnings'])
 

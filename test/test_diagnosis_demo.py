@@ -18,10 +18,10 @@ from rich.console import Console
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.residuals.measuring import measure_residuals
-from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.measurement.recording import read_recording
 from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.residuals.residuals import Residuals
 
 DEMO = Path(diagnosis_demo.__file__)
 SEED, DURATION = 20, 8.0  # [s]

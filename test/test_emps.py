@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from ros_processes import executable
 
-from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.adoption.loop import adopt_all
+from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.model.model_file import load_model
 
 DOCS = Path(__file__).parents[1] / 'docs'

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 BENCHMARKS = Path(__file__).parents[1] / 'benchmarks'

@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.reconstruction import reconstruct
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.residuals.measuring import measure_residuals
 
 RATE, DURATION, NOISE, ENCODER = 500.0, 20.0, 0.08, 1e-6
 # The reconstruction itself leaves 0.001 N, which under 0.03 N of treated noise adds 0.1 %.

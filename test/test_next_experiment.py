@@ -9,22 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
-
-from pprs_dynamics import DriveModel
-from pprs_dynamics.regression.design import Design
 from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
 from pprs_dynamics.diagnosis.stages import Stage
+from ros_processes import executable
+
+from pprs_dynamics import DriveModel
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.experiments.columns import Block, plan_for
 from pprs_dynamics.experiments.commissioning import commissioning
 from pprs_dynamics.experiments.criteria import Contest, Explanation, Precision
 from pprs_dynamics.experiments.fourier_path import FourierFamily
-from pprs_dynamics.experiments.information import Information, NoiseSpectra, block_index
+from pprs_dynamics.experiments.information import Information, whitened
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.experiments.next_experiment import PurposeError, experiment_of, next_experiment
-from pprs_dynamics.experiments.question import _Asker
+from pprs_dynamics.experiments.question import question_after
 from pprs_dynamics.experiments.trajectory_search import (
     NoMotionError,
     TrajectorySearch,
@@ -35,6 +34,54 @@ from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.model_file import build_robot, default_parameters
+from pprs_dynamics.regression.base_columns import (
+    KnownNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+)
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.joint_fit import Regression
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.selection.candidates import CandidateSet
+from pprs_dynamics.selection.decisions import DECISIONS
+from pprs_dynamics.selection.expansion import Selection
+from pprs_dynamics.selection.rivals import Rival
+from pprs_dynamics.selection.search import Search
+from pprs_dynamics.effects.catalogue import CATALOGUE
+from pprs_dynamics.experiments.columns import ColumnPlan, FittedTerm
+from pprs_dynamics.experiments.commissioning import commissioning
+from pprs_dynamics.experiments.criteria import Contest, Explanation, Precision
+from pprs_dynamics.experiments.fourier_path import FourierFamily
+from pprs_dynamics.experiments.information import Information, whitened
+from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
+from pprs_dynamics.experiments.next_experiment import PurposeError, experiment_of, next_experiment
+from pprs_dynamics.experiments.question import question_after
+from pprs_dynamics.experiments.trajectory_search import (
+    NoMotionError,
+    TrajectorySearch,
+    forces_of,
+)
+from pprs_dynamics.measurement.pose_files import read_poses
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.model.model_file import build_robot, default_parameters
+from pprs_dynamics.regression.base_columns import (
+    KnownNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+)
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.joint_fit import Regression
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.selection.candidates import CandidateSet
+from pprs_dynamics.selection.decisions import DECISIONS
+from pprs_dynamics.selection.expansion import Selection
+from pprs_dynamics.selection.rivals import Rival
+from pprs_dynamics.selection.search import Search
+from pprs_dynamics.regression.design import Design
 
 DURATION = 8.0
 HARMONICS = np.array([[1, 2, 4], [1, 3, 5], [2, 3, 4], [1, 2, 3], [1, 4, 5], [2, 4, 5]])
@@ -88,13 +135,13 @@ def test_velocities_and_accelerations_are_those_of_the_poses(parameters: np.ndar
 
 # Columns and information.
 
-BLOCKS = (
-    Block(CATALOGUE['stribeck_friction'], 3, {'velocity': 0.02, 'exponent': 2.0}, (0,),
-          np.array([0.5])),
-    Block(CATALOGUE['drive_spring'], 0, {}, (0, 1), np.array([10.0, 1.0])),
-    Block(CATALOGUE['time_delay'], 4, {'delay': 0.004}, (0,), np.ones(1)),
-    Block(CATALOGUE['homing_error'], 1, {}, (0,), np.array([0.001])),
-    Block(CATALOGUE['base_tilt'], None, {}, (0, 1), np.array([0.01, 0.0])))
+TERMS = (
+    FittedTerm(CATALOGUE['stribeck_friction'], 3, {'velocity': 0.02, 'exponent': 2.0}, ('force',),
+               np.array([0.5])),
+    FittedTerm(CATALOGUE['drive_spring'], 0, {}, ('stiffness', 'preload'), np.array([10.0, 1.0])),
+    FittedTerm(CATALOGUE['time_delay'], 4, {'delay': 0.004}, (), np.ones(1)),
+    FittedTerm(CATALOGUE['homing_error'], 1, {}, ('zero',), np.array([0.001])),
+    FittedTerm(CATALOGUE['base_tilt'], None, {}, ('about_x', 'about_y'), np.array([0.01, 0.0])))
 EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_mass'],
            'effects.viscous_friction.lift_2.coefficient': 1.5,
            'effects.stribeck_friction.slide_2.force': 0.6,

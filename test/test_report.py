@@ -13,11 +13,11 @@ import pytest
 from browser import find_browser, render
 from ros_processes import executable
 
-from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.measurement.recording import read_recording, write_recording
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.report.comparison_figures import thinned, worst_spans
 from pprs_dynamics.report.page import Page
+from pprs_dynamics.residuals.residuals import Residuals
 
 needs_browser = pytest.mark.skipif(
     find_browser() is None, reason='no Chromium on PATH to look at the page with')

@@ -17,13 +17,12 @@ from made_up_diagnosis import (
     made_up_diagnosis,
     made_up_residuals,
     statement,
+    within_model_error,
 )
 from rich.console import Console
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
-from pprs_dynamics.diagnosis.found_effects import joined
-from pprs_dynamics.selection.patterns import OWN, PLATFORM
 from pprs_dynamics.diagnosis.partial import partial_residual, remaining_profile
 from pprs_dynamics.diagnosis.quantities import name_drives, with_uncertainty
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
@@ -34,6 +33,7 @@ from pprs_dynamics.model.model_file import build_model, default_parameters
 from pprs_dynamics.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.report.diagnosis_tables import diagnosis_view
+from pprs_dynamics.selection.patterns import OWN, PLATFORM
 
 VARIABLES = (*OWN, *PLATFORM, 'velocity', 'direction', 'time', 'frequency', 'position of lift_1',
              'velocity of slide_3')
@@ -60,7 +60,7 @@ def everything() -> Diagnosis:
                             found_effect('asymmetric_friction', DRIVES[:5]),
                             found_effect('payload_offset', None)),
         indistinguishable=(('payload_offset', 'external_wrench'),), depends_on=(statement(),),
-        suspects=(SUSPECT,), of_form=(statement('lift_1', 'velocity'),),
+        suspects=(SUSPECT,), within_model_error=(within_model_error('stribeck_friction'),),
         calibrated=(calibration(),), warnings=('effort of slide_1 looks filtered',))
 
 
@@ -184,9 +184,10 @@ def test_an_effect_of_measurement_is_never_a_command() -> None:
         assert ('never a command' in what) is told
 
 
-def test_a_remainder_of_an_effects_form_names_the_effect() -> None:
-    words = word_diagnosis(one_effect(of_form=(statement('lift_2', 'velocity'),)))
-    assert 'little beside coulomb_friction' in words.of_form[0]
+def test_what_is_within_model_error_names_the_effect_whose_it_is_and_its_size() -> None:
+    words = word_diagnosis(one_effect(within_model_error=(within_model_error(),)))
+    assert words.within_model_error[0].startswith(
+        'hysteresis on lift_2, 0.021 N rms, is within the model error of coulomb_friction')
 
 
 @pytest.mark.parametrize('name', CATALOGUE)
@@ -230,7 +231,7 @@ def test_the_terminal_shows_everything_within_its_width(make: Any, width: int) -
     assert '…' not in text, 'nothing is cut off'
     shown = re.sub(r'[\s│]+', ' ', text)
     for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
-                     *words.of_form, *words.warnings):
+                     *words.within_model_error, *words.warnings):
         assert sentence in shown
     for finding in (*words.effects, *words.unexplained):
         for sentence in (finding.what, finding.why, finding.cause, finding.confirm,
@@ -291,16 +292,3 @@ def test_the_page_escapes_what_comes_from_files() -> None:
     assert '<script>alert(1)' not in html
     assert '&lt;script&gt;alert(1)' in html
     assert 'Held out: &lt;b&gt;' in html
-
-
-def test_an_effect_that_is_found_on_further_drives_is_told_once() -> None:
-    first = found_effect('effort_gain', ('lift_2',), error_after=0.2)
-    further = found_effect('effort_gain', ('slide_1',), error_before=0.2, error_after=0.1)
-    other = found_effect('load_friction', ('lift_1',), error_before=0.1, error_after=0.05)
-    gain, friction = joined([first], [further, other], DRIVES)
-    assert (gain.name, gain.drives) == ('effort_gain', ('slide_1', 'lift_2'))
-    assert set(gain.parameters) == {'slide_1.gain', 'lift_2.gain'}
-    assert gain.evidence == first.evidence + further.evidence
-    assert (gain.error_before, gain.error_after) == (first.error_before, 0.1)
-    np.testing.assert_array_equal(gain.force, first.force + further.force)
-    assert friction is other

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pprs_dynamics.diagnosis.joint_fit import Regression
 from ros_processes import environment, executable
 
 from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
-from pprs_dynamics.regression.design import Design, sensitivities_of
-from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.measurement.reconstruction import reconstruct
@@ -21,6 +20,7 @@ from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import HelicalPath
 from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.model.model_file import build_model, build_robot, read_parameters
+from pprs_dynamics.regression.design import Design, sensitivities_of
 
 CONFIG = Path(__file__).parents[1] / 'config'
 FILE = CONFIG / 'single_axis.yaml'

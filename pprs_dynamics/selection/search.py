@@ -34,6 +34,7 @@ from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
+REFINED = 3  # of the sets fitted in a round
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a search goes on
 # Lowest score of a proposal, and how much worse than the best a replacement may look at the best
@@ -161,14 +162,15 @@ class Search:
     # Moves
 
     def _try(self, sets: Iterable[tuple[Candidates, CandidateSet]]) -> None:
-        """Fit sets, each from the noise of a near one, and refine the shapes of the best two."""
+        """Fit sets, each from the noise of a near one, and refine the shapes of the best few."""
         new = []
         for candidates, near in sets:
             if set_key(candidates) not in self.evaluated and self._is_bounded(candidates):
                 new.append(self.evaluate(candidates, near))
-        for found in sorted(new, key=lambda one: one.cost)[:2]:
-            if found.cost < self.best.cost + 4 * self.decisions.rival_margin:
-                self.refined(found)
+        # A pattern of no catalogue is at its best from the start, an effect once its shape is.
+        shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
+        for found in sorted(shaped, key=lambda one: one.cost)[:REFINED]:
+            self.refined(found)
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:

@@ -26,6 +26,7 @@ from pprs_dynamics.selection.patterns import (
 
 LOWEST_LINE = 3.0  # periods within the longest stretch, below which a line is a drift
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for
+FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
 # Limits of a range are moved by up to a bin, then by shares of it: a step in time is to be met to
 # the sample.
 LIMIT_STEPS = (1.0, 0.2, 0.04, 0.008)
@@ -227,6 +228,8 @@ class PatternLibrary:
             Without the candidate.
         """
         pattern, family = candidate.pattern, candidate.family
+        if pattern.kind == 'line':
+            return self._line_refined(candidate, fit)
         if pattern.kind not in ('range', 'directed_range') or pattern.limits is None:
             return candidate
         speed = family.variable.startswith('velocity') and pattern.kind == 'directed_range'
@@ -262,6 +265,23 @@ class PatternLibrary:
         moved = replace(pattern, limits=(limits[0], limits[1]))
         rows = np.asarray((values >= limits[0]) & (values <= limits[1]), dtype=float) * sign
         return self.candidate(family, moved, rows[None])
+
+    def _line_refined(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
+        """Return a line after Gauss-Newton steps in its frequency."""
+        frequency, time = candidate.pattern.scale, self.residuals.time
+        root = np.sqrt(self.series.spread(self.regression.weights(fit, self.d)))
+        rest = self.regression.remaining(fit, self.d) * root
+        middle = time - time.mean()
+        for _ in range(FREQUENCY_STEPS):
+            wave = np.stack((np.cos(2 * np.pi * frequency * time),
+                             np.sin(2 * np.pi * frequency * time)))
+            a, b = np.linalg.lstsq((self.series.transform(wave) * root).T, rest, rcond=None)[0]
+            slope = 2 * np.pi * middle * (b * wave[0] - a * wave[1])
+            rows = self.series.transform(np.concatenate((wave, slope[None]))) * root
+            step = np.linalg.lstsq(rows.T, rest, rcond=None)[0][2]
+            frequency += float(np.clip(step, -0.25 / np.ptp(time), 0.25 / np.ptp(time)))
+        rows = np.stack((np.cos(2 * np.pi * frequency * time), np.sin(2 * np.pi * frequency * time)))
+        return self.candidate(candidate.family, Pattern('line', scale=frequency), rows)
 
     def values(self, variable: str) -> Array:
         """Return a variable by its name in the interface, also one of another drive, (n,)."""
