@@ -4,7 +4,7 @@
 
 Each case hides a random effect in the simulated robot and records two motions. `pprs diagnose
 --adopt-all` sees the first recording; the error of the model it writes is taken on the second,
-beside that of the best fit of the hidden effect's own form. Then `pprs adopt` is offered an
+beside that of the best fit of the hidden effect's own form. Then `pprs adopt` is asked for an
 effect that is not there, which it must refuse. Outcomes are appended to FILE as they come, and
 cases that are there are not run again.
 """
@@ -30,12 +30,12 @@ from hidden_recordings import LEAD, Case, Scene, noise_settings
 from hidden_strength import Whitening
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.measurement.reconstruction import reconstruct
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.prescribed import PrescribedPlant
@@ -144,25 +144,25 @@ def run_case(case: Case, wrong: str) -> dict[str, Any]:
         write_recording(folder / 'first.csv', first)
         write_recording(folder / 'second.csv', second)
         common = (str(folder / 'first.csv'), '--model', str(folder / 'model.yaml'))
-        walk = pprs('diagnose', *common, '--adopt-all', '--output', str(folder / 'new.yaml'),
-                    '--json', str(folder / 'walk.json'))
+        loop = pprs('diagnose', *common, '--adopt-all', '--output', str(folder / 'new.yaml'),
+                    '--json', str(folder / 'loop.json'))
         written = (folder / 'new.yaml').exists()
         errors = [_error(folder / file, second) if (folder / file).exists() else float('nan')
                   for file in ('model.yaml', 'new.yaml')]
-        said = json.loads((folder / 'walk.json').read_text()) if (
-            folder / 'walk.json').exists() else {}
-        offered = pprs('adopt', wrong, *common, '--output', str(folder / 'wrong.yaml'),
+        said = json.loads((folder / 'loop.json').read_text()) if (
+            folder / 'loop.json').exists() else {}
+        refused = pprs('adopt', wrong, *common, '--output', str(folder / 'wrong.yaml'),
                        '--json', str(folder / 'wrong.json'))
         reason = json.loads((folder / 'wrong.json').read_text())['reason'] if (
-            folder / 'wrong.json').exists() else offered.stderr.strip()
+            folder / 'wrong.json').exists() else refused.stderr.strip()
     best = robot.best_error(first, second)
     adoption = said.get('adoption', {})
     return {'name': case.name, 'seed': case.seed, 'hidden': list(case.effects),
             'adopted': [step['effect'] for step in adoption.get('steps', [])
                         if step['adopted']],
-            'ended': adoption.get('ended', walk.stderr.strip()), 'status': walk.returncode,
+            'ended': adoption.get('ended', loop.stderr.strip()), 'status': loop.returncode,
             'given': errors[0], 'error': errors[1] if written else errors[0], 'best': best,
-            'wrong': wrong, 'wrong_status': offered.returncode, 'wrong_reason': reason}
+            'wrong': wrong, 'wrong_status': refused.returncode, 'wrong_reason': reason}
 
 
 def _error(model: Path, recording: Recording) -> float:

@@ -25,9 +25,9 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.localisation import localise
-from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.residuals.residuals import Residuals
 
 DURATION, RATE = 40.0, 100.0  # [s, Hz]
 NOISE, ERROR = 0.08, 0.3  # [N]

@@ -12,6 +12,7 @@ from typing import Any
 from pprs_dynamics.diagnosis.library import Candidate
 from pprs_dynamics.diagnosis.scan import Scan
 from pprs_dynamics.diagnosis.selection import NEAR_SCORE, Selector
+
 from pprs_dynamics.effects.catalogue import catalogue
 
 

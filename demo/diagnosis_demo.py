@@ -26,10 +26,10 @@ from rich.markup import escape
 from rich.table import Table
 from ros_processes import executable
 
-from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.measurement.recording import read_recording
 from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.residuals.measuring import measure_residuals
 
 REFUSED = 1  # exit status of pprs
 SEEDS = 10_000

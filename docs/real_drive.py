@@ -18,12 +18,12 @@ from scipy.signal import butter, decimate, filtfilt
 
 from pprs_dynamics import AxisModel, AxisMotion, PprsError
 from pprs_dynamics.adoption.adopt import Adoption, adopt
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.adoption.loop import AdoptionRun, adopt_all
-from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.adoption.request import EffectRequest
+from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.residuals.measuring import measure_residuals
 
 matplotlib.use('Agg')
 from matplotlib import pyplot
@@ -108,7 +108,7 @@ class Story:
 
 
 def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> Story:
-    """Run everything; the pulses run gates the second walk and the ripple, and nothing else."""
+    """Run everything; the pulses run gates the second loop and the ripple, and nothing else."""
     model = AxisModel.load()
     report('diagnosing')
     diagnosis = diagnose(model, [run])
@@ -162,22 +162,22 @@ def document(story: Story) -> str:
     rows: list[tuple[str, ForceModel]] = [
         ('published, symmetric friction', story.model),
         ('with asymmetric_friction', story.asymmetric.after)]
-    for walk, name in ((story.blind, 'blocks'), (story.gated, 'pulses run')):
-        rows += [(f'gated by {name}: + {step.effect}', step.after) for step in walk.adopted]
+    for outcome, name in ((story.blind, 'blocks'), (story.gated, 'pulses run')):
+        rows += [(f'gated by {name}: + {step.effect}', step.after) for step in outcome.adopted]
     for name, model in rows:
         figures = [f(model, one) for f in (error_of, compared) for one in (run, pulses)]
         lines.append(f'| {name} | ' + ' | '.join(f'{one:.2f} %' for one in figures) + ' |')
     lines += ['', f'- Gated by blocks of the identification run: {_ending(story.blind)}',
               f'- Gated by the pulses run: {_ending(story.gated)}']
     if story.ripple is not None:
-        lines.append(f'- A force_ripple offered to the last model: '
+        lines.append(f'- A force_ripple asked for in the last model: '
                      f'{"taken" if story.ripple.adopted else "refused"}: {story.ripple.reason}.')
     return '\n'.join(lines) + '\n\n![Error over velocity and over time](images/real_drive.png)\n'
 
 
-def _ending(walk: AdoptionRun) -> str:
-    steps = ', '.join(step.effect for step in walk.adopted) or 'nothing'
-    return f'{steps} adopted; ended {walk.ended}: {walk.reason}.'
+def _ending(outcome: AdoptionRun) -> str:
+    steps = ', '.join(step.effect for step in outcome.adopted) or 'nothing'
+    return f'{steps} adopted; ended {outcome.ended}: {outcome.reason}.'
 
 
 def draw(story: Story, path: Path) -> None:

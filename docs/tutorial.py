@@ -24,10 +24,10 @@ from rich.progress import track  # noqa: E402
 from ros_processes import executable  # noqa: E402
 
 from pprs_dynamics import DriveModel  # noqa: E402
-from pprs_dynamics.residuals.measuring import measure_residuals  # noqa: E402
-from pprs_dynamics.residuals.residuals import Residuals  # noqa: E402
 from pprs_dynamics.measurement.recording import read_recording  # noqa: E402
 from pprs_dynamics.report.figures import BLUE, GREY, RED, pyplot_module, save  # noqa: E402
+from pprs_dynamics.residuals.measuring import measure_residuals  # noqa: E402
+from pprs_dynamics.residuals.residuals import Residuals  # noqa: E402
 
 HIDDEN, ON = 'stribeck_friction', 'slide_1'
 BINS = 40  # of equal numbers of samples

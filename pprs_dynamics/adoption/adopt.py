@@ -70,6 +70,8 @@ class Adoption:
     held_out_on : {'blocks', 'validation'}
     noise_floor : float
         Root of the mean square of the noise, as the diagnosis has it [N].
+    noise_floors : mapping of str to float
+        The same by drive [N].
     """
 
     request: EffectRequest
@@ -92,6 +94,7 @@ class Adoption:
     held_out_after: float
     held_out_on: str
     noise_floor: float
+    noise_floors: dict[str, float]
 
     @property
     def effect(self) -> str:
@@ -234,7 +237,8 @@ class _Case:
         return Adoption(
             self.request, self.request.drives, False, False, f'its fit gives no model: {reason}',
             (reason,), (), {}, (), (), self.model, self.model, before, before, error, error,
-            held_out, held_out, VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor)
+            held_out, held_out, VALIDATION if self.validate else BLOCKS,
+            self.diagnosis.noise_floor, self.diagnosis.noise_floors)
 
     def answer(
         self, after: ForceModel, drives: tuple[str, ...] | None, found: list[str],
@@ -253,7 +257,8 @@ class _Case:
             self.request, drives, adopted, bool(found) and self.force, reason, tuple(found),
             tuple(remarks), parameters, calibrated, rivals, self.model, after, residuals_before,
             residuals_after, rms(residuals_before), rms(residuals_after), *held_out,
-            VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor)
+            VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor,
+            self.diagnosis.noise_floors)
 
 
 def _linear_error(search: Search, found: CandidateSet) -> float:

@@ -9,7 +9,9 @@ import argparse
 
 from rich.markup import escape
 
-from pprs_dynamics.commands.ledger_entry import Book, check_output
+from pprs_dynamics.adoption.adopt import adopt
+from pprs_dynamics.adoption.request import EffectRequest
+from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,
@@ -18,8 +20,6 @@ from pprs_dynamics.commands.recordings import (
     read_validation,
     show_findings,
 )
-from pprs_dynamics.adoption.adopt import adopt
-from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_page import adoption_page
@@ -45,13 +45,13 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     base = check_output(options.output, options.model)
     model = load_model(base)
-    offer = EffectRequest.of(options.effect, model.drives)
-    offer.require_place(model)
+    request = EffectRequest.of(options.effect, model.drives)
+    request.require_place(model)
     recordings = read_all(options, screen, model.drives)
     validation = read_validation(options, screen, model.drives)
     show_findings((*recordings, *validation), screen)
-    with progress_bar(screen, f'adopting {offer.name}') as progress:
-        answer = adopt(model, offer, recordings, validation, options.force,
+    with progress_bar(screen, f'adopting {request.name}') as progress:
+        answer = adopt(model, request, recordings, validation, options.force,
                        lambda share: progress(share, 1.0))
     screen.print(adoption_view(answer))
     if options.json:
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         screen.print(f'page: {escape(str(page.write(options.report)))}')
     if not answer.adopted:
         return 1
-    book = Book.of(dict(zip(options.recordings, recordings, strict=True)),
+    book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
                    dict(zip(options.validate, validation, strict=True)))
     write_model(options.output, book.entered(answer).values, base)
     screen.print(f'model: {escape(options.output)}')

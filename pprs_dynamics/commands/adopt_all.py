@@ -9,10 +9,10 @@ from typing import Any
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from pprs_dynamics.commands.ledger_entry import Book, check_output
+from pprs_dynamics.adoption.loop import REFUSED, adopt_all
+from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.adoption.loop import REFUSED, adopt_all
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_writer import write_model
@@ -29,21 +29,21 @@ def adopt_what_was_found(
     it, if anything.
     """
     base = check_output(options.output, options.model)
-    book = Book.of(dict(zip(options.recordings, recordings, strict=True)),
+    book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
                    dict(zip(options.validate, validate, strict=True)))
     columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=screen, transient=True) as bar:
         task = bar.add_task('adopting', total=1.0)
-        walk = adopt_all(
+        outcome = adopt_all(
             model, recordings, validate, book.entered,
             lambda what, share: bar.update(task, description=what, completed=share), diagnosis)
-    for step in walk.steps:
+    for step in outcome.steps:
         screen.print(adoption_view(step))
-    screen.print(f'[bold]{walk.ended}[/]: {escape(walk.reason)}')
+    screen.print(f'[bold]{outcome.ended}[/]: {escape(outcome.reason)}')
     if options.json:
-        write_json(options.json, {**diagnosis.to_json(), 'adoption': walk.to_json()})
-    if walk.adopted or walk.ended != REFUSED:
-        write_model(options.output, walk.model.values, base)
-        count = len(walk.adopted)
+        write_json(options.json, {**diagnosis.to_json(), 'adoption': outcome.to_json()})
+    if outcome.adopted or outcome.ended != REFUSED:
+        write_model(options.output, outcome.model.values, base)
+        count = len(outcome.adopted)
         screen.print(f'model, {count} effect{"s" * (count != 1)} added: {escape(options.output)}')
-    return int(walk.ended == REFUSED)
+    return int(outcome.ended == REFUSED)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from pprs_dynamics import __version__
 from pprs_dynamics.adoption.adopt import Adoption
-from pprs_dynamics.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording
@@ -19,10 +18,11 @@ from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import NOT_KNOWN, Step, with_step
 from pprs_dynamics.model.model_file import build_model, find_file
 from pprs_dynamics.model.model_writer import refuse_same_file
+from pprs_dynamics.residuals.paired_errors import rms_by_drive
 
 
 @dataclass(frozen=True)
-class Source:
+class RecordingEntry:
     """A recording as the ledger names it: file, hash, first and last time [s]."""
 
     name: str
@@ -30,29 +30,29 @@ class Source:
     span: tuple[float, float]
 
     @classmethod
-    def of(cls, path: str | PathLike[str], recording: Recording) -> Source:
+    def of(cls, path: str | PathLike[str], recording: Recording) -> RecordingEntry:
         """Return what the ledger says of a recording."""
         time = recording.epoch + recording.time
         return cls(recording.name, fingerprint(path), (float(time[0]), float(time[-1])))
 
 
 @dataclass(frozen=True)
-class Book:
+class LedgerBook:
     """Enters adoptions into a model's ledger.
 
     Parameters
     ----------
-    fitted, validation : tuple of Source
+    fitted, validation : tuple of RecordingEntry
     """
 
-    fitted: tuple[Source, ...]
-    validation: tuple[Source, ...]
+    fitted: tuple[RecordingEntry, ...]
+    validation: tuple[RecordingEntry, ...]
 
     @classmethod
-    def of(cls, fitted: Mapping[str, Recording], validation: Mapping[str, Recording]) -> Book:
+    def of(cls, fitted: Mapping[str, Recording], validation: Mapping[str, Recording]) -> LedgerBook:
         """Make it from recordings by path."""
-        return cls(tuple(Source.of(*one) for one in fitted.items()),
-                   tuple(Source.of(*one) for one in validation.items()))
+        return cls(tuple(RecordingEntry.of(*one) for one in fitted.items()),
+                   tuple(RecordingEntry.of(*one) for one in validation.items()))
 
     def entered(self, adoption: Adoption) -> ForceModel:
         """Return the model of an adoption with its step in the ledger."""

@@ -37,6 +37,7 @@ from pprs_dynamics.selection.expansion import (
 from pprs_dynamics.selection.form import Remainder, without_remainders
 from pprs_dynamics.selection.held_out import hold_out
 from pprs_dynamics.selection.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.selection.rivals import find_rivals
 from pprs_dynamics.selection.search import Search
 
 MOST_SETS = 8  # that are told with their costs
@@ -228,16 +229,11 @@ class _Answer:
 
     def _rivals(self) -> dict[str, list[str]]:
         """Return, for each adopted effect, what stands for it in sets that are nearly as good."""
-        mine = {c.name for c in self.kept.effects}
-        ignored = {one.candidate.name for one in self.remainders}
-        rivals: dict[str, list[str]] = {name: [] for name in mine}
-        for other in self.selection.ranked:
-            if other.cost > self.best.cost + self.decisions.rival_margin:
-                break
-            theirs = {c.name for c in other.effects} - ignored
-            missing, instead = mine - theirs, theirs - mine
-            for name in missing:
-                rivals[name] += [one for one in sorted(instead) if one not in rivals[name]]
+        rivals: dict[str, list[str]] = {c.name: [] for c in self.kept.effects}
+        for rival in find_rivals(self.selection, self.kept, self.decisions.rival_margin,
+                                 {one.candidate.name for one in self.remainders}):
+            for name in rival.missing:
+                rivals[name] += [one for one in rival.instead if one not in rivals[name]]
         return rivals
 
     def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:

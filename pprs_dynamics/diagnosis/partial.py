@@ -9,12 +9,10 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.diagnosis.noise import fit_noise
-from pprs_dynamics.residuals.profiles import Profile, error_profile
-from pprs_dynamics.diagnosis.search import DriveSearch
 from pprs_dynamics.diagnosis.statements import UNITS
+from pprs_dynamics.residuals.bins import bin_edges
+from pprs_dynamics.residuals.profiles import Profile, error_profile
 from pprs_dynamics.residuals.residuals import Residuals
-from pprs_dynamics.selection.patterns import bin_edges
 
 FINE_BINS = 24
 # Of the variance of an effect, what means over bins of a variable must tell to draw it along it.
@@ -57,11 +55,9 @@ def partial_residual(diagnosis: Diagnosis, found: FoundEffect) -> PartialResidua
     without = _with_error(diagnosis.residuals, diagnosis.remaining + found.force)
     variable, share = _most_telling(without, drive, force)
     profile, fitted = None, np.zeros(0)
-    if share > TELLING:
-        # The noise is what is left with the effect, not what it is to stand out from.
-        rest = DriveSearch(remaining_residuals(diagnosis), drive)
-        profile = error_profile(without, drive, variable, fit_noise(rest.error, rest.stretches),
-                                FINE_BINS)
+    noise = diagnosis.noise.get(without.drives[drive])
+    if share > TELLING and noise is not None:
+        profile = error_profile(without, drive, variable, noise, FINE_BINS)
     if profile is not None:
         values = without.variable(variable, drive)
         assert values is not None
@@ -72,14 +68,16 @@ def partial_residual(diagnosis: Diagnosis, found: FoundEffect) -> PartialResidua
 
 def remaining_profile(diagnosis: Diagnosis, drive: str, variable: str) -> Profile | None:
     """Return the mean of what remains on a drive along a variable of the interface."""
-    residuals = remaining_residuals(diagnosis)
+    residuals, noise = remaining_residuals(diagnosis), diagnosis.noise.get(drive)
+    if noise is None:
+        return None
     name, of, other = variable.partition(' of ')
     if of:
         values = residuals.variable(name, residuals.drives.index(other))
         if values is None:
             return None
         residuals = replace(residuals, variables={**residuals.variables, variable: values})
-    return error_profile(residuals, residuals.drives.index(drive), variable, bins=FINE_BINS)
+    return error_profile(residuals, residuals.drives.index(drive), variable, noise, FINE_BINS)
 
 
 def remaining_residuals(diagnosis: Diagnosis) -> Residuals:

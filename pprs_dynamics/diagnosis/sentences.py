@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from pprs_dynamics.selection.estimates import Calibration, Estimate
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect
+from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, WithinModelError
 from pprs_dynamics.diagnosis.quantities import (
     INTERVAL,
     listed,
@@ -22,6 +19,7 @@ from pprs_dynamics.effects.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.effects.catalogue import find_effect
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import Parameter
+from pprs_dynamics.selection.estimates import Calibration, Estimate
 
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
@@ -72,7 +70,7 @@ class Sentences:
         The verdict.
     effects, unexplained : tuple of Finding
         In the order of `Diagnosis.effects` and `Diagnosis.depends_on`.
-    suspects, of_form, calibrated, warnings : tuple of str
+    suspects, within_model_error, calibrated, warnings : tuple of str
     following : str
         What to do next.
     """
@@ -81,7 +79,7 @@ class Sentences:
     effects: tuple[Finding, ...]
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
-    of_form: tuple[str, ...]
+    within_model_error: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
     following: str
@@ -95,9 +93,7 @@ def word_diagnosis(diagnosis: Diagnosis) -> Sentences:
         tuple(Finding(*describe_unexplained(one, bool(diagnosis.effects)))
               for one in diagnosis.depends_on),
         tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
-        tuple(f'{one.text}. That is little beside {listed(_on_drive(diagnosis, one.drive))}, and '
-              'taken for its form, which in a robot is never quite the catalogue\'s'
-              for one in diagnosis.of_form),
+        tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
         tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
         diagnosis.warnings,
         _following(diagnosis))
@@ -288,12 +284,10 @@ def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:
             'threshold); repeat the recording')
 
 
-def _on_drive(diagnosis: Diagnosis, drive: str) -> list[str]:
-    """Return the effects that act on a drive, those that sit on it first."""
-    index = diagnosis.residuals.drives.index(drive)
-    sitting = [one.name for one in diagnosis.effects if one.drives and drive in one.drives]
-    return sitting or [one.name for one in diagnosis.effects if np.any(one.force[:, index])] or [
-        'what the model has there']
+def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
+    return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}, '
+            f'{newtons(one.rms)} rms, is within the model error of {listed(one.of)}: a real '
+            'machine is only nearly of the form that the catalogue gives it. Not adopted')
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from pprs_dynamics.residuals.live import Compared, LiveComparison
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import conversions
@@ -18,6 +17,7 @@ from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
 from pprs_dynamics.nodes.whole import message_in
+from pprs_dynamics.residuals.live import Compared, LiveComparison
 
 PARAMETERS = (
     NodeParameter('window', 0.12, 'of the smoothing that gives velocity and acceleration; '

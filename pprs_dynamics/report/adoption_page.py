@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.adoption.adopt import Adoption
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.error_steps import ErrorStep
-from pprs_dynamics.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.report.adoption_tables import error_rows, headline, parameter_rows
 from pprs_dynamics.report.comparison_figures import LINES, curve
 from pprs_dynamics.report.diagnosis_figures import before_and_after, waterfall
 from pprs_dynamics.report.page import Page, plotly_objects
+from pprs_dynamics.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.residuals.residuals import Residuals
 
 
@@ -33,9 +33,9 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     page.table(('error on', 'before [N]', 'after [N]', 'change'), error_rows(answer))
     page.bullets(answer.remarks)
     page.heading('The error falls')
-    page.text('Root of the mean square; dashed is what noise leaves.', 'note')
+    page.text('Root of the mean square; dashed is the noise.', 'note')
     page.figure(waterfall([_step('model as given', before), _step(answer.effect, after)],
-                          before.drives, answer.noise_floor, _by_drive(after)))
+                          before.drives, answer.noise_floor, answer.noise_floors))
     if answer.parameters:
         page.heading('What it is')
         page.table(('parameter', 'value', '± 2 standard deviations', 'unit'),
@@ -45,9 +45,9 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
         page.heading('What each added effect contributes')
         page.figure(parts)
     page.heading('Before and after')
-    for drive in range(len(before.drives)):
-        if np.isfinite(before.measured[:, drive]).any():
-            page.figure(before_and_after(before, after, drive, answer.noise_floor))
+    for drive, name in enumerate(before.drives):
+        if name in answer.noise_floors:
+            page.figure(before_and_after(before, after, drive, answer.noise_floors[name]))
     if answer.calibrated:
         page.heading('Numbers of the model that move within their tolerances')
         page.table(('number', 'before', 'after', 'unit'),

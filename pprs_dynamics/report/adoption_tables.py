@@ -1,4 +1,4 @@
-"""The answer to an offered effect in the terminal, drawn with rich."""
+"""The answer to a requested effect in the terminal, drawn with rich."""
 
 from __future__ import annotations
 

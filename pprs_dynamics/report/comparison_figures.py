@@ -9,8 +9,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.comparison import Comparison
-from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.report.page import plotly_objects
+from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'
@@ -101,7 +101,7 @@ def against_variables(residuals: Residuals, comparison: Comparison) -> Any:
     for drive, drive_name in enumerate(residuals.drives):
         noise = comparison.localisation.drives[drive_name].noise
         for number, name in enumerate(names):
-            profile = error_profile(residuals, drive, name, noise)
+            profile = None if noise is None else error_profile(residuals, drive, name, noise)
             if profile is None:
                 continue
             middle = (profile.edges[1:] + profile.edges[:-1]) / 2
@@ -157,9 +157,10 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
     go = plotly_objects()
     figure, owners = go.Figure(), []
     for drive, name in enumerate(residuals.drives):
-        if not np.isfinite(residuals.measured[:, drive]).any():
+        noise = comparison.localisation.drives[name].noise
+        if noise is None:
             continue
-        found = error_spectrum(residuals, drive, comparison.localisation.drives[name].noise)
+        found = error_spectrum(residuals, drive, noise)
         for label, power, colour in (('error', found.power, LINES[drive % len(LINES)]),
                                      ('its noise model', found.background, MEASURED)):
             keep = found.frequency > 0

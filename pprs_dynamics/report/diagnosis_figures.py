@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import ErrorStep
 from pprs_dynamics.diagnosis.found_effects import FoundEffect
@@ -16,10 +15,11 @@ from pprs_dynamics.diagnosis.partial import (
     remaining_profile,
     remaining_residuals,
 )
-from pprs_dynamics.residuals.profiles import error_spectrum
 from pprs_dynamics.diagnosis.statements import UNITS, WORDS, Statement
 from pprs_dynamics.report.comparison_figures import ERROR, LINES, MEASURED, MODEL, curve
 from pprs_dynamics.report.page import plotly_objects
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.residuals.profiles import error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals
 
 AFTER, FLOOR, RISE = '#009E73', '#1a1a1a', '#D55E00'
@@ -56,7 +56,7 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
 
 
 def waterfall(steps: Sequence[ErrorStep], drives: Sequence[str], floor: float,
-              floors: Array) -> Any:
+              floors: Mapping[str, float]) -> Any:
     """Return how the error falls step by step, overall and by drive, the noise floor drawn."""
     go = plotly_objects()
     from plotly.subplots import make_subplots
@@ -90,7 +90,7 @@ def waterfall(steps: Sequence[ErrorStep], drives: Sequence[str], floor: float,
             hovertext=[f'{label}: {text} N' for label, text in zip(
                 [*labels, 'what is left'], texts, strict=True)], hoverinfo='text'),
             row=row, col=column)
-        level = floor if number == 0 else float(floors[number - 1])
+        level = floor if number == 0 else floors.get(drives[number - 1], np.nan)
         figure.add_hline(y=level, row=row, col=column,
                          line={'color': FLOOR, 'width': 1.2, 'dash': 'dash'})
         figure.update_yaxes(range=[0, 1.18 * max(float(levels.max()), level)], row=row, col=column)
@@ -167,7 +167,8 @@ def effect_picture(diagnosis: Diagnosis, found: FoundEffect) -> Any:
 def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:
     """Return the shape of what remains along what it depends on."""
     if statement.variable == 'frequency':
-        return _spectrum(diagnosis, statement)
+        noise = diagnosis.noise.get(statement.drive)
+        return None if noise is None else _spectrum(diagnosis, statement, noise)
     go = plotly_objects()
     variable = 'velocity' if statement.variable == 'direction' else statement.variable
     profile = remaining_profile(diagnosis, statement.drive, variable)
@@ -229,10 +230,10 @@ def axis_of(variable: str) -> tuple[float, str]:
     return factor, f'{WORDS.get(name, name)}{of}{other} [{unit}]'
 
 
-def _spectrum(diagnosis: Diagnosis, statement: Statement) -> Any:
+def _spectrum(diagnosis: Diagnosis, statement: Statement, noise: NoiseSpectrum) -> Any:
     go = plotly_objects()
     residuals = remaining_residuals(diagnosis)
-    found = error_spectrum(residuals, residuals.drives.index(statement.drive))
+    found = error_spectrum(residuals, residuals.drives.index(statement.drive), noise)
     keep = found.frequency > 0
     figure = go.Figure(go.Scatter(x=found.frequency[keep], y=found.power[keep], mode='lines',
                                   line={'color': ERROR, 'width': 1.2}))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
 from pprs_dynamics.diagnosis.sentences import Finding, Sentences, fitted_values
@@ -59,26 +57,15 @@ def diagnosis_page(
     page.heading('Before and after')
     page.text('Dotted: two standard deviations of the noise. Drag to zoom, double-click to return.',
               'note')
-    floors = noise_floors(diagnosis)
-    for drive in range(len(diagnosis.residuals.drives)):
-        if np.isfinite(floors[drive]):
+    for drive, name in enumerate(diagnosis.residuals.drives):
+        if name in diagnosis.noise_floors:
             page.figure(figures.before_and_after(diagnosis.residuals, after, drive,
-                                                 float(floors[drive])))
+                                                 diagnosis.noise_floors[name]))
     page.heading('How it was found')
     page.text(' '.join(METHOD))
     if diagnosis.notes:
         page.bullets(diagnosis.notes)
     return page
-
-
-def noise_floors(diagnosis: Diagnosis) -> np.typing.NDArray[np.float64]:
-    """Return what all fits leave on each drive, (D,) [N]; NaN where nothing was measured."""
-    known = np.isfinite(diagnosis.remaining)
-    total = np.sum(np.where(known, diagnosis.remaining, 0.0) ** 2, axis=0)
-    count = known.sum(axis=0).astype(float)
-    mean: np.typing.NDArray[np.float64] = np.divide(
-        total, count, out=np.full(len(count), np.nan), where=count > 0)
-    return np.sqrt(mean)
 
 
 def _warnings(page: Page, words: Sentences) -> None:
@@ -101,7 +88,8 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
         page.card(finding.title, finding_lines(finding),
                   figures.unknown_picture(diagnosis, statement))
     for title, lines in (('Suspects: effects that slow noise would explain as well',
-                          words.suspects), ('What remains of their form', words.of_form)):
+                          words.suspects), ('Within the model error of an adopted effect',
+                           words.within_model_error)):
         if lines:
             page.heading(title)
             page.bullets(lines)
@@ -115,16 +103,15 @@ def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
 def _errors(page: Page, diagnosis: Diagnosis, after: Residuals) -> None:
     page.heading('How the error falls')
     steps = error_steps(diagnosis, after)
-    floor = 'what all fits leave' if diagnosis.depends_on else 'the noise'
     if len(steps) > 1:
         numbered = ', '.join(f'+{k} {step.label}' for k, step in enumerate(steps) if k)
         page.text('Both ends are what a comparison with these models says; in between, parameters '
-                  f'are those of the last fit. Dashed: {floor}, {diagnosis.noise_floor:.3g} N over '
+                  f'are those of the last fit. Dashed: the noise, {diagnosis.noise_floor:.3g} N over '
                   f'all drives. Steps of the small pictures: {numbered}.', 'note')
         page.figure(figures.waterfall(steps, after.drives, diagnosis.noise_floor,
-                                      noise_floors(diagnosis)))
+                                      diagnosis.noise_floors))
     else:
-        page.text(f'It does not: the model leaves {steps[0].overall:.4f} N rms, and {floor} is '
+        page.text(f'It does not: the model leaves {steps[0].overall:.4f} N rms, and the noise is '
                   f'{diagnosis.noise_floor:.4f} N.')
     if diagnosis.effects:
         where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'

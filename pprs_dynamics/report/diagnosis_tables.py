@@ -45,7 +45,7 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
                      [_ranked(one, diagnosis) for one in diagnosis.candidates], right=(2, 3))
     yield from _list('Within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
-    yield from _list('Its form', words.of_form, 'blue')
+    yield from _list('Within model error', words.within_model_error, 'blue')
     yield from _list('Warnings', words.warnings, 'yellow')
     yield f'[bold]Next[/] {escape(words.following)}'
 
