@@ -9,45 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.noise import NoiseModel, fit_noise
-from pprs_dynamics.diagnosis.stages import Stage
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.effects.catalogue import CATALOGUE
-from pprs_dynamics.experiments.columns import Block, plan_for
-from pprs_dynamics.experiments.commissioning import commissioning
-from pprs_dynamics.experiments.criteria import Contest, Explanation, Precision
-from pprs_dynamics.experiments.fourier_path import FourierFamily
-from pprs_dynamics.experiments.information import Information, whitened
-from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
-from pprs_dynamics.experiments.next_experiment import PurposeError, experiment_of, next_experiment
-from pprs_dynamics.experiments.question import question_after
-from pprs_dynamics.experiments.trajectory_search import (
-    NoMotionError,
-    TrajectorySearch,
-    forces_of,
-)
-from pprs_dynamics.measurement.pose_files import read_poses
-from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.model_file import build_robot, default_parameters
-from pprs_dynamics.regression.base_columns import (
-    KnownNumber,
-    PresentCoefficient,
-    PresentShape,
-    ReversalShape,
-)
-from pprs_dynamics.regression.design import Design
-from pprs_dynamics.regression.joint_fit import Regression
-from pprs_dynamics.residuals.noise import NoiseSpectrum
-from pprs_dynamics.selection.candidates import CandidateSet
-from pprs_dynamics.selection.decisions import DECISIONS
-from pprs_dynamics.selection.expansion import Selection
-from pprs_dynamics.selection.rivals import Rival
-from pprs_dynamics.selection.search import Search
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.experiments.columns import ColumnPlan, FittedTerm
 from pprs_dynamics.experiments.commissioning import commissioning
@@ -81,7 +45,6 @@ from pprs_dynamics.selection.decisions import DECISIONS
 from pprs_dynamics.selection.expansion import Selection
 from pprs_dynamics.selection.rivals import Rival
 from pprs_dynamics.selection.search import Search
-from pprs_dynamics.regression.design import Design
 
 DURATION = 8.0
 HARMONICS = np.array([[1, 2, 4], [1, 3, 5], [2, 3, 4], [1, 2, 3], [1, 4, 5], [2, 4, 5]])
@@ -138,11 +101,13 @@ def test_velocities_and_accelerations_are_those_of_the_poses(parameters: np.ndar
 TERMS = (
     FittedTerm(CATALOGUE['stribeck_friction'], 3, {'velocity': 0.02, 'exponent': 2.0}, ('force',),
                np.array([0.5])),
-    FittedTerm(CATALOGUE['drive_spring'], 0, {}, ('stiffness', 'preload'), np.array([10.0, 1.0])),
+    FittedTerm(CATALOGUE['drive_spring'], 0, {}, ('stiffness', 'force'), np.array([10.0, 1.0])),
     FittedTerm(CATALOGUE['time_delay'], 4, {'delay': 0.004}, (), np.ones(1)),
     FittedTerm(CATALOGUE['homing_error'], 1, {}, ('zero',), np.array([0.001])),
-    FittedTerm(CATALOGUE['base_tilt'], None, {}, ('about_x', 'about_y'), np.array([0.01, 0.0])))
-EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_mass'],
+    FittedTerm(CATALOGUE['base_tilt'], None, {}, ('x', 'y'), np.array([0.01, 0.0])))
+EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_mass',
+                              'time_delay'],
+           'effects.time_delay.lift_3.delay': 0.003,
            'effects.viscous_friction.lift_2.coefficient': 1.5,
            'effects.stribeck_friction.slide_2.force': 0.6,
            'effects.stribeck_friction.slide_2.velocity': 0.02,
@@ -156,52 +121,51 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     model = build_robot({**model.values, **EFFECTS})
     path = FAMILY.path(parameters)
     time = np.arange(0.0, DURATION, 0.002)
-    regression = Regression(Design.of(model, [recorded(model, path.motion(time), 0, 0.0)]))
-    noise = NoiseSpectra.white(0.05, 0.01)
-    plan = plan_for(regression.design, BLOCKS)
-    information = Information(plan, noise)
-    known = information.of_recordings(regression)
+    design = Design.of(model, [recorded(model, path.motion(time), 0, 0.0)])
+    regression = Regression(design.residuals, design.base)
+    white = np.zeros((6, len(regression.noise_shapes.corners) + 1))
+    white[:, 0] = 0.05 ** 2
+    fit = regression.at((), white)
+    plan = ColumnPlan.of_design(design, TERMS)
+    information = Information(plan, regression.noise(fit))
+    known = information.of_recordings(design, regression, fit) - information.prior()
+    # Smoothing drops half a window at either end, and the transform a few samples more.
+    time = design.recordings[0].time[:5 * len(regression.series[0])]
     columns = plan.on_motions(forces_of(model, [path], time), time, 5)[0]
-    told = information.of_motion(columns)
+    told = information.of_motion(columns, len(time) * 0.002)
     scale = np.sqrt(np.diag(known))
-    # Smoothing drops half a window at either end, where the motion is at rest.
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
+    assert {type(one) for one in plan.base} == {
+        KnownNumber, ReversalShape, PresentCoefficient, PresentShape}
 
 
 def test_few_samples_tell_nearly_the_same(model: DriveModel, parameters: np.ndarray) -> None:
     path = FAMILY.path(parameters)
-    rng = np.random.default_rng(0)
-    slow = np.zeros(4000)
-    for k in range(1, len(slow)):
-        slow[k] = 0.9 * slow[k - 1] + rng.normal()
-    one = fit_noise(0.05 * slow, [slice(0, len(slow))])
-    noise = NoiseSpectra(dict.fromkeys(range(6), one), 0.01)
+    noise = NoiseSpectrum(np.array([1.7]), np.array([7e-4, 0.25]), 0.01)
     question = commissioning(model, [], 0.05)
-    blocks = (BLOCKS[1], BLOCKS[4])
-    plan = replace(question.plan, blocks=blocks)
-    information = Information(plan, noise)
+    plan = replace(question.plan, terms=(TERMS[1], TERMS[4]))
+    information = Information(plan, dict.fromkeys(range(6), noise))
     fine, coarse = np.arange(0, DURATION, 0.002), np.arange(120) * DURATION / 120
-    full = information.of_motion(plan.on_motions(forces_of(model, [path], fine), fine, 5)[0])
-    few = information.of_coarse_motion(
+    full = information.of_motion(
+        plan.on_motions(forces_of(model, [path], fine), fine, 5)[0], DURATION)
+    few = information.of_motion(
         plan.on_motions(forces_of(model, [path, path], coarse), coarse)[1], DURATION)
-    numbers = [k for k, (kind, _) in enumerate(plan.labels) if kind == 'number']
-    for k in [*numbers, *block_index(plan, blocks)]:
+    for k in [*plan.numbers, *range(len(plan.base), plan.size)]:
         assert few[k, k] == pytest.approx(full[k, k], rel=0.3)
 
 
 def test_white_noise_counts_samples() -> None:
-    noise = NoiseModel((), (0,), (np.zeros(0),), (0.5,))
-    weights = NoiseSpectra({0: noise}, 0.01).weights(0, 40, 10.0)
+    noise = NoiseSpectrum(np.zeros(0), np.array([0.5 ** 2]), 0.01)
     wave = np.cos(2 * np.pi * 3 * np.arange(40) / 40)
     # 1000 samples of mean square 1/2 over a variance of 1/4.
-    assert np.sum(np.abs(np.fft.rfft(wave) * weights) ** 2) == pytest.approx(2000)
+    assert np.sum(whitened(wave, noise, 10.0) ** 2) == pytest.approx(2000)
 
 
 # Criteria.
 
 def _explained(name: str, index: tuple[int, ...], truth: list[float]) -> Explanation:
-    return Explanation(name, (), index, np.array(truth), 0.0)
+    return Explanation((name,), (), index, index, np.array(truth))
 
 
 def test_misfit_is_what_least_squares_leaves() -> None:
@@ -305,15 +269,15 @@ def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> 
 
 def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     """Coulomb and load friction on a drive whose load hardly changes, by a hair's breadth."""
-    blocks = (Block(CATALOGUE['coulomb_friction'], 0, {}, (0,), np.array([1e-3])),
-              Block(CATALOGUE['load_friction'], 0, {}, (0,), np.array([1e-4])))
+    terms = (FittedTerm(CATALOGUE['coulomb_friction'], 0, {}, ('force',), np.array([1e-3])),
+             FittedTerm(CATALOGUE['load_friction'], 0, {}, ('coefficient',), np.array([1e-4])))
     question = commissioning(model, [], 0.05)
-    plan = replace(question.plan, blocks=blocks)
-    base = tuple(range(len(plan.labels)))
+    plan = replace(question.plan, terms=terms)
+    base = tuple(range(len(plan.base)))
     gram = np.zeros((plan.size, plan.size))
     gram[base, base] = 1.0
-    both = [replace(_explained(block.effect.name, (), list(block.truth)),
-                    index=tuple(block_index(plan, [block]))) for block in blocks]
+    both = [_explained(term.effect.name, (plan.places()[term].start,), list(term.values))
+            for term in terms]
     contests = [Contest(a, b, (*base, *b.index)) for a, b in (both, both[::-1])]
     question = replace(question, kind='separate', plan=plan, known=gram,
                        subjects=()).with_contests(contests)
@@ -339,12 +303,21 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     time = np.arange(0.0, DURATION, 0.004)
     path = FAMILY.path(parameters)
     old = recorded(robot, path.motion(time), 1, 0.1)
-    stage = Stage.of(model, [old], lambda share: None)
-    assert [one.candidate.name for one in stage.selection.adopted] == ['coulomb_friction']
-    stage.selection.rivals = {}
-    assert _Asker(stage).question().kind == 'estimate'
-    stage.selection.rivals = {'coulomb_friction': ['asymmetric_friction', 'load_friction']}
-    question = _Asker(stage).question()
+    search = Search(Design.of(model, [old]), DECISIONS)
+    search.evaluate(())
+
+    def fitted(name: str, *coefficients: str) -> CandidateSet:
+        placement = search.library.placed(CATALOGUE[name], 3, {}, coefficients)
+        return search.evaluate((search.library.candidate(CATALOGUE[name], [placement]),))
+
+    adopted = fitted('coulomb_friction', 'force')
+    selection = Selection(search, search, adopted)
+    assert question_after(selection, adopted, []).kind == 'estimate'
+    free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
+    other = fitted('load_friction', 'coefficient')
+    question = question_after(selection, adopted, [
+        Rival(free, ('coulomb_friction',), ('asymmetric_friction',)),
+        Rival(other, ('coulomb_friction',), ('load_friction',))])
     assert question.kind == 'separate'
     pairs = {(one.truth.name, one.rival.name) for one in question.contests}
     assert ('coulomb_friction', 'load_friction') in pairs
@@ -353,7 +326,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     # What the same motion tells again doubles the misfit and leaves the priors as they are.
     fine = np.arange(0.0, DURATION, 0.002)
     columns = question.plan.on_motions(forces_of(model, [path], fine), fine, 5)[0]
-    again = question.known + question.information.of_motion(columns)
+    again = question.known + question.information.of_motion(columns, DURATION)
     for contest in question.contests:
         once = contest.misfit(question.known)
         assert once < contest.misfit(again) < 2.6 * once + 1.0

@@ -1,153 +1,106 @@
 """Columns of the regression on a motion that nobody has made yet.
 
-They are those of `diagnosis.design`, in the same order and scale, so that what a new motion
+They are those of `regression.design`, in the same order and scale, so that what a new motion
 would tell adds to what the recordings have told.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.joint_fit import Active
-from pprs_dynamics.effects.drive_effect import DriveEffect
-from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.effects.homing_error import HomingError
+from pprs_dynamics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.structure_effect import StructureEffect
-from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
-from pprs_dynamics.regression.design import SHAPE_STEP, Design, FullRate
+from pprs_dynamics.regression.base_columns import (
+    BaseColumn,
+    KnownNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+    present_values,
+)
+from pprs_dynamics.regression.design import Design, FullRate, Rows, Term
 from pprs_dynamics.regression.platform_sensitivities import ChunkSensitivities
-from pprs_dynamics.regression.sensitivities import Number
 from pprs_dynamics.residuals.residuals import Residuals
 
-DELAY_STEP = 1e-4  # [s]
-PER_MILLISECOND = 1e-3
-PRESENT_SHAPE = 0.1  # relative change per unit of a present shape parameter's column
-HOMING_SAMPLES = 100  # of a motion, at which its columns are computed; they change slowly
-Rows = dict[int, Array]
+HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
+Columns = Mapping[int, tuple[np.typing.NDArray[np.int_], Array]]
+"""By drive: places of the columns that it feels, (p,), and these in time, (p, M) [N]."""
 
 
-class Source(Protocol):
-    """A recording or a motion that gives columns, (k, M) by drive."""
+@dataclass(frozen=True, eq=False)
+class FittedTerm:
+    """An effect on a drive or in the structure, with values.
 
-    def drive_rows(self, effect: type[DriveEffect], drive: int,
-                   shape: Mapping[str, float]) -> Array:
-        """Return the columns of an effect on one drive."""
-
-    def common_rows(self, effect: type[CatalogueEffect], drive: int | None) -> Rows:
-        """Return the columns of an effect that all drives feel."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """An effect's term with values: its columns, and those of its shape parameters.
+    Its columns are those of its coefficients (of one that is 1 where the shape says it all), then
+    the derivatives by its shape parameters, per amount of movement.
 
     Parameters
     ----------
     effect : type of CatalogueEffect
     drive : int or None
     shape : mapping of str to float
-    chosen : tuple of int
+    names : tuple of str
         Coefficients that are fitted.
     values : (k,) array
-        Theirs; 1 for an effect whose shape says it all.
+        Theirs; 1 where the shape says it all.
     """
 
     effect: type[CatalogueEffect]
     drive: int | None
     shape: Mapping[str, float]
-    chosen: tuple[int, ...]
+    names: tuple[str, ...]
     values: Array
 
     @classmethod
-    def of(cls, active: Active, coefficients: Array) -> Block:
-        """Return the block of an active term, at fitted coefficients."""
-        term = active.term
-        chosen, values = (((0,), np.ones(1)) if term.fixed
-                          else (tuple(active.chosen), np.asarray(coefficients)))
-        return cls(term.effect, term.drive, dict(term.shape), chosen, values)
+    def at_scale(cls, effect: type[CatalogueEffect], drive: int | None,
+                 shape: Mapping[str, float]) -> FittedTerm:
+        """Return an effect with all coefficients at the sizes at which they matter."""
+        return cls(effect, drive, shape, tuple(c.name for c in effect.coefficients),
+                   np.array([c.scale for c in effect.coefficients] or [1.0]))
 
     @property
     def size(self) -> int:
         """Number of columns."""
-        return len(self.chosen) + len(self.shape)
+        return len(self.values) + len(self.shape)
 
     @property
-    def truth(self) -> Array:
-        """Coefficients of its columns where the effect is there as fitted, (size,)."""
-        return np.concatenate((self.values, np.zeros(len(self.shape))))
+    def free(self) -> slice:
+        """Columns whose coefficients are fitted."""
+        return slice(len(self.values) - len(self.names), None)
 
     @property
-    def is_homing(self) -> bool:
-        """True where positions are wrong: felt by all drives."""
-        return self.effect is HomingError
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of the free columns: coefficients, then shape parameters."""
+        known = {c.name: c for c in self.effect.coefficients}
+        return (*(known[name] for name in self.names), *self.effect.shape)
 
-    def rows(self, source: Source) -> Rows:
-        """Return its columns and their derivatives by the shape parameters."""
-        if self.drive is None or self.is_homing:
-            found = source.common_rows(self.effect, self.drive)
-            return {d: rows[list(self.chosen)] for d, rows in found.items()}
-        assert issubclass(self.effect, DriveEffect)
+    @property
+    def scales(self) -> Array:
+        """Sizes at which the coefficients of the free columns matter; shapes by a factor of e."""
+        return np.array([p.scale for p in self.parameters[:len(self.names)]]
+                        + [1.0] * len(self.shape))
 
-        def at(shape: Mapping[str, float]) -> Array:
-            assert issubclass(self.effect, DriveEffect)
+    def rows(self, design: Design) -> Rows:
+        """Return its columns on recordings or on a motion."""
+        term = design.find_term(self.effect, self.drive, self.shape)
+        chosen = [term.names.index(name) for name in self.names] or [0]
+        rows = {d: values[chosen] for d, values in term.rows.items()}
+        if self.shape:
             assert self.drive is not None
-            return source.drive_rows(self.effect, self.drive, shape)[list(self.chosen)]
-
-        own = at(self.shape)
-        slopes = []
-        for name, value in self.shape.items():
-            step = DELAY_STEP if self.effect is TimeDelay else SHAPE_STEP * abs(value)
-            unit = PER_MILLISECOND / DELAY_STEP if self.effect is TimeDelay else 1 / SHAPE_STEP
-            slopes.append(self.values @ (at({**self.shape, name: value + step}) - own) * unit)
-        return {self.drive: np.concatenate((own, np.stack(slopes))) if slopes else own}
-
-
-class RecordedColumns:
-    """Columns on recordings."""
-
-    def __init__(self, design: Design) -> None:
-        self.design = design
-        self.drive_rows = design.drive_rows
-
-    def common_rows(self, effect: type[CatalogueEffect], drive: int | None) -> Rows:
-        """Return the columns of an effect that all drives feel."""
-        terms = self.design.homing if effect is HomingError else self.design.structure
-        return next(one.rows for one in terms if one.effect is effect and one.drive == drive)
-
-
-@dataclass(frozen=True)
-class MotionColumns:
-    """Columns on one hypothetical motion.
-
-    Parameters
-    ----------
-    base : list of dict of drive to (M,) array
-        As the design's base columns.
-    common : dict of (name, drive) to Rows
-    design : Design
-        Of this motion, for columns of effects on drives.
-    """
-
-    base: list[dict[int, Array]]
-    common: Mapping[tuple[str, int | None], Rows]
-    design: Design
-
-    def drive_rows(self, effect: type[DriveEffect], drive: int,
-                   shape: Mapping[str, float]) -> Array:
-        """Return the columns of an effect on one drive."""
-        return self.design.drive_rows(effect, drive, shape)
-
-    def common_rows(self, effect: type[CatalogueEffect], drive: int | None) -> Rows:
-        """Return the columns of an effect that all drives feel."""
-        return self.common[effect.name, drive]
+            every = np.zeros(len(term.names) or 1)
+            every[chosen] = self.values
+            rows[self.drive] = np.concatenate(
+                (rows[self.drive], design.slope_rows(term, every)))
+        return rows
 
 
 @dataclass(frozen=True)
@@ -156,135 +109,151 @@ class ColumnPlan:
 
     Parameters
     ----------
-    model : DriveModel
-    labels : tuple of (kind, label)
-        Of the base columns, as the design has them.
-    numbers : tuple of Number
-    blocks : tuple of Block
+    given, model : DriveModel
+        As the user has it; and around which forces are linear.
+    base : tuple of BaseColumn
+        As the design has them; their rows are those of the recordings, if any.
+    terms : tuple of FittedTerm
     """
 
+    given: DriveModel
     model: DriveModel
-    labels: tuple[tuple[str, str], ...]
-    numbers: tuple[Number, ...]
-    blocks: tuple[Block, ...]
+    base: tuple[BaseColumn, ...]
+    terms: tuple[FittedTerm, ...]
+
+    @classmethod
+    def of_design(cls, design: Design, terms: Sequence[FittedTerm]) -> ColumnPlan:
+        """Return the plan of a design's base columns and more."""
+        assert isinstance(design.given, DriveModel)
+        assert isinstance(design.model, DriveModel)
+        return cls(design.given, design.model, design.base, tuple(terms))
 
     @property
     def size(self) -> int:
         """Number of all columns, base columns first."""
-        return len(self.labels) + sum(block.size for block in self.blocks)
+        return len(self.base) + sum(term.size for term in self.terms)
 
-    def places(self) -> list[slice]:
-        """Return where each block's columns stand."""
-        ends = len(self.labels) + np.cumsum([block.size for block in self.blocks])
-        return [slice(int(end) - block.size, int(end))
-                for end, block in zip(ends, self.blocks, strict=True)]
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Places of the model's own numbers."""
+        return tuple(k for k, one in enumerate(self.base) if isinstance(one, KnownNumber))
 
-    def on_motions(self, forces: DriveForces, time: Array, block: int = 1,
-                   ) -> list[MotionColumns]:
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Places of the other base columns."""
+        return tuple(k for k in range(len(self.base)) if k not in self.numbers)
+
+    def places(self) -> dict[FittedTerm, slice]:
+        """Return where each term's columns stand."""
+        ends = len(self.base) + np.cumsum([term.size for term in self.terms])
+        return {term: slice(int(end) - term.size, int(end))
+                for end, term in zip(ends, self.terms, strict=True)}
+
+    def on_recordings(self, design: Design) -> Columns:
+        """Return all columns on the recordings of the design that the plan is of."""
+        return self._by_drive([one.rows for one in design.base], design)
+
+    def on_motions(self, forces: DriveForces, time: Array, block: int = 1) -> list[Columns]:
         """Return the columns of motions one after the other, each at the same times.
 
         Parameters
         ----------
         forces : DriveForces
-            Of the model with its sensors; M motions of N samples.
+            Of the model, before its sensors; M motions of N samples.
         time : (N,) array
         block : int
             Samples that are averaged.
         """
         samples = len(time)
         found = ChunkSensitivities(self.model, forces)
-        every = {**dict(zip((('number', n.label) for n in self.numbers),
-                            found.of_numbers(self.numbers), strict=True)),
-                 **{('width', f'drives {k}'): column
-                    for k, column in enumerate(found.of_drive_widths())},
-                 **{('width', f'passive {k}'): column
-                    for k, column in enumerate(found.of_passive_widths())},
-                 **{('present', f'{effect.name}..{name}'): column * _scale(effect, name)
-                    for effect in self.model.effects if isinstance(effect, StructureEffect)
-                    for _, name, column in found.of_present(effect)}}
-        common: dict[tuple[str, int | None], Array] = {
-            (one.effect.name, None): np.stack(list(found.of_structure(one.effect)))
-            for one in self.blocks if issubclass(one.effect, StructureEffect)}
-        common |= {(HomingError.name, drive): column[None]
-                   for drive, column in self._homing(found, samples).items()}
+        numbers = tuple(one.number for one in self.base if isinstance(one, KnownNumber))
+        shared = dict(zip(self.numbers, found.of_numbers(numbers), strict=True))
+        of_drives, of_joints = found.of_drive_widths(), found.of_passive_widths()
+        # A base leaves out, from the first on, shapes that a drive does not feel.
+        left = Counter(one.drive for one in self.base if isinstance(one, ReversalShape))
+        for k, one in enumerate(self.base):
+            if isinstance(one, ReversalShape):
+                shared[k] = (of_joints if one.drive is None else of_drives)[-left[one.drive]]
+                left[one.drive] -= 1
+        wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
+            one, (FittedTerm, PresentCoefficient, PresentShape))}
+        structure = {effect: np.stack([full for full, _ in found.of_structure(effect)])
+                     for effect in wanted if issubclass(effect, StructureEffect)}
+        homing = self._homing(found, samples) if any(
+            issubclass(effect, MeasurementEffect) and effect.shifts_positions()
+            for effect in wanted) else ()
         treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
         result = []
         for start in range(0, len(forces.total), samples):
             part = slice(start, start + samples)
-            columns = MotionColumns(
-                [], {key: {d: treat(rows[:, part, d].T).T for d in range(len(DRIVES))}
-                     for key, rows in common.items()},
-                self._design(forces, part, time, treat, block))
-            treated = {key: treat(column[part]).T for key, column in every.items()}
-            columns.base.extend(self._base(kind, label, columns, treated)
-                                for kind, label in self.labels)
-            result.append(columns)
+
+            def by_drive(column: Array, part: slice = part) -> dict[int, Array]:
+                return dict(enumerate(treat(column[part]).T))
+
+            design = replace(
+                self._motion_design(forces, part, time, treat, block), structure=tuple(
+                    Term(effect, None, {}, {d: treat(rows[:, part, d].T).T
+                                            for d in range(len(DRIVES))})
+                    for effect, rows in structure.items()),
+                homing=tuple(by_drive(column) for column in homing))
+            base = [self._present(one, design) if isinstance(
+                        one, (PresentCoefficient, PresentShape))
+                    else _felt(one, by_drive(shared[k])) for k, one in enumerate(self.base)]
+            result.append(self._by_drive(base, design))
         return result
 
-    def _base(self, kind: str, label: str, columns: MotionColumns,
-              treated: Mapping[tuple[str, str], Array]) -> dict[int, Array]:
-        """Return a base column of one motion by its label."""
-        if (kind, label) in treated:
-            return dict(enumerate(treated[kind, label]))
-        if kind == 'width':
-            drive, factor = label.rsplit(' ', 1)
-            d = DRIVES.index(drive)
-            return {d: treated[kind, f'drives {factor}'][d]}
-        name, drive, parameter = label.split('.')
-        d = DRIVES.index(drive)
-        effect = next(e for e in self.model.effects if e.name == name)
-        assert isinstance(effect, DriveEffect)
-        kind_of = type(effect)
-        if isinstance(effect, HomingError):
-            return {k: rows[0] * effect.linear[0].scale
-                    for k, rows in columns.common_rows(kind_of, d).items()}
-        values = effect.drives[drive]
-        shape = {p.name: values[p.name] for p in effect.shape}
-        names = [c.name for c in effect.coefficients]
-        if parameter in names:
-            row = columns.drive_rows(kind_of, d, shape)[names.index(parameter)]
-            return {d: row * _scale(effect, parameter)}
-        if isinstance(effect, TimeDelay):
-            # The model's effort is delayed already: a little more of it.
-            later = columns.drive_rows(kind_of, d, {'delay': DELAY_STEP})[0]
-            return {d: later / DELAY_STEP * PER_MILLISECOND}
-        coefficients = effect.to_coefficients(values)
-        weights = np.array([coefficients[name] for name in names])
-        moved = {**shape, parameter: shape[parameter] * (1 + SHAPE_STEP)}
-        change = (columns.drive_rows(kind_of, d, moved)
-                  - columns.drive_rows(kind_of, d, shape))
-        return {d: weights @ change / SHAPE_STEP * PRESENT_SHAPE}
+    def _present(self, column: PresentCoefficient | PresentShape, design: Design) -> Rows:
+        """Return the column of what the given model has already on one motion."""
+        effect = next(e for e in self.model.effects if type(e) is column.effect)
+        assert isinstance(effect, CatalogueEffect)
+        values = present_values(effect, column.drive)
+        drive = None if column.drive is None else DRIVES.index(column.drive)
+        term = design.find_term(column.effect, drive,
+                                {p.name: values[p.name] for p in column.effect.shape})
+        if isinstance(column, PresentCoefficient):
+            at = term.names.index(column.coefficient.name)
+            return {d: rows[at] * column.coefficient.scale for d, rows in term.rows.items()}
+        assert drive is not None
+        weights = effect.to_coefficients(values)
+        slopes = design.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
+        return {drive: slopes[column.effect.shape.index(column.parameter)]}
 
-    def _homing(self, found: ChunkSensitivities, samples: int) -> dict[int, Array]:
-        """Return the columns of wrong zeros by drive, (N, 6), where any is wanted."""
-        wanted = any(block.is_homing for block in self.blocks) or any(
-            isinstance(effect, HomingError) for effect in self.model.effects)
-        if not wanted:
-            return {}
+    def _homing(self, found: ChunkSensitivities, samples: int) -> Array:
+        """Return the columns of wrong zeros by drive, (6, N, 6)."""
         every = np.arange(len(found.state.velocity))
         kept = every[::max(1, samples // HOMING_SAMPLES)]
-        return {drive: np.stack([np.interp(every, kept, column) for column in rows.T], axis=1)
-                for drive, rows in enumerate(found.of_homing(kept))}
+        return np.stack([np.stack([np.interp(every, kept, column) for column in rows.T], axis=1)
+                         for rows in found.of_homing(kept)])
 
-    def _design(self, forces: DriveForces, part: slice, time: Array, treat: Treatment,
-                block: int) -> Design:
+    def _motion_design(self, forces: DriveForces, part: slice, time: Array, treat: Treatment,
+                       block: int) -> Design:
         s, total = forces.mechanism, forces.total[part]
         full = FullRate(time, s.position[part], s.velocity[part], s.acceleration[part],
                         s.direction[part], s.guide_load[part], total, total,
-                        (slice(0, len(time)),), treat)
+                        (slice(0, len(time)),), treat, float(time[0]))
         means = treat(total)
         residuals = Residuals(DRIVES, treat(time), np.zeros(len(means), dtype=int), means, means,
                               period=float(time[1] - time[0]) * block)
-        return Design(self.model, residuals, (full,), [], [], [], ())
+        return Design(self.given, self.model, residuals, (full,), (), (), (), ())
+
+    def _by_drive(self, base: Sequence[Rows], design: Design) -> Columns:
+        """Return base columns and those of the terms, drive by drive."""
+        terms = [(place, term.rows(design)) for term, place in self.places().items()]
+        found = {}
+        for d in range(len(DRIVES)):
+            index = [k for k, rows in enumerate(base) if d in rows]
+            parts = [base[k][d][None] for k in index]
+            for place, rows in terms:
+                if d in rows:
+                    index += range(place.start, place.stop)
+                    parts.append(rows[d])
+            found[d] = (np.array(index, dtype=int), np.concatenate(parts))
+        return found
 
 
-def _scale(effect: CatalogueEffect, name: str) -> float:
-    return next(c.scale for c in effect.coefficients if c.name == name)
+def _felt(column: BaseColumn, rows: Rows) -> Rows:
+    """Return the rows of a column on the drives that may feel it."""
+    if isinstance(column, ReversalShape) and column.drive is not None:
+        return {column.drive: rows[column.drive]}
+    return rows
 
-
-def plan_for(design: Design, blocks: Sequence[Block]) -> ColumnPlan:
-    """Return the plan of a design's base columns and more."""
-    assert isinstance(design.model, DriveModel)
-    return ColumnPlan(
-        design.model, tuple((one.kind, one.label) for one in design.base),
-        tuple(one.number for one in design.base if one.number is not None), tuple(blocks))

@@ -6,21 +6,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pprs_dynamics.diagnosis.joint_fit import Regression
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange
-from pprs_dynamics.experiments.columns import Block, ColumnPlan
-from pprs_dynamics.experiments.criteria import Explanation, Precision, index_of
-from pprs_dynamics.experiments.information import Information, NoiseSpectra, block_index
-from pprs_dynamics.experiments.question import Question, block_scales
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.experiments.columns import ColumnPlan, FittedTerm
+from pprs_dynamics.experiments.criteria import Precision, free_of
+from pprs_dynamics.experiments.information import Information
+from pprs_dynamics.experiments.question import Question, subjects_of
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.treatment import BLOCK_DURATION
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.model_file import build_robot
-from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.base_columns import (
+    BaseColumn,
+    KnownNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+)
+from pprs_dynamics.regression.design import FREE, Design
+from pprs_dynamics.regression.joint_fit import Regression
 from pprs_dynamics.regression.platform_sensitivities import PASSIVE_WIDTHS
 from pprs_dynamics.regression.sensitivities import DRIVE_WIDTHS, known_numbers
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.selection.candidates import Prices
+from pprs_dynamics.selection.decisions import DECISIONS
 
 # Effects that most machines have, or that are most often entered wrongly.
 ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_offset',
@@ -52,56 +63,47 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
         model = build_robot({**model.values, **{f'tolerances.{key}': TOLERANCE for key in NUMBERS
                                                 if np.any(model.values[key])}})
     present = {effect.name for effect in model.effects}
-    effects = [effect for name, effect in catalogue().items()
-               if name in ON_DRIVES + IN_STRUCTURE and name not in present]
-    blocks: list[Block] = []
-    groups: list[tuple[str, list[Block]]] = []
-    for effect in effects:
-        chosen = tuple(range(len(effect.coefficients)))
-        values = np.array([c.scale for c in effect.coefficients])
-        own = []
-        for drive in range(len(DRIVES)) if issubclass(effect, DriveEffect) else (None,):
-            shape = {}
-            if issubclass(effect, DriveEffect):
-                trials = effect.trials(TYPICAL)
-                shape = dict(trials[len(trials) // 3])
-            own.append(Block(effect, drive, shape, chosen, values))
-        blocks += own
-        groups.append((effect.name, own))
-    plan, spectra, gram, floor = _known(model, recordings, noise, blocks)
-    numbers = tuple(k for k, (kind, _) in enumerate(plan.labels) if kind == 'number')
-    others = tuple(k for k, (kind, _) in enumerate(plan.labels) if kind != 'number')
-    subjects = tuple(
-        Explanation(name, (block,), tuple(block_index(plan, [block])), block.truth,
-                    block.size * float(np.log(TYPICAL.duration / BLOCK_DURATION)))
-        for name, own in groups for block in own)
-    scales = np.concatenate([np.ones(len(numbers)),
-                             *(block_scales(one.blocks[0]) for one in subjects)])
-    criterion = Precision((*numbers, *index_of(subjects)), others, scales)
-    return Question('commission', model, plan, spectra, gram, criterion, (), subjects, floor)
-
-
-def _known(model: DriveModel, recordings: Sequence[Recording], noise: float,
-           blocks: Sequence[Block]) -> tuple[ColumnPlan, NoiseSpectra, np.ndarray, float]:
-    """Return the plan, the noise, and what is known: from recordings, or from tolerances alone."""
+    terms = []
+    for name, effect in catalogue().items():
+        if name in present or name not in ON_DRIVES + IN_STRUCTURE:
+            continue
+        if issubclass(effect, DriveEffect):
+            trials = effect.trials(TYPICAL)
+            terms += [FittedTerm.at_scale(effect, drive, trials[len(trials) // 3])
+                      for drive in range(len(DRIVES))]
+        else:
+            terms.append(FittedTerm.at_scale(effect, None, {}))
+    samples = round(TYPICAL.duration / BLOCK_DURATION)
     if recordings:
-        from pprs_dynamics.experiments.columns import plan_for
-
-        regression = Regression(Design.of(model, recordings))
+        design = Design.of(model, recordings)
+        regression = Regression(design.residuals, design.base)
         # What the model does not explain counts as noise as long as nothing else is known.
-        noises = {d: series.fit_noise(series.error) for d, series in regression.series.items()}
-        plan = plan_for(regression.design, blocks)
-        spectra = NoiseSpectra(noises, regression.design.residuals.period)
-        gram = Information(plan, spectra).of_recordings(regression)
-        gram[np.diag_indices(len(plan.labels))] += regression.precision
-        floor = max(float(np.sqrt(np.mean(one.error[one.known] ** 2)))
-                    for one in regression.series.values())
-        return plan, spectra, gram, floor
-    numbers = known_numbers(model)
-    labels = [('number', number.label) for number in numbers]
-    labels += [('width', f'{drive} {k}') for k in range(len(DRIVE_WIDTHS)) for drive in DRIVES]
-    labels += [('width', f'passive {k}') for k in range(len(PASSIVE_WIDTHS))]
-    plan = ColumnPlan(model, tuple(labels), numbers, tuple(blocks))
-    gram = np.zeros((plan.size, plan.size))
-    gram[np.diag_indices(len(labels))] = 1.0
-    return plan, NoiseSpectra.white(noise, BLOCK_DURATION), gram, noise
+        fit = regression.fit(())
+        plan, spectra = ColumnPlan.of_design(design, terms), regression.noise(fit)
+        known = Information(plan, spectra).of_recordings(design, regression, fit)
+        noise = max(regression.noise_floor(fit, d) for d in regression.drives)
+    else:
+        white = NoiseSpectrum(np.zeros(0), np.array([noise ** 2]), BLOCK_DURATION)
+        plan = ColumnPlan(model, model, base_without_recordings(model), tuple(terms))
+        spectra = dict.fromkeys(range(len(DRIVES)), white)
+        known = Information(plan, spectra).prior()
+    subjects = subjects_of(plan, Prices(len(catalogue()), len(DRIVES), samples, DECISIONS))
+    scales = np.concatenate([np.ones(len(plan.numbers)), *(term.scales for term in terms)])
+    criterion = Precision((*plan.numbers, *free_of(subjects)), plan.others, scales)
+    return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise)
+
+
+def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:
+    """Return what is fitted on any recording of a model, as columns without rows."""
+    base: list[BaseColumn] = [KnownNumber({}, 1.0, number) for number in known_numbers(model)]
+    # One for every width, and one for friction that differs by direction while it turns over.
+    base += [ReversalShape({}, 1.0, drive) for _ in (*DRIVE_WIDTHS, None)
+             for drive in range(len(DRIVES))]
+    base += [ReversalShape({}, 1.0, None) for _ in PASSIVE_WIDTHS]
+    for effect in model.effects:
+        if isinstance(effect, CatalogueEffect):
+            for drive in effect.drives if isinstance(effect, DriveEffect) else (None,):
+                base += [PresentCoefficient({}, FREE, type(effect), drive, c)
+                         for c in effect.coefficients]
+                base += [PresentShape({}, FREE, type(effect), drive, p) for p in effect.shape]
+    return tuple(base)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.experiments.columns import Block
+from pprs_dynamics.experiments.columns import FittedTerm
 
 WEAK = 1e-9  # prior precision of what is free, relative to what is known of it
 # A direction of less information, per scale, is unknown, and so is what has a share in it.
@@ -35,25 +35,33 @@ class Criterion(Protocol):
 
 @dataclass(frozen=True)
 class Explanation:
-    """An effect that may be there.
+    """Effects that may be there.
 
     Parameters
     ----------
-    name : str
-    blocks : tuple of Block
+    names : tuple of str
+    terms : tuple of FittedTerm
+    free : tuple of int
+        Places of the columns that are fitted.
     index : tuple of int
-        Places of its columns.
+        Places of the columns that make up its force.
     truth : (k,) array
         Their coefficients where it is there as the recordings say.
-    penalty : float
-        Of the diagnosis, for its coefficients, shapes and places.
+    price : float
+        Against nothing: of its choice and of its coefficients.
     """
 
-    name: str
-    blocks: tuple[Block, ...]
+    names: tuple[str, ...]
+    terms: tuple[FittedTerm, ...]
+    free: tuple[int, ...]
     index: tuple[int, ...]
     truth: Array
-    penalty: float
+    price: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Of all its effects."""
+        return ' and '.join(self.names)
 
 
 @dataclass(frozen=True)
@@ -64,26 +72,43 @@ class Contest:
     ----------
     truth, rival : Explanation
     refitted : tuple of int
-        Places of all columns that are fitted with the rival: the model's, the rival's, and those
-        of other effects.
+        Places of all columns that are fitted with the rival.
+    now : float
+        By how much the rival costs more on the recordings that there are.
     """
 
     truth: Explanation
     rival: Explanation
     refitted: tuple[int, ...]
+    now: float = 0.0
+
+    @property
+    def sides(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Effects that only the truth has, and those that only the rival has."""
+        truth, rival = self.truth.names, self.rival.names
+        return (tuple(one for one in truth if one not in rival),
+                tuple(one for one in rival if one not in truth))
+
+    def unexplained(self, size: int) -> Array:
+        """Return coefficients of the true force less what the rival has for certain, (size,)."""
+        force = np.zeros(size)
+        force[list(self.truth.index)] += self.truth.truth
+        for k, value in zip(self.rival.index, self.rival.truth, strict=True):
+            if k not in self.rival.free:
+                force[k] -= value
+        return force
 
     def misfit(self, gram: Array) -> float:
         """Return the squared error, whitened, that the refitted rival leaves."""
         return misfits_of((self,), gram)[0]
 
-    @property
-    def price(self) -> float:
-        """What the rival pays more than the truth."""
-        return self.rival.penalty - self.truth.penalty
+    def evidence(self, known: Array, after: Array) -> float:
+        """Return the evidence against the rival that recordings and motion together promise."""
+        return self.now + self.gained(known, after)
 
-    def evidence(self, gram: Array) -> float:
-        """Return twice the expected log-likelihood ratio less the penalties' difference."""
-        return self.misfit(gram) + self.price
+    def gained(self, known: Array, after: Array) -> float:
+        """Return the share of it that the motion adds."""
+        return max(self.misfit(after) - self.misfit(known), 0.0)
 
 
 def misfits_of(contests: Sequence[Contest], gram: Array) -> list[float]:
@@ -94,13 +119,12 @@ def misfits_of(contests: Sequence[Contest], gram: Array) -> list[float]:
     misfits = [0.0] * len(contests)
     for refitted, members in by_rival.items():
         R = list(refitted)
-        truths = [contests[k].truth for k in members]
-        sides = np.stack([gram[np.ix_(R, list(one.index))] @ one.truth for one in truths], axis=1)
-        explained = np.sum(sides * solve(gram[np.ix_(R, R)], sides), axis=0)
-        for k, one, part in zip(members, truths, explained, strict=True):
-            T = list(one.index)
-            whole = float(one.truth @ gram[np.ix_(T, T)] @ one.truth)
-            misfits[k] = max(whole - float(part), 0.0)
+        forces = np.stack([contests[k].unexplained(len(gram)) for k in members], axis=1)
+        whole = gram @ forces
+        explained = np.sum(whole[R] * solve(gram[np.ix_(R, R)], whole[R]), axis=0)
+        left = np.sum(forces * whole, axis=0) - explained
+        for k, misfit in zip(members, left, strict=True):
+            misfits[k] = max(float(misfit), 0.0)
     return misfits
 
 
@@ -172,6 +196,6 @@ def solve(matrix: Array, side: Array) -> Array:
     return result
 
 
-def index_of(explanations: Sequence[Explanation]) -> tuple[int, ...]:
-    """Return the places of all columns of explanations."""
-    return tuple(k for one in explanations for k in one.index)
+def free_of(explanations: Sequence[Explanation]) -> tuple[int, ...]:
+    """Return the places of all columns that are fitted in explanations."""
+    return tuple(k for one in explanations for k in one.free)

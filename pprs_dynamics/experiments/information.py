@@ -1,124 +1,72 @@
-"""What recordings and motions say about columns: Gram matrices under correlated noise."""
+"""What recordings and motions say about columns: Gram matrices under the noise of the drives.
+
+As in a fit, columns are transformed by the orthonormal DCT and divided by the root of the noise's
+power spectrum.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.joint_fit import Regression
-from pprs_dynamics.diagnosis.noise import NoiseModel
-from pprs_dynamics.experiments.columns import Block, ColumnPlan, MotionColumns, RecordedColumns
-
-LEAST_FREQUENCIES = 1024  # at which a noise model's spectrum is taken, at least
+from pprs_dynamics.experiments.columns import ColumnPlan, Columns
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.residuals.noise import NoiseSpectrum
 
 
 @dataclass(frozen=True)
-class NoiseSpectra:
-    """Noise of every drive, as it weighs on a motion.
-
-    Parameters
-    ----------
-    models : dict of drive to NoiseModel
-    period : float
-        Between the samples of the noise models [s].
-    """
-
-    models: dict[int, NoiseModel]
-    period: float
-
-    @classmethod
-    def white(cls, deviation: float, period: float, drives: int = 6) -> NoiseSpectra:
-        """Return the same white noise of samples `period` apart on all drives [N]."""
-        return cls({d: NoiseModel((), (0,), (np.zeros(0),), (deviation,))
-                    for d in range(drives)}, period)
-
-    def weights(self, d: int, samples: int, duration: float) -> Array:
-        """Return factors for `fft.rfft` of values at coarse samples of a periodic motion.
-
-        The sum of squares of what they give is the whitened sum of squares at `period`.
-        """
-        model = self.models[d]
-        whole = duration / self.period
-        size = max(LEAST_FREQUENCIES, len(model.filter), round(whole))
-        power = model.spectrum(size)
-        at = np.arange(samples // 2 + 1) / duration * self.period * size
-        density = np.interp(at, np.arange(len(power)), power)
-        twice = np.where((np.arange(len(density)) == 0)
-                         | (2 * np.arange(len(density)) == samples), 1.0, 2.0)
-        weights: Array = np.sqrt(twice * whole / samples ** 2 / density)
-        return weights
-
-
 class Information:
-    """Gram matrices of a plan's columns.
+    """Gram matrices of a plan's columns, (P, P).
 
     Parameters
     ----------
     plan : ColumnPlan
-    noise : NoiseSpectra
+    noise : mapping of drive to NoiseSpectrum
+        Other drives tell nothing.
     """
 
-    def __init__(self, plan: ColumnPlan, noise: NoiseSpectra) -> None:
-        self.plan, self.noise = plan, noise
-        self._weights: dict[tuple[int, int, float], Array] = {}
+    plan: ColumnPlan
+    noise: Mapping[int, NoiseSpectrum]
 
-    def of_recordings(self, regression: Regression) -> Array:
-        """Return what recordings tell, (P, P)."""
-        source = RecordedColumns(regression.design)
+    def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
+        """Return what recordings tell, and what is known of the base columns beforehand."""
+        white = {}
+        for d, (index, rows) in self.plan.on_recordings(design).items():
+            if d in self.noise:
+                series = regression.series[d]
+                factor = series.spread(np.sqrt(regression.weights(fit, d)))
+                white[d] = index, series.transform(rows) * factor
+        return self._gram(white) + self.prior()
+
+    def prior(self) -> Array:
+        """Return what is known of the base columns beforehand."""
+        known = np.zeros(self.plan.size)
+        known[:len(self.plan.base)] = [column.precision for column in self.plan.base]
+        return np.diag(known)
+
+    def of_motion(self, columns: Columns, duration: float) -> Array:
+        """Return what a motion of some duration [s] would tell, however densely it is sampled."""
+        return self._gram({d: (index, whitened(rows, self.noise[d], duration))
+                           for d, (index, rows) in columns.items() if d in self.noise})
+
+    def _gram(self, white: Columns) -> Array:
         gram = np.zeros((self.plan.size, self.plan.size))
-        rows = [block.rows(source) for block in self.plan.blocks]
-        for d, noise in self.noise.models.items():
-            series = regression.series[d]
-            base, _ = regression.whitened_base(d, noise)
-            index, parts = list(regression.base_index[d]), [base]
-            for found, place in zip(rows, self.plan.places(), strict=True):
-                if d in found:
-                    index += range(place.start, place.stop)
-                    parts.append(series.whiten(noise, found[d][:, series.index]))
-            stacked = np.concatenate(parts)
-            gram[np.ix_(index, index)] += stacked @ stacked.T
+        for index, rows in white.values():
+            gram[np.ix_(index, index)] += rows @ rows.T
         return gram
 
-    def of_motion(self, columns: MotionColumns) -> Array:
-        """Return what a motion at the noise's own rate would tell, (P, P)."""
-        gram = np.zeros((self.plan.size, self.plan.size))
-        for d, index, rows in self._by_drive(columns):
-            white = self.noise.models[d].whiten(rows, [slice(0, rows.shape[1])])
-            gram[np.ix_(index, index)] += white @ white.T
-        return gram
 
-    def of_coarse_motion(self, columns: MotionColumns, duration: float) -> Array:
-        """Return nearly the same from few samples of a periodic motion, (P, P)."""
-        gram = np.zeros((self.plan.size, self.plan.size))
-        for d, index, rows in self._by_drive(columns):
-            key = (d, rows.shape[1], duration)
-            if key not in self._weights:
-                self._weights[key] = self.noise.weights(*key)
-            lines = fft.rfft(rows, axis=1) * self._weights[key]
-            white = np.concatenate((lines.real, lines.imag), axis=1)
-            gram[np.ix_(index, index)] += white @ white.T
-        return gram
+def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:
+    """Return the DCT of rows of a motion, (p, n), per standard deviation of the noise.
 
-    def _by_drive(self, columns: MotionColumns) -> list[tuple[int, list[int], Array]]:
-        blocks = [block.rows(columns) for block in self.plan.blocks]
-        found = []
-        for d in self.noise.models:
-            index = [k for k, rows in enumerate(columns.base) if d in rows]
-            parts = [columns.base[k][d][None] for k in index]
-            for rows, place in zip(blocks, self.plan.places(), strict=True):
-                if d in rows:
-                    index += range(place.start, place.stop)
-                    parts.append(rows[d])
-            found.append((d, index, np.concatenate(parts)))
-        return found
-
-
-def block_index(plan: ColumnPlan, blocks: Sequence[Block]) -> list[int]:
-    """Return the places of the columns of some of a plan's blocks."""
-    wanted = {id(block) for block in blocks}
-    return [k for block, place in zip(plan.blocks, plan.places(), strict=True)
-            if id(block) in wanted for k in range(place.start, place.stop)]
+    Fewer samples than the noise has count for as many, as long as they follow the motion.
+    """
+    count = rows.shape[-1]
+    density = noise.power(np.arange(count) / (2 * duration)) * count * noise.period / duration
+    white: Array = fft.dct(rows, norm='ortho', axis=-1) / np.sqrt(density)
+    return white

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.stats import norm
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.selection import FAR_SCORE
-from pprs_dynamics.effects.time_delay import TimeDelay
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.experiments.columns import Block
+from pprs_dynamics.experiments.columns import FittedTerm
 from pprs_dynamics.experiments.commissioning import commissioning
-from pprs_dynamics.experiments.criteria import Contest, Precision, index_of
+from pprs_dynamics.experiments.criteria import Contest, Precision
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
-from pprs_dynamics.experiments.question import Question, block_scales, question_of
+from pprs_dynamics.experiments.question import Question, precision_of, question_of
 from pprs_dynamics.experiments.trajectory_search import Found, TrajectorySearch, forces_of
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.regression.base_columns import KnownNumber
+from pprs_dynamics.selection.decisions import DECISIONS
 
 PURPOSES = ('separate', 'commission')
 SURE = 0.9  # probability from which a design counts as separating
@@ -42,8 +43,7 @@ class Bout:
     ----------
     truth, rival : str
     now, expected : float
-        Twice the expected log-likelihood ratio less the penalties' difference: of the recordings,
-        and with the motion.
+        By how much the rival costs more in a diagnosis: of the recordings, and with the motion.
     probability : float
         That the rival falls behind by what a diagnosis asks for.
     """
@@ -245,7 +245,7 @@ def check_duration(duration: float) -> None:
 def experiment_of(question: Question, found: Found) -> Experiment:
     """Return a motion with what it promises for a question."""
     known, after = question.known, question.known + found.gram
-    bouts = tuple(_bout(one, known, after) for one in question.contests)
+    bouts = tuple(bout for one in question.contests for bout in _bouts(one, known, after))
     decided = [one.expected for one in bouts if one.probability >= SURE]
     evidences = _evidences(question, after)
     if bouts:
@@ -261,20 +261,22 @@ def experiment_of(question: Question, found: Found) -> Experiment:
         lambda time: forces_of(question.model, [found.path], time), question.model)
 
 
-def _bout(contest: Contest, known: Array, after: Array) -> Bout:
-    misfit, expected = contest.misfit(after), contest.evidence(after)
+def _bouts(contest: Contest, known: Array, after: Array) -> list[Bout]:
+    """Return what a motion promises for every pair of effects of a contest."""
+    expected, gained = contest.evidence(known, after), contest.gained(known, after)
     # Twice a log-likelihood ratio scatters by twice the root of its mean.
-    sure = float(norm.cdf((expected - FAR_SCORE) / (2 * np.sqrt(misfit) + 1e-9)))
-    return Bout(contest.truth.name, contest.rival.name, contest.evidence(known), expected, sure)
+    sure = float(norm.cdf((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
+    return [Bout(truth, rival, contest.now, expected, sure)
+            for truth, rival in product(*contest.sides)]
 
 
 def _evidences(question: Question, after: Array) -> dict[str, float]:
     """Return the evidence of each subject against its absence, the least of its drives."""
-    base = tuple(range(len(question.plan.labels)))
+    base = tuple(range(len(question.plan.base)))
     found: dict[str, float] = {}
     for one in question.subjects:
         own = Precision(one.index, base, np.ones(len(one.index))).own(after)
-        evidence = float(one.truth @ own @ one.truth) - one.penalty
+        evidence = float(one.truth @ own @ one.truth) - one.price
         found[one.name] = min(evidence, found.get(one.name, np.inf))
     return found
 
@@ -283,41 +285,31 @@ def _accuracies(question: Question, known: Array, after: Array) -> list[Accuracy
     """Return how well numbers and effects would be known; effects that may be there each alone."""
     if question.contests:
         return []
-    labels = question.plan.labels
-    base = tuple(range(len(labels)))
-    found = []
+    plan, found = question.plan, []
     if question.kind == 'commission' or not question.subjects:
-        numbers = tuple(k for k, (kind, _) in enumerate(labels) if kind == 'number')
-        scales = np.array([one.deviation for one in question.plan.numbers])
-        found += _known_to([(one.label, one.unit) for one in question.plan.numbers], scales,
-                           Precision(numbers, tuple(k for k in base if k not in numbers),
-                                     np.ones(len(numbers))), known, after)
+        numbers = [one.number for one in plan.base if isinstance(one, KnownNumber)]
+        # Their columns are per standard deviation of what is known beforehand.
+        found += _known_to([(one.label, one.unit, one.deviation) for one in numbers],
+                           precision_of(plan, ()), known, after)
     groups = ([question.subjects] if question.kind == 'estimate' else
               [(one,) for one in question.subjects])
     for group in groups:
-        blocks = [block for one in group for block in one.blocks]
-        scales = np.concatenate([block_scales(block) for block in blocks])
-        found += _known_to([label for block in blocks for label in _labels(block)], scales,
-                           Precision(index_of(group), base, scales), known, after)
+        found += _known_to([label for one in group for term in one.terms
+                            for label in _labels(term)], precision_of(plan, group), known, after)
     return found
 
 
-def _known_to(labels: list[tuple[str, str]], scales: Array, precision: Precision, known: Array,
+def _known_to(labels: list[tuple[str, str, float]], precision: Precision, known: Array,
               after: Array) -> list[Accuracy]:
-    # Columns of numbers are per standard deviation of what is known beforehand.
-    unit = scales / precision.scales
-    return [Accuracy(label, what, float(scale), float(a), float(b))
-            for (label, what), scale, a, b in zip(
-                labels, scales, unit * precision.deviations(known),
-                unit * precision.deviations(after), strict=True)]
+    """Return accuracies by name, unit and what one scale of the precision is in that unit."""
+    before, later = (precision.deviations(gram) / precision.scales for gram in (known, after))
+    return [Accuracy(label, unit, scale, scale * float(a), scale * float(b))
+            for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
 
 
-def _labels(block: Block) -> list[tuple[str, str]]:
-    """Return name and unit of each of a block's columns."""
-    prefix = block.effect.name + ('' if block.drive is None else f'.{DRIVES[block.drive]}')
-    own = [(f'{prefix}.{c.name}', c.unit) for c in (
-        [block.effect.coefficients[k] for k in block.chosen] if block.effect.coefficients else ())]
-    shapes = [(f'{prefix}.{name}', 'ms' if block.effect is TimeDelay else 'relative')
-              for name in block.shape]
-    # The column of a delay as a whole says what its slope says.
-    return (own or [(f'{prefix} present', 'share')]) + shapes
+def _labels(term: FittedTerm) -> list[tuple[str, str, float]]:
+    """Return name, unit and scale of each parameter of a term that is fitted."""
+    prefix = term.effect.name + ('' if term.drive is None else f'.{DRIVES[term.drive]}')
+    return [(f'{prefix}.{p.name}', p.unit,
+             p.spread(1.0, term.shape[p.name]) if p.name in term.shape else p.scale)
+            for p in term.parameters]

@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import permutations, product
+from math import log
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.joint_fit import Active, Regression
-from pprs_dynamics.diagnosis.library import Candidate, holds
-from pprs_dynamics.diagnosis.scan import Scan
-from pprs_dynamics.diagnosis.stages import Stage, find_way
-from pprs_dynamics.experiments.columns import Block, ColumnPlan, plan_for
+from pprs_dynamics.experiments.columns import ColumnPlan, FittedTerm
 from pprs_dynamics.experiments.criteria import (
     Contest,
     Criterion,
     Explanation,
     Precision,
     Separation,
-    index_of,
+    free_of,
 )
-from pprs_dynamics.experiments.information import Information, NoiseSpectra, block_index
+from pprs_dynamics.experiments.information import Information
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate, Prices
+from pprs_dynamics.selection.decisions import DECISIONS
+from pprs_dynamics.selection.expansion import Selection, rebuilt, select
+from pprs_dynamics.selection.form import without_remainders
+from pprs_dynamics.selection.rivals import Rival, find_rivals
+from pprs_dynamics.selection.search import Search
 
 UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least
+HELD = 1e-3  # of a column's square may lie outside the span of another effect's
+Part = tuple[FittedTerm, Array]
+"""A term, and the coefficients that it has in one explanation."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +44,8 @@ class Question:
     Parameters
     ----------
     kind : {'separate', 'estimate', 'excite', 'commission'}
-    model : DriveModel
-        Around which all is linear.
     plan : ColumnPlan
-    noise : NoiseSpectra
+    noise : mapping of drive to NoiseSpectrum
     known : (P, P) array
         What recordings and tolerances tell already.
     criterion : Criterion
@@ -52,14 +58,18 @@ class Question:
     """
 
     kind: str
-    model: DriveModel
     plan: ColumnPlan
-    noise: NoiseSpectra
+    noise: Mapping[int, NoiseSpectrum]
     known: Array
     criterion: Criterion
     contests: tuple[Contest, ...]
     subjects: tuple[Explanation, ...]
     noise_floor: float
+
+    @property
+    def model(self) -> DriveModel:
+        """Around which all is linear."""
+        return self.plan.model
 
     @property
     def information(self) -> Information:
@@ -74,131 +84,200 @@ class Question:
 def question_of(model: DriveModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    way = find_way(model, recordings, progress)
-    # As the diagnosis does: all others are judged around a model that has what bends them.
-    contested = any(way.rivals.get(one.candidate.name) for one in way.bent)
-    stage = way.first if contested else way.last
-    progress(1.0)
-    return _Asker(stage).question()
+    selection = select(model, recordings, DECISIONS, progress)
+    adopted, remainders = without_remainders(selection.last, selection.best)
+    rivals = find_rivals(selection, adopted, DECISIONS.rival_margin,
+                         {one.candidate.name for one in remainders})
+    return question_after(selection, adopted, rivals)
 
 
-class _Asker:
-    """Turns a selection into a question."""
+def question_after(selection: Selection, adopted: CandidateSet,
+                   rivals: Sequence[Rival]) -> Question:
+    """Return what a selection leaves open.
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage, self.selection = stage, stage.selection
-        self.regression: Regression = stage.regression
-        self.noises = self.selection.fit.noises
-        self.blocks: list[Block] = []
-
-    def question(self) -> Question:
-        adopted = self.selection.adopted
-        if any(self.selection.rivals.get(one.candidate.name) for one in adopted):
-            return self._separation()
-        if adopted:
-            return self._estimation('estimate', [self._explained(one.candidate, self._others(k))
-                                                 for k, one in enumerate(adopted)])
-        return self._estimation('excite', self._weak())
-
-    def _others(self, k: int) -> tuple[Active, ...]:
-        return tuple(active for j, one in enumerate(self.selection.adopted) if j != k
-                     for active in one.candidate.active)
-
-    def _explained(self, candidate: Candidate, others: tuple[Active, ...],
-                   more: Sequence[int] = ()) -> Explanation:
-        """Return an explanation with its fitted values, on more drives where they are given."""
-        coefficients, _, _ = self.regression.solve((*others, *candidate.active), self.noises)
-        place = len(self.regression.design.base) + sum(one.size for one in others)
-        blocks = []
-        for active in candidate.active:
-            blocks.append(Block.of(active, coefficients[place:place + active.size]))
-            place += active.size
-        first = blocks[0]
-        blocks += [replace(first, drive=d, values=0 * first.values) for d in more]
-        self.blocks += blocks
-        return Explanation(candidate.name, tuple(blocks), (),
-                           np.concatenate([block.truth for block in blocks]), candidate.penalty)
-
-    def _separation(self) -> Question:
-        pairs: list[tuple[Explanation, Explanation, tuple[Explanation, ...]]] = []
-        mains = [self._explained(one.candidate, self._others(k))
-                 for k, one in enumerate(self.selection.adopted)]
-        for k, one in enumerate(self.selection.adopted):
-            names = self.selection.rivals.get(one.candidate.name, [])
-            scan = Scan(self.stage.selector.library, self._others(k), self.noises)
-            found = {c.name: c for c in scan.candidates()} if names else {}
-            group = [(one.candidate, mains[k])]
-            for name in names:
-                candidate = scan.refined(found[name])
-                group.append((candidate, self._explained(
-                    candidate, self._others(k), _drives_missing(candidate, one.candidate))))
-            beside = tuple(other for j, other in enumerate(mains) if j != k)
-            # An effect that can be all that another one is fits it on any motion.
-            pairs += [(truth, rival, beside) for (small, truth), (large, rival)
-                      in permutations(group, 2) if not holds(large, small)]
-        plan = plan_for(self.regression.design, self.blocks)
-        base = tuple(range(len(plan.labels)))
-        contests = []
-        for truth, rival, beside in pairs:
-            truth, rival = (_placed(one, plan) for one in (truth, rival))
-            others = index_of([_placed(one, plan) for one in beside])
-            contests.append(Contest(truth, rival, (*base, *others, *rival.index)))
-        return self._asked('separate', plan, Separation(tuple(contests)), tuple(contests),
-                           [_placed(one, plan) for one in mains])
-
-    def _estimation(self, kind: str, subjects: list[Explanation]) -> Question:
-        plan = plan_for(self.regression.design, self.blocks)
-        placed = [_placed(one, plan) for one in subjects]
-        base = tuple(range(len(plan.labels)))
-        if placed:
-            scales = np.concatenate([block_scales(b) for one in placed for b in one.blocks])
-            criterion = Precision(index_of(placed), base, scales)
-        else:
-            numbers = tuple(k for k, (what, _) in enumerate(plan.labels) if what == 'number')
-            criterion = Precision(numbers, tuple(k for k in base if k not in numbers),
-                                  np.ones(len(numbers)))
-        return self._asked(kind, plan, criterion, (), placed)
-
-    def _weak(self) -> list[Explanation]:
-        """Return effects that the motion would not show at a size that matters."""
-        scan = Scan(self.stage.selector.library, (), self.noises)
-        weak = []
-        for term in self.stage.selector.library.structure:
-            S, _, _ = scan.projected(term.rows)
-            scales = np.array([c.scale for c in term.effect.coefficients])
-            if np.any(np.diag(S) * scales ** 2 < UNEXCITED):
-                active = Active(term, tuple(c.name for c in term.effect.coefficients))
-                block = Block.of(active, scales)
-                self.blocks.append(block)
-                weak.append(Explanation(term.effect.name, (block,), (), block.truth,
-                                        self.stage.selector.library.penalty(active)))
-        return weak
-
-    def _asked(self, kind: str, plan: ColumnPlan, criterion: Criterion,
-               contests: tuple[Contest, ...], subjects: Sequence[Explanation]) -> Question:
-        noise = NoiseSpectra(self.noises, self.regression.design.residuals.period)
-        known = Information(plan, noise).of_recordings(self.regression)
-        known[np.diag_indices(len(plan.labels))] += self.regression.precision
-        floor = max(float(np.sqrt(np.mean(self.selection.fit.rest[d][
-            self.regression.series[d].known] ** 2))) for d in self.noises)
-        return Question(kind, plan.model, plan, noise, known, criterion,
-                        contests, tuple(subjects), floor)
+    Parameters
+    ----------
+    selection : Selection
+    adopted : CandidateSet
+        Of its last search.
+    rivals : sequence of Rival
+        The best first.
+    """
+    if rivals:
+        return _separation(selection, adopted, rivals)
+    search = selection.last
+    if adopted.effects:
+        return _estimation(search, adopted)
+    return _excitation(search, adopted)
 
 
-def block_scales(block: Block) -> Array:
-    """Return the sizes at which a block's coefficients matter; shapes are relative."""
-    coefficients = block.effect.coefficients
-    own = [coefficients[k].scale for k in block.chosen] if coefficients else [1.0]
-    return np.array(own + [1.0] * len(block.shape))
+def _separation(selection: Selection, adopted: CandidateSet, rivals: Sequence[Rival]) -> Question:
+    """Return how to tell sets apart, each pair of effects in the sets of lowest cost."""
+    pairs: set[tuple[str, str]] = set()
+    sets = [adopted]
+    for rival in rivals:
+        new = set(product(rival.missing, rival.instead))
+        if not new <= pairs:
+            pairs |= new
+            sets.append(rival.found)
+    search = _common_search(selection, sets)
+    placed = [search.evaluate(rebuilt(search, one)) for one in sets]
+    terms = _Terms()
+    parts = [terms.of_set(one) for one in placed]
+    further = {(k, j): terms.on_drives_of(placed[k], placed[j])
+               for k, j in permutations(range(len(sets)), 2)}
+    plan = ColumnPlan.of_design(search.design, terms.all)
+    explanations = [_explanation([c.name for c in one.effects], own, plan, 0.0)
+                    for one, own in zip(placed, parts, strict=True)]
+    contests = []
+    for (k, j), more in further.items():
+        free = explanations[k].free + tuple(
+            place for term in more for place in _places(plan, term)[term.free])
+        contest = Contest(explanations[j], explanations[k], (*range(len(plan.base)), *free),
+                          sets[k].cost - sets[j].cost)
+        refitted = [*(term for term, _ in parts[k]), *more]
+        own = [term for term, _ in parts[j] if term.effect.name in contest.sides[0]]
+        # An effect that can be all that another one is fits it on any motion.
+        if all(contest.sides) and not all(_holds(refitted, one, search.design) for one in own):
+            contests.append(contest)
+    subjects = [_explanation([c.name], terms.of_candidate(placed[0], c), plan, 0.0)
+                for c in placed[0].effects]
+    return _asked('separate', search, placed[0], plan, Separation(tuple(contests)), contests,
+                  subjects)
 
 
-def _placed(one: Explanation, plan: ColumnPlan) -> Explanation:
-    return replace(one, index=tuple(block_index(plan, one.blocks)))
+def _common_search(selection: Selection, sets: Sequence[CandidateSet]) -> Search:
+    """Return the last search, or the first where one of the sets is linear around its point."""
+    last = selection.last
+    return last if all(last.evaluated.get(one.key) is one for one in sets) else selection.first
 
 
-def _drives_missing(candidate: Candidate, beside: Candidate) -> list[int]:
-    """Return drives of the one effect that the other, if it sits on drives, leaves out."""
-    mine, theirs = candidate.drives, beside.drives
-    if mine is None or theirs is None or len(candidate.active[0].term.rows) > 1:
-        return []
-    return sorted(set(theirs) - set(mine))
+def _estimation(search: Search, adopted: CandidateSet) -> Question:
+    """Return how to measure the parameters of effects that are there."""
+    terms = _Terms()
+    parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
+    plan = ColumnPlan.of_design(search.design, terms.all)
+    samples = search.library.prices.samples
+    subjects = [_explanation([c.name], own, plan, c.total_price + sum(
+        len(term.names) for term, _ in own) * log(samples))
+        for c, own in zip(adopted.effects, parts, strict=True)]
+    return _asked('estimate', search, adopted, plan, precision_of(plan, subjects), (), subjects)
+
+
+def _excitation(search: Search, nothing: CandidateSet) -> Question:
+    """Return how to show effects that the motion would not show at a size that matters."""
+    regression = search.regression
+    weak = []
+    for term in search.design.structure:
+        block = regression.block(term.rows)
+        gain = np.diag(regression.own_information(nothing.fit, block))
+        found = FittedTerm.at_scale(term.effect, None, {})
+        if np.any(gain * found.scales ** 2 < UNEXCITED):
+            weak.append(found)
+    plan = ColumnPlan.of_design(search.design, weak)
+    subjects = subjects_of(plan, search.library.prices)
+    return _asked('excite', search, nothing, plan, precision_of(plan, subjects), (), subjects)
+
+
+def subjects_of(plan: ColumnPlan, prices: Prices) -> list[Explanation]:
+    """Return each term of a plan as an effect that may be there."""
+    subjects = []
+    for term in plan.terms:
+        price = (prices.of_name() + prices.of_placement(term.effect, 1)
+                 + len(term.names) * log(prices.samples))
+        if term.drive is not None:
+            price += prices.of_drives(1)
+        subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, price))
+    return subjects
+
+
+def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision:
+    """Return how well effects are known beside the base; without any, the model's numbers."""
+    if not subjects:
+        return Precision(plan.numbers, plan.others, np.ones(len(plan.numbers)))
+    scales = np.concatenate([term.scales for one in subjects for term in one.terms])
+    return Precision(free_of(subjects), tuple(range(len(plan.base))), scales)
+
+
+def _asked(kind: str, search: Search, found: CandidateSet, plan: ColumnPlan, criterion: Criterion,
+           contests: Sequence[Contest], subjects: Sequence[Explanation]) -> Question:
+    """Return a question under the noise of a set."""
+    regression, fit = search.regression, found.fit
+    noise = regression.noise(fit)
+    known = Information(plan, noise).of_recordings(search.design, regression, fit)
+    floor = max(regression.noise_floor(fit, d) for d in regression.drives)
+    return Question(kind, plan, noise, known, criterion, tuple(contests), tuple(subjects), floor)
+
+
+class _Terms:
+    """Terms of several sets; what they share is there once."""
+
+    def __init__(self) -> None:
+        self._found: dict[Hashable, FittedTerm] = {}
+
+    @property
+    def all(self) -> tuple[FittedTerm, ...]:
+        """In the order in which they came."""
+        return tuple(self._found.values())
+
+    def of_set(self, found: CandidateSet) -> list[Part]:
+        """Return the terms of a set."""
+        return [part for c in found.effects for part in self.of_candidate(found, c)]
+
+    def of_candidate(self, found: CandidateSet, candidate: EffectCandidate) -> list[Part]:
+        """Return the terms of an effect of a set."""
+        parts = []
+        for one in candidate.placements:
+            values = found.coefficients(one)
+            term = FittedTerm(candidate.effect, one.drive, one.term.shape, one.names, values)
+            parts.append((self._once(term), values))
+        return parts
+
+    def on_drives_of(self, found: CandidateSet, truth: CandidateSet) -> list[FittedTerm]:
+        """Return the effects of a set on further drives, where those of another set sit."""
+        theirs = {d for c in truth.effects for d in c.drives or ()}
+        more = []
+        for c in found.effects:
+            first = c.placements[0]
+            if c.drives is not None and c.name not in {one.name for one in truth.effects} and (
+                    len(first.term.rows) == 1):
+                values = found.coefficients(first) * first.term.is_fixed
+                more += [self._once(FittedTerm(c.effect, d, first.term.shape, first.names, values))
+                         for d in sorted(theirs - set(c.drives))]
+        return more
+
+    def _once(self, term: FittedTerm) -> FittedTerm:
+        key = (term.effect, term.drive, tuple(sorted(term.shape.items())), term.names)
+        return self._found.setdefault(key, term)
+
+
+def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, price: float,
+                 ) -> Explanation:
+    places = [_places(plan, term) for term, _ in parts]
+    return Explanation(
+        tuple(names), tuple(term for term, _ in parts),
+        tuple(k for place, (term, _) in zip(places, parts, strict=True) for k in place[term.free]),
+        tuple(k for place, (_, values) in zip(places, parts, strict=True)
+              for k in place[:len(values)]),
+        np.concatenate([values for _, values in parts]), price)
+
+
+def _places(plan: ColumnPlan, term: FittedTerm) -> range:
+    place = plan.places()[term]
+    return range(place.start, place.stop)
+
+
+def _holds(larger: Sequence[FittedTerm], smaller: FittedTerm, design: Design) -> bool:
+    """Return whether terms with more coefficients on the same drive can be all that one is."""
+    same = [term for term in larger if term.drive == smaller.drive]
+    if sum(len(term.values) for term in same) <= len(smaller.values):
+        return False
+    theirs = [term.rows(design) for term in same]
+    for d, mine in smaller.rows(design).items():
+        own = mine[:len(smaller.values)]
+        span = np.concatenate([rows[d][:len(term.values)] for term, rows in zip(
+            same, theirs, strict=True) if d in rows] or [np.zeros((1, own.shape[1]))])
+        rest = own - np.linalg.lstsq(span.T, own.T, rcond=None)[0].T @ span
+        if np.sum(rest ** 2) > HELD * np.sum(own ** 2):
+            return False
+    return True

@@ -24,9 +24,11 @@ from pprs_dynamics.experiments.fourier_path import (
 )
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.experiments.question import Question
+from pprs_dynamics.measurement.treatment import block_length
 from pprs_dynamics.mechanism.paths import HOME
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.parallel import each
+from pprs_dynamics.selection.decisions import DECISIONS
 
 HARMONICS = 4  # of each degree of freedom
 SLOWEST_TOP = 5  # the highest harmonic of the slowest motions
@@ -41,7 +43,6 @@ HALVINGS = 7
 # Some series are left smaller than the limits allow: slow motion tells of friction near rest.
 SMALLER, SMALLEST = 0.25, 0.1
 OTHER_SPECTRUM = 0.2  # difference of ln of the highest harmonic
-HOPELESS = 10.0  # evidence, below which a motion decides nothing
 OUTSIDE = 2.0  # use of limits where the mechanism cannot follow
 FINE_RATE = 500.0  # [Hz], at which limits are checked
 
@@ -157,10 +158,11 @@ class TrajectorySearch:
         contests = self.question.contests
         if not contests:
             return []
-        misfits = np.max([misfits_of(contests, self.question.known + draw.gram)
-                          for draw in drawn], axis=0)
-        return [one for one, misfit in zip(contests, misfits, strict=True)
-                if misfit + one.price > HOPELESS]
+        known = self.question.known
+        gained = np.max([misfits_of(contests, known + draw.gram) for draw in drawn],
+                        axis=0) - misfits_of(contests, known)
+        return [one for one, more in zip(contests, gained, strict=True)
+                if one.now + more > DECISIONS.rival_margin]
 
     def screen(self, progress: Callable[[float], None] = lambda share: None,
                draws: int = DRAWS) -> list[Drawn]:
@@ -192,9 +194,9 @@ class TrajectorySearch:
         forces = self._forces([path], self._fine)
         uses = self.limits.uses(self.question.model, forces, len(self._fine))[0]
         question = self.question
-        block = max(1, round(question.noise.period * FINE_RATE))
+        block = block_length(1 / FINE_RATE)
         columns = question.plan.on_motions(forces, self._fine, block)[0]
-        gram = question.information.of_motion(columns)
+        gram = question.information.of_motion(columns, self.duration)
         return Found(path, gram, uses, self._worth(gram))
 
     def _kinds(self, drawn: list[Drawn]) -> list[Drawn]:
@@ -257,7 +259,7 @@ class TrajectorySearch:
         """Return what several paths would tell, and their uses of the limits."""
         question = self.question
         forces = self._forces(paths, self._time)
-        grams = [question.information.of_coarse_motion(columns, self.duration)
+        grams = [question.information.of_motion(columns, self.duration)
                  for columns in question.plan.on_motions(forces, self._time)]
         return grams, self.limits.uses(self.question.model, forces, len(self._time))
 
@@ -309,6 +311,5 @@ class TrajectorySearch:
 
 
 def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> DriveForces:
-    """Return the efforts that sensors would show along paths, one after the other."""
-    state = model.initial_state()
-    return model.measured(model.drive_forces(joined_motion(paths, time), state), state)
+    """Return the forces that drives must apply along paths, one after the other."""
+    return model.drive_forces(joined_motion(paths, time))
