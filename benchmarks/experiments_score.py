@@ -140,6 +140,12 @@ def poor_motions(seed: int) -> dict[str, PlatformMotion]:
                                highest_frequency=0.25).motion(times(OLD))}
 
 
+def rivals_of(name: str, question: Question) -> list[str]:
+    """Return what a question holds against an effect."""
+    return sorted({rival for contest in question.contests if name in contest.sides[0]
+                   for rival in contest.sides[1]})
+
+
 def ambiguous_start(name: str, seed: int) -> Start | None:
     """Return a robot, its poor motion, the recording and the open question, or None."""
     for how, motion in poor_motions(seed).items():
@@ -147,8 +153,7 @@ def ambiguous_start(name: str, seed: int) -> Start | None:
             robot = HiddenRobot(name, seed, scale)
             old = robot.record(motion, 0)
             question = question_of(robot.model, [old], lambda share: None)
-            pairs = {one for c in question.contests for one in (c.truth.name, c.rival.name)}
-            if name in pairs:
+            if rivals_of(name, question):
                 return Start(robot, how, motion, old, question)
             if not question.subjects or question.kind == 'excite':
                 break
@@ -182,8 +187,7 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
     experiment = experiment_of(question, found)
     result: dict[str, Any] = {
         'effect': name, 'seed': seed, 'scale': robot.scale, 'motion': start.how,
-        'rivals': sorted({one for c in question.contests
-                          for one in (c.truth.name, c.rival.name)} - {name}),
+        'rivals': rivals_of(name, question),
         'promised': [list(pair) for pair in experiment.separates],
         'probability': min((b.probability for b in experiment.bouts if b.truth == name),
                            default=1.0),

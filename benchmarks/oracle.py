@@ -1,48 +1,44 @@
 """What somebody could say who knows which effect is hidden, and on which drives.
 
-The catalogue's form of the true effect is fitted on the true drives, its shape refined; the
-noise is that of its residual, as good as the true one. Rivals are fitted the same way.
+The catalogue's form of the true effect is fitted on the true drives, its shape refined; the noise
+is that of its residual, as good as the true one. Rivals are fitted from the same noise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from pprs_dynamics.diagnosis.library import Candidate
-from pprs_dynamics.diagnosis.scan import Scan
-from pprs_dynamics.diagnosis.selection import NEAR_SCORE, Selector
+import numpy as np
 
 from pprs_dynamics.effects.catalogue import catalogue
+from pprs_dynamics.selection.decisions import DECISIONS
+from pprs_dynamics.selection.expansion import Selection, linear_prediction
+from pprs_dynamics.selection.search import Search
+
+RIVALS = 6  # proposals that are fitted
 
 
-def consult(selector: Selector, truth: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `best_error` [N], and `separable`: no other effect scores as well.
+def consult(selection: Selection, truth: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `best_error` [N], and `separable`: no other effect alone comes near its cost.
 
-    Empty where nothing, several effects or none of the catalogue are hidden.
+    Empty where nothing, several effects or none of the catalogue are hidden, or where the model
+    has no place for it.
     """
     hidden = truth['effects']
     if len(hidden) != 1 or hidden[0]['name'] not in catalogue():
         return {}
-    name, regression = hidden[0]['name'], selector.regression
-    true = None if hidden[0]['drives'] is None else {
-        regression.design.drives.index(drive) for drive in hidden[0]['drives']}
-    scan = Scan(selector.library, (), selector.rich)
-    best: dict[int | None, Candidate] = {}
-    for one in [*(Candidate((active,), gain, selector.library.penalty(active))
-                  for active, gain in scan.terms()), *scan.local_bests()]:
-        drive = one.active[0].term.drive
-        if one.name == name and (true is None or drive in true) and (
-                drive not in best or one.score > best[drive].score):
-            best[drive] = one
-    chosen = Candidate(tuple(a for one in best.values() for a in one.active),
-                       sum(one.gain for one in best.values()),
-                       sum(one.penalty for one in best.values()) + selector.library.name_penalty)
-    chosen = scan.refined(chosen)
-    fit = regression.fit(chosen.active, selector.rich)
-    scan = Scan(selector.library, (), fit.noises)
-    own = scan.refined(chosen)
-    rivals = [scan.refined(one).score for one in scan.candidates()[:6] if one.name != name]
-    fit = regression.fit(own.active, fit.noises)
-    return {'best_error': regression.error(fit.active, fit.coefficients),
-            'separable': own.score > max(rivals, default=0.0) + NEAR_SCORE}
+    effect, design = catalogue()[hidden[0]['name']], selection.first.design
+    drives = hidden[0]['drives'] and [design.drives.index(drive) for drive in hidden[0]['drives']]
+    search = Search(design, DECISIONS, with_unknown=False)
+    nothing = search.evaluate(())
+    own = search.best_of(effect, drives)
+    if own is None:
+        return {}
+    base = replace(nothing, fit=search.regression.at((), own.fit.amplitudes))
+    rivals = [search.refined(search.evaluate(one, own)).cost
+              for one in search.proposals(base, RIVALS) if one[0].name != effect.name]
+    left = design.residuals.measured - linear_prediction(search, own)
+    return {'best_error': float(np.sqrt(np.nanmean(left ** 2))),
+            'separable': min(rivals, default=nothing.cost) > own.cost + DECISIONS.rival_margin}

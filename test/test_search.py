@@ -18,7 +18,13 @@ from pprs_dynamics.regression import design as design_module
 from pprs_dynamics.regression.design import Design
 from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.selection.decisions import DECISIONS, Decisions
-from pprs_dynamics.selection.expansion import select, squared_difference
+from pprs_dynamics.selection.expansion import (
+    exact_forces,
+    fitted_model,
+    linear_prediction,
+    select,
+    squared,
+)
 from pprs_dynamics.selection.form import without_remainders
 from pprs_dynamics.selection.search import Search
 
@@ -122,9 +128,9 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     found, _ = without_remainders(selection.last, selection.best)
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
-    from pprs_dynamics.selection.expansion import fitted_model
-    fitted = fitted_model(selection.last.design, selection.best)
-    assert squared_difference(selection.last, selection.best, fitted, [recording]) < 50
+    last = selection.last
+    exact = exact_forces(last.design, fitted_model(last, found), [recording])
+    assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
 def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:

@@ -274,7 +274,7 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     search, name = Search(design, case.decisions, with_unknown=False), case.request.name
     found = search.evaluate(())
     try:
-        fitted = with_widths(fitted_model(design, found), design, estimate_widths(search, found))
+        fitted = with_widths(fitted_model(search, found), design, estimate_widths(search, found))
     except ModelError as error:
         return case.without_model(str(error))
     before, after = case.residuals(fitted)

@@ -113,13 +113,13 @@ def fit_effect(
     after = hold_out(last, found)
     widths = estimate_widths(last, found)
     moved = [one for one in calibrations(last, found, widths) if _is_move(design, one)]
-    fitted = with_widths(fitted_model(last.design, found), last.design, widths)
+    fitted = with_widths(fitted_model(last, found), last.design, widths)
     final = _with_numbers(fitted, model, moved)
     parameters = {key: Estimate(float(final.values[f'effects.{request.name}.{key}']), one.std,
                                 one.unit) for key, one in said.parameters.items()}
     report(1.0)
     return EffectFit(
-        request, _names(design, candidate), final, fitted_model(design, plain_set), parameters,
+        request, _names(design, candidate), final, fitted_model(search, plain_set), parameters,
         said.at_bound, moved, evidence, share, last, found, before.error, after.error,
         plain_losses - after.losses)
 

@@ -112,9 +112,9 @@ def adopt_all(
         taken += 1
         refused.clear()
         if step.rivals:
-            return AdoptionRun(tuple(steps), AMBIGUOUS, f'{", ".join(step.rivals)} would explain these '
-                        f'recordings as well as {name}: pprs next-experiment tells which motion '
-                        'separates them', model, diagnosis)
+            reason = (f'{", ".join(step.rivals)} would explain these recordings as well as {name}: '
+                      'pprs next-experiment tells which motion separates them')
+            return AdoptionRun(tuple(steps), AMBIGUOUS, reason, model, diagnosis)
         diagnosis = None
 
 

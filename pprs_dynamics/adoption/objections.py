@@ -112,8 +112,8 @@ def of_linearity(promised: float, found: float) -> list[str]:
 def of_identifiability(fitted: EffectFit) -> list[str]:
     """Return whether the recordings tell the parameters at all."""
     if fitted.own_share < OWN_SHARE:
-        return [f'these recordings cannot tell {fitted.request.name} from what the model has: of its '
-                f'square only {fitted.own_share:.1e} is its own']
+        return [f'these recordings cannot tell {fitted.request.name} from what the model has: of '
+                f'its square only {fitted.own_share:.1e} is its own']
     angles = {p.name for p in fitted.request.effect.parameters if p.is_angle}
 
     def is_angle(key: str) -> bool:

@@ -172,7 +172,7 @@ class _Answer:
         search, regression = self.search, self.search.regression
         first = self.selection.first.design
         widths = estimate_widths(search, self.kept)
-        adopted = with_widths(fitted_model(self.design, self.kept), self.design, widths)
+        adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
         remaining = first.residuals.measured - exact_forces(self.design, adopted, self.recordings)
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
@@ -208,7 +208,7 @@ class _Answer:
                     for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.selection.first.design.given
-            models = [given, *(fitted_model(self.design, step) for step in steps[1:])]
+            models = [given, *(fitted_model(search, step) for step in steps[1:])]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
             held_out = [hold_out(search, step).error for step in steps]

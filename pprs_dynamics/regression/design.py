@@ -130,6 +130,16 @@ class FullRate:
 
 
 @dataclass(frozen=True)
+class PlacedEffect:
+    """An effect on a drive or in the structure, with all its coefficients by name."""
+
+    effect: type[CatalogueEffect]
+    drive: int | None
+    shape: Mapping[str, float]
+    coefficients: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Point:
     """Where forces are linear: a model, and what makes it differ from the given one.
 
@@ -137,15 +147,14 @@ class Point:
     ----------
     model : ForceModel
     base : (P,) array
-        Coefficients of the base columns; those of reversals count as 0.
-    effects : tuple of (effect, drive, shape, coefficients by name)
+        Coefficients of the base columns; those of reversals are 0.
+    effects : tuple of PlacedEffect
         What it has beside the given model.
     """
 
     model: ForceModel
     base: Array
-    effects: tuple[tuple[type[CatalogueEffect], int | None, Mapping[str, float],
-                         Mapping[str, float]], ...] = ()
+    effects: tuple[PlacedEffect, ...] = ()
 
 
 @dataclass
@@ -166,6 +175,8 @@ class Design:
         Change of all forces per metre that a drive is measured too far [N/m].
     notes : tuple of str
     reconstructions : tuple of Reconstruction
+    point : Point, optional
+        None: the given model.
     """
 
     given: ForceModel
@@ -177,6 +188,7 @@ class Design:
     homing: tuple[Mapping[int, Array], ...]
     notes: tuple[str, ...]
     reconstructions: tuple[Reconstruction, ...] = field(default=(), repr=False)
+    point: Point | None = None
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -204,13 +216,13 @@ class Design:
             if not isinstance(column, ReversalShape):
                 for d, row in column.rows.items():
                     shift[:, d] += c * row
-        for effect, drive, shape, coefficients in point.effects:
-            term = design.find_term(effect, drive, shape)
-            weights = np.array([coefficients[name] for name in term.names] or [1.0])
+        for one in point.effects:
+            term = design.find_term(one.effect, one.drive, one.shape)
+            weights = np.array([one.coefficients[name] for name in term.names] or [1.0])
             for d, rows in term.rows.items():
                 shift[:, d] += weights @ rows
         residuals = replace(design.residuals, model=design.residuals.model - shift)
-        return replace(design, residuals=residuals)
+        return replace(design, residuals=residuals, point=point)
 
     @classmethod
     def _evaluated(cls, model: ForceModel, given: ForceModel,
@@ -243,8 +255,9 @@ class Design:
         base: list[BaseColumn] = [
             KnownNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
-        base += [ReversalShape({d: column[d]}, 1.0, d)
-                 for column in stacked[OF_DRIVES] for d in range(count) if np.any(column[d])]
+        # Where a drive stands, friction that turns over otherwise is any constant force.
+        base += [ReversalShape({d: column[d]}, 1.0, d) for column in stacked[OF_DRIVES]
+                 for d in range(count) if np.any(column[d]) and design.moves(d)]
         base += [ReversalShape(_rows(column), 1.0, None)
                  for column in stacked.get(OF_JOINTS, ()) if np.any(column)]
         for effect in given.effects:

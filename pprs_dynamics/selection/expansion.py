@@ -26,19 +26,16 @@ from pprs_dynamics.regression.base_columns import (
     move_present,
     within,
 )
-from pprs_dynamics.regression.design import Design, Point
+from pprs_dynamics.regression.design import Design, PlacedEffect, Point
 from pprs_dynamics.selection.candidates import (
-    Candidate,
     CandidateSet,
-    EffectCandidate,
-    Placement,
 )
 from pprs_dynamics.selection.decisions import Decisions
 from pprs_dynamics.selection.search import Search
 
 # What the exact model may differ from the linear one by, in whitened squares, and how often the
 # expansion is repeated; less changes no cost by more than a rival's margin.
-LEAST_DIFFERENCE, MOST_EXPANSIONS = 4.0, 3
+LEAST_DIFFERENCE, MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 4.0, 3, 6, 4
 
 
 @dataclass(frozen=True)
@@ -88,20 +85,85 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     first = search = Search(design, decisions,
                             progress=lambda share: report(0.25 + 0.35 * share))
     best = search.run()
-    for number in range(MOST_EXPANSIONS):
+    for number in range(MOST_SEARCHES):
         try:
-            point = point_of(design, search, best)
-            if squared_difference(search, best, point.model, recordings) < LEAST_DIFFERENCE:
-                break
-            around = design.around(point, recordings)
+            around = linearised(search, best, recordings, decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
-        start = 0.6 + 0.4 * number / MOST_EXPANSIONS
-        search = Search(around, decisions, search.regression.error_scale,
-                        lambda share, s=start: report(s + 0.4 / MOST_EXPANSIONS * share))
-        best = search.run(rebuilt(search, best))
+        if around is None:
+            break
+        start = 0.6 + 0.4 * number / MOST_SEARCHES
+        search = Search(around, decisions, first.regression.error_scale,
+                        _share_of(report, start, 0.4 / MOST_SEARCHES))
+        best = search.run(search.library.rebuilt(best.candidates))
     report(1.0)
     return Selection(first, search, best)
+
+
+def _share_of(report: Callable[[float], None], start: float, width: float,
+              ) -> Callable[[float], None]:
+    return lambda share: report(start + width * share)
+
+
+def linearised(search: Search, found: CandidateSet, recordings: Sequence[Recording],
+               decisions: Decisions) -> Design | None:
+    """Return the design around the fitted model of a set; None where it would change nothing.
+
+    Gauss-Newton steps with the set as it is, each halved until the exact error falls.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    around: Design | None = None
+    for _ in range(MOST_STEPS):
+        point = next_point(search, found, recordings)
+        if point is None:
+            break
+        around = search.design.around(point, recordings)
+        search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
+        search.evaluate(())
+        found = search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
+    return around
+
+
+def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recording],
+               ) -> Point | None:
+    """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
+
+    None where the exact forces of the fitted model are those of the linear fit.
+    """
+    design = search.design
+    base, effects = parts_of(search, found)
+    linear = linear_prediction(search, found)
+    measured = search.regression.residuals.measured
+    target = model_at(design, base, effects)
+    exact = exact_forces(design, target, recordings)
+    if squared(search, found, exact - linear) < LEAST_DIFFERENCE:
+        return None
+    before = design.point
+    loss = squared(search, found, measured - exact)
+    now = exact_forces(design, design.model, recordings)
+    known = {(one.effect, one.drive): one for one in before.effects} if before else {}
+    if all((one.effect, one.drive) in known for one in effects) and before is not None:
+        reached = squared(search, found, measured - now)
+        for _ in range(MOST_HALVINGS):
+            if loss < reached:
+                break
+            base = (base + before.base) / 2
+            effects = tuple(_between(known[one.effect, one.drive], one) for one in effects)
+            target = model_at(design, base, effects)
+            loss = squared(search, found, measured - exact_forces(design, target, recordings))
+        else:
+            return None
+    return Point(target, base, effects)
+
+
+def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
+    return replace(b, coefficients={
+        name: (a.coefficients.get(name, 0.0) + value) / 2
+        for name, value in b.coefficients.items()})
 
 
 def expanded(search: Search, found: CandidateSet, recordings: Sequence[Recording],
@@ -113,41 +175,32 @@ def expanded(search: Search, found: CandidateSet, recordings: Sequence[Recording
     ModelError
         For values that no model may have.
     """
-    for _ in range(MOST_EXPANSIONS):
-        point = point_of(search.design, search, found)
-        if squared_difference(search, found, point.model, recordings) < LEAST_DIFFERENCE:
-            break
-        around = search.design.around(point, recordings)
-        search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
-        search.evaluate(())
-        found = search.refined(search.evaluate(rebuilt(search, found)))
-    return search, found
+    around = linearised(search, found, recordings, decisions)
+    if around is None:
+        return search, found
+    scale = search.regression.error_scale
+    search = Search(around, decisions, scale, with_unknown=False)
+    search.evaluate(())
+    return search, search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
 
 
-def point_of(design: Design, search: Search, found: CandidateSet) -> Point:
-    """Return the fitted model with its numbers, and what it has beside the given one.
-
-    Raises
-    ------
-    ModelError
-        For values that no model may have.
-    """
-    base = found.fit.coefficients[:len(design.base)].copy()
-    for k, column in enumerate(search.design.base):
-        if isinstance(column, ReversalShape):
-            base[k] = 0.0
+def parts_of(search: Search, found: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
+    """Return coefficients of the base columns, 0 for reversals, and effects with theirs."""
+    base = found.fit.coefficients[:len(search.design.base)].copy()
+    base[[isinstance(column, ReversalShape) for column in search.design.base]] = 0.0
     effects = []
     for candidate in found.effects:
         for placement in candidate.placements:
             every = {c.name: 0.0 for c in candidate.effect.coefficients}
             every.update(zip(placement.names, found.coefficients(placement).tolist(),
                              strict=False))
-            effects.append((candidate.effect, placement.drive, placement.term.shape, every))
-    return Point(fitted_model(design, found), base, tuple(effects))
+            effects.append(PlacedEffect(candidate.effect, placement.drive, placement.term.shape,
+                                        every))
+    return base, tuple(effects)
 
 
-def fitted_model(design: Design, found: CandidateSet) -> ForceModel:
-    """Return the given model with the effects of a set, and its numbers as the fit moves them.
+def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> ForceModel:
+    """Return the given model with its numbers as coefficients have them, and with effects.
 
     Raises
     ------
@@ -155,38 +208,39 @@ def fitted_model(design: Design, found: CandidateSet) -> ForceModel:
         For values that no model may have.
     """
     values: dict[str, Any] = dict(design.given.values)
-    base = found.fit.coefficients[:len(design.base)]
     move_numbers(values, design.base, base)
     move_present(values, design.given, design.base, base)
     names = list(values.get('effects.active', []))
-    for candidate in found.effects:
-        if candidate.name not in names:
-            names.append(candidate.name)
-        for placement in candidate.placements:
-            for key, value in placement_values(design, found, placement).items():
-                values[f'effects.{candidate.name}.{key}'] = value
+    for one in effects:
+        kind = one.effect
+        if kind.name not in names:
+            names.append(kind.name)
+        every = {**kind.from_coefficients(one.coefficients), **one.shape}
+        drive = '' if one.drive is None else f'{design.drives[one.drive]}.'
+        for parameter in kind.parameters:
+            values[f'effects.{kind.name}.{drive}{parameter.name}'] = within(
+                parameter, every[parameter.name])
     if names:
         values['effects.active'] = names
     return replace(build_model(values), source=design.given.source)
 
 
-def placement_values(design: Design, found: CandidateSet, placement: Placement) -> dict[str, float]:
-    """Return the parameters of a placement under their keys in a model file."""
-    effect = placement.term.effect
-    prefix = '' if placement.drive is None else f'{design.drives[placement.drive]}.'
-    every = {**placement.values(found.coefficients(placement)), **placement.term.shape}
-    return {prefix + p.name: within(p, every[p.name]) for p in effect.parameters}
+def fitted_model(search: Search, found: CandidateSet) -> ForceModel:
+    """Return the given model with the effects of a set, and its numbers as the fit moves them.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    return model_at(search.design, *parts_of(search, found))
 
 
-def squared_difference(search: Search, found: CandidateSet, model: ForceModel,
-                       recordings: Sequence[Recording]) -> float:
-    """Return the whitened squares of the exact forces of a fitted model less the linear ones."""
-    regression, design = search.regression, search.design
-    linear = linear_prediction(search, found)
-    exact = exact_forces(design, model, recordings)
+def squared(search: Search, found: CandidateSet, forces: Array) -> float:
+    """Return the whitened squares of forces (M, D) under the noise of a set."""
     total = 0.0
-    for d in regression.drives:
-        white = regression.whitened(found.fit, d, (exact - linear)[:, d])
+    for d in search.regression.drives:
+        white = search.regression.whitened(found.fit, d, np.nan_to_num(forces[:, d]))
         total += float(white @ white)
     return total
 
@@ -210,16 +264,3 @@ def exact_forces(design: Design, model: ForceModel, recordings: Sequence[Recordi
     found = (design.reconstructions if same
              else [reconstruct(model, recording) for recording in recordings])
     return np.concatenate([treated_forces(model, one)['total'] for one in found])
-
-
-def rebuilt(search: Search, found: CandidateSet) -> tuple[Candidate, ...]:
-    """Return the candidates of another search's set with the columns of this one."""
-    candidates: list[Candidate] = []
-    for candidate in found.candidates:
-        if isinstance(candidate, EffectCandidate):
-            candidates.append(search.library.candidate(candidate.effect, [
-                search.library.placed(candidate.effect, one.drive, one.term.shape, one.names)
-                for one in candidate.placements]))
-        else:
-            candidates.append(candidate)
-    return tuple(candidates)

@@ -13,7 +13,7 @@ from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.design import Design, Term, searched_in_drives
 from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression, term_gains
-from pprs_dynamics.selection.candidates import EffectCandidate, Placement, Prices
+from pprs_dynamics.selection.candidates import Candidate, EffectCandidate, Placement, Prices
 
 
 @dataclass(frozen=True)
@@ -243,6 +243,14 @@ class Library:
         if ordered[0].drive is not None:
             price += self.prices.of_drives(len(ordered))
         return EffectCandidate(effect, ordered, price)
+
+    def rebuilt(self, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+        """Return the candidates of another library with the columns of this one."""
+        return tuple(self.candidate(one.effect, [
+            self.placed(one.effect, placement.drive, placement.term.shape, placement.names)
+            for placement in one.placements]) if isinstance(one, EffectCandidate) else one
+            for one in candidates)
+
 
 
 def _is_felt_everywhere(effect: type[DriveEffect]) -> bool:

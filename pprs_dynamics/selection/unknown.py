@@ -280,7 +280,8 @@ class PatternLibrary:
             rows = self.series.transform(np.concatenate((wave, slope[None]))) * root
             step = np.linalg.lstsq(rows.T, rest, rcond=None)[0][2]
             frequency += float(np.clip(step, -0.25 / np.ptp(time), 0.25 / np.ptp(time)))
-        rows = np.stack((np.cos(2 * np.pi * frequency * time), np.sin(2 * np.pi * frequency * time)))
+        phase = 2 * np.pi * frequency * time
+        rows = np.stack((np.cos(phase), np.sin(phase)))
         return self.candidate(candidate.family, Pattern('line', scale=frequency), rows)
 
     def values(self, variable: str) -> Array:
