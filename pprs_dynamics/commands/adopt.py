@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from rich.markup import escape
-
+from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.commands.ledger_entry import Book, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
@@ -25,7 +24,7 @@ from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_page import adoption_page
 from pprs_dynamics.report.adoption_tables import adoption_view
 from pprs_dynamics.report.progress import progress_bar
-from pprs_dynamics.report.tables import console
+from pprs_dynamics.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,10 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'the recordings call for; or EFFECT:drive,drive')
     add_recordings(parser)
     add_validation(parser)
-    parser.add_argument('--output', metavar='FILE', required=True, help='model file to write')
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL), required=True,
+                        help='model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
-    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='write a page with all figures')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,11 +59,11 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, answer.to_json())
     if options.report:
         page = adoption_page(answer, recordings, validation)
-        screen.print(f'page: {escape(str(page.write(options.report)))}')
+        screen.print(f'page: {shown(page.write(options.report))}')
     if not answer.adopted:
         return 1
     book = Book.of(dict(zip(options.recordings, recordings, strict=True)),
                    dict(zip(options.validate, validation, strict=True)))
     write_model(options.output, book.entered(answer).values, base)
-    screen.print(f'model: {escape(options.output)}')
+    screen.print(f'model: {shown(options.output)}')
     return 0

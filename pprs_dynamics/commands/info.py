@@ -9,7 +9,8 @@ from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_all
 from pprs_dynamics.measurement.recording import describe
 from pprs_dynamics.model.model_file import load_model
-from pprs_dynamics.report.tables import console, recording_table
+from pprs_dynamics.report.tables import recording_table
+from pprs_dynamics.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     for summary in summaries:
         screen.print(recording_table(summary))
         for finding in summary.findings:
-            screen.print(f'[yellow]![/] {finding.text}')
+            screen.print(f'[yellow]![/] {shown(finding.text)}')
         if not summary.findings:
             screen.print('[green]nothing wrong found[/]')
     if options.json:

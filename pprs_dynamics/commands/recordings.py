@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.recording import Recording, read_recording
+from pprs_dynamics.plain_text import displayed
 from pprs_dynamics.report.progress import progress_bar
 
 
@@ -62,6 +63,6 @@ def _read(paths: Sequence[str], options: argparse.Namespace, screen: Any,
           drives: tuple[str, ...]) -> list[Recording]:
     recordings = []
     for path in paths:
-        with progress_bar(screen, f'reading {path}') as progress:
+        with progress_bar(screen, f'reading {displayed(path)}') as progress:
             recordings.append(read_recording(path, drives, options.topic, progress))
     return recordings
