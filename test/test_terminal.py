@@ -225,7 +225,7 @@ def test_unknown_endings_of_outputs_are_refused_with_those_that_are_known(
 
 
 NUMBERS = {
-    'simulate': {'--scale': ('-1', '1e10', 'nan'), '--seed': ('-1', '9' * 5000, '1.5', '²'),
+    'simulate': {'--scale': ('-1', '1e7', 'nan'), '--seed': ('-1', '9' * 5000, '1.5', '²'),
                  '--path-seed': ('-1', '9' * 40), '--duration': ('0', '1e9', 'inf', 'x'),
                  '--noise': ('-1', '1e9')},
     'next-experiment': {

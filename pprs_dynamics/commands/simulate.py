@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         choices=(*HIDDEN_EFFECTS, RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
                         f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}')
-    parser.add_argument('--scale', type=number(0.0, 1e9), default=1.0,
+    parser.add_argument('--scale', type=number(0.0, 1e6), default=1.0,
                         help='multiplies the strength of the effects (default 1)')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',
