@@ -13,9 +13,8 @@ from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,
     add_validation,
-    read_all,
+    read_recordings,
     read_validation,
-    show_findings,
 )
 from pprs_dynamics.adoption.adopt import adopt
 from pprs_dynamics.adoption.request import EffectRequest
@@ -48,9 +47,8 @@ def run(options: argparse.Namespace) -> int:
     model = load_model(base)
     offer = EffectRequest.of(options.effect, model.drives)
     offer.require_place(model)
-    recordings = read_all(options, screen, model.drives)
-    validation = read_validation(options, screen, model.drives)
-    show_findings((*recordings, *validation), screen)
+    recordings = read_recordings(options, screen, model)
+    validation = read_validation(options, screen, model, recordings)
     with progress_bar(screen, f'adopting {offer.name}') as progress:
         answer = adopt(model, offer, recordings, validation, options.force,
                        lambda share: progress(share, 1.0))

@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from pprs_dynamics.commands.arguments import PAGE, output_file
 from pprs_dynamics.commands.output import write_json
-from pprs_dynamics.commands.recordings import add_recordings, read_all
+from pprs_dynamics.commands.recordings import add_recordings, read_recordings
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import localise
 from pprs_dynamics.model.model_file import load_model
@@ -32,10 +32,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = load_model(options.model)
-    recordings = read_all(options, screen, model.drives)
-    for recording in recordings:
-        for finding in recording.findings:
-            screen.print(f'[yellow]![/] {escape(recording.name)}: {escape(finding.text)}')
+    recordings = read_recordings(options, screen, model)
     with progress_bar(screen, 'motion and model') as progress:
         residuals, notes = measure_residuals(model, recordings, progress)
     with progress_bar(screen, 'where it fails') as progress:

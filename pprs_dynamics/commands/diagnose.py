@@ -11,9 +11,8 @@ from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,
     add_validation,
-    read_all,
+    read_recordings,
     read_validation,
-    show_findings,
 )
 from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
@@ -47,9 +46,8 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     screen = console()
     model = load_model(options.model)
-    recordings = read_all(options, screen, model.drives)
-    validate = read_validation(options, screen, model.drives)
-    show_findings((*recordings, *validate), screen)
+    recordings = read_recordings(options, screen, model)
+    validate = read_validation(options, screen, model, recordings)
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
     words = word_diagnosis(diagnosis)

@@ -10,7 +10,7 @@ from rich.markup import escape
 from pprs_dynamics.commands.arguments import PAGE, POSES, number, output_file, seed
 from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
-from pprs_dynamics.commands.recordings import add_recordings, read_all, show_findings
+from pprs_dynamics.commands.recordings import add_recordings, read_recordings, refuse_inputs
 from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.next_experiment import (
     LONGEST,
@@ -72,8 +72,8 @@ def run(options: argparse.Namespace) -> int:
     limits = MotionLimits(options.velocity, options.acceleration, options.tilt,
                           options.condition, options.margin)
     model = DriveModel.load(check_output(options.output, options.model))
-    recordings = read_all(options, screen, model.drives)
-    show_findings(recordings, screen)
+    refuse_inputs(options.output, options.recordings)
+    recordings = read_recordings(options, screen, model)
     with progress_bar(screen, 'designing') as progress:
         experiment = next_experiment(
             model, recordings, options.purpose, limits, options.duration, options.seed,

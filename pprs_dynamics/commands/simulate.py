@@ -12,6 +12,7 @@ import numpy as np
 
 from pprs_dynamics.commands.arguments import PAGE, RECORDING, number, output_file, seed
 from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.commands.recordings import refuse_inputs
 from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
@@ -58,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
+    refuse_inputs(options.output, (options.path,))
     model = DriveModel.load(options.model)
     motion = _motion(options)
     forces = model.drive_forces(motion)

@@ -15,7 +15,14 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.defects import SLOW_STEP
 from pprs_dynamics.measurement.excerpt import Excerpt, excerpt_of, forces_in_pieces, forces_on
-from pprs_dynamics.measurement.readings import UNITS, Reading, as_named, named, readings
+from pprs_dynamics.measurement.readings import (
+    POSITION_UNIT,
+    UNITS,
+    Reading,
+    as_named,
+    named,
+    readings,
+)
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.samples import Finding
 from pprs_dynamics.model.drive_model import DriveModel
@@ -36,6 +43,8 @@ GOOD_FIT = 0.25
 GOOD_FIT_ALONE = 0.1
 # A fit as close as this leaves nothing to look for in signs and orders.
 CLOSE_FIT = 0.015
+# Of readings whose fits differ by less, the first and simplest counts.
+SAME_FIT = 0.9
 # Drives, and swings about their means, that are this much weaker than others tell nothing.
 WEAK = 0.01
 STROKE_SLACK = 0.05  # share of a stroke by which positions may lie outside it
@@ -90,9 +99,9 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Finding, ...
     if best is not None:
         found += [*_of_time(best), *_of_reading(model, best), *_of_efforts(model, best)]
     told = {finding.kind for finding in found}
-    if not told & {'position_unit', 'drive_order'}:
+    if not told & {POSITION_UNIT, 'drive_order'}:
         found += _of_strokes(model, recording)
-    if not told & {'position_unit', 'position_sign', 'reversed_time'}:
+    if not told & {POSITION_UNIT, 'position_sign', 'reversed_time'}:
         unit = 1.0 if best is None else best.time_unit
         found += _of_velocities(recording, excerpts.get(unit))
     return tuple(found)
@@ -124,10 +133,10 @@ class _Search:
                 fit = self._fit(reading, unit, excerpt)
                 if (fit is not None and fit.cost and fit.misfit <= least
                         and (reference is None or fit.score <= bound)
-                        and (best is None or fit.score < best.score)):
+                        and (best is None or fit.score < SAME_FIT * best.score)):
                     best = fit
             left = bound if best is None else best.misfit
-            if reading.kind == 'position_unit' and left <= CLOSE_FIT:
+            if reading.kind == POSITION_UNIT and left <= CLOSE_FIT:
                 break
         return best
 
@@ -180,7 +189,7 @@ class _Search:
             return out
 
         position = excerpt.motion.position
-        needed = reading.kind != 'position_unit' or np.any(outside(position)[[*reading.drives]])
+        needed = reading.kind != POSITION_UNIT or np.any(outside(position)[[*reading.drives]])
         return bool(needed and not np.any(outside(position @ reading.position.T)))
 
 
@@ -250,9 +259,8 @@ def _of_efforts(model: ForceModel, fit: _Fit) -> Iterator[Finding]:
             continue
         unit = EFFORT_UNITS.get(abs(factor))
         times = 'minus' if factor == -1.0 else f'{factor:g} times'
-        guess = '' if unit is None else f': is it in {unit}' + (
-            ', and of the other sign?' if factor < 0 else '?')
-        other = ', or its position of the other sign' if len(drives) == 1 and factor < 0 else ''
+        guess = '' if unit is None else f', as if it were in {unit}'
+        other = ' (or its position is negated)' if len(drives) == 1 and factor < 0 else ''
         yield Mistake('effort_sign' if unit is None else 'effort_unit', len(group),
                       f'the effort of {named(drives, group)} looks like {times} what the model '
                       f'says{guess}{other}', (), tuple(drives[k] for k in group))
@@ -270,9 +278,9 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Finding]:
     unit = next((name for unit, name in UNITS.items()
                  if np.all(reach[list(far)] * unit <= np.maximum(-lower, upper)[list(far)])), '')
     drives = recording.drives
-    yield Mistake('position_unit', len(far),
+    yield Mistake(POSITION_UNIT, len(far),
                   f'the positions of {named(drives, far)} reach {reach.max():.4g} m, far out of '
-                  'the stroke' + f': are they in {unit}?' * bool(unit), (),
+                  'the stroke' + f', as if they were in {unit}' * bool(unit), (),
                   tuple(drives[k] for k in far))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.drive_motion import DriveMotion
 
+POSITION_UNIT = 'position_unit'  # kind of mistake
 UNITS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
 SLIDES, LIFTS = (0, 1, 2), (3, 4, 5)  # of the six drives, in drive order
 # Columns in the order chain by chain, and last to first, under names in drive order.
@@ -75,10 +76,10 @@ def readings(drives: tuple[str, ...]) -> Iterator[Reading]:
                   'drives the motion', tuple(range(count)), same, same, backwards=True)
     for unit, name in UNITS.items():
         for group in _groups(count):
-            yield Reading('position_unit', f'the {_position(drives, group)} in {name}', group,
+            yield Reading(POSITION_UNIT, f'the {_position(drives, group)} like {name}', group,
                           np.diag(_scaled(count, group, unit)), same)
     for group in _groups(count):
-        yield Reading('position_sign', f'the {_position(drives, group)} with the other sign',
+        yield Reading('position_sign', f'the {_position(drives, group)} negated',
                       group, np.diag(_scaled(count, group, -1.0)), same)
     for order in _orders(count):
         moved = tuple(k for k in range(count) if order[k] != k)
@@ -118,10 +119,11 @@ def _orders(count: int) -> list[tuple[int, ...]]:
     within = [(*first, *second) for first in permutations(SLIDES)
               for second in permutations(LIFTS)]
     swapped = [order[3:] + order[:3] for order in within]
-    # Of those that fit alike, as all that turn the whole robot do, the one that moves least.
-    ranked = sorted({*within, *swapped, *OTHER_ORDERS},
-                    key=lambda order: sum(k != place for place, k in enumerate(order)))
-    return ranked[1:]
+    # Of those that fit alike, as all that turn the whole robot do, the one that moves least
+    # comes first, and keeps chains together.
+    return sorted({*within, *swapped, *OTHER_ORDERS}, key=lambda order: (
+        sum(k != place for place, k in enumerate(order)),
+        sum(k % 3 != place % 3 for place, k in enumerate(order)), order))[1:]
 
 
 def _scaled(count: int, group: tuple[int, ...], factor: float) -> Array:
