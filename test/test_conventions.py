@@ -113,8 +113,6 @@ MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
 
 
 def expect(found: list[str], patterns: list[str]) -> None:
-    import re
-
     assert len(found) == len(patterns), found
     for text, pattern in zip(found, patterns, strict=True):
         assert re.search(pattern, text), (text, pattern)

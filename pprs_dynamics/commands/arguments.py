@@ -52,7 +52,7 @@ def output_file(*endings: str) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         path = Path(text)
-        if path.suffix not in endings:
+        if path.suffix not in endings and not path.is_dir():
             raise argparse.ArgumentTypeError(f'{text!r} must end in {known}')
         if path.is_dir() or (not path.suffix and path.exists()):
             raise argparse.ArgumentTypeError(f'{text}: cannot be written: ' + (

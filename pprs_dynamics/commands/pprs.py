@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import NoReturn
 
 from pprs_dynamics import __version__
 from pprs_dynamics.commands.arguments import JSON, output_file
@@ -56,6 +57,14 @@ def _run(options: argparse.Namespace) -> int:
     return status
 
 
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line, without all that would be right; --help has that."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        self.exit(2, f'{self.prog}: {message}\n')
+
+
 def _module(command: str) -> ModuleType:
     return import_module(f'{__package__}.{command.replace("-", "_")}')
 
@@ -69,7 +78,7 @@ def _summary(command: str) -> str:
 
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser, with the arguments of the command that is called."""
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog='pprs', description='Dynamics of the 3-PPRS parallel robot: what the model says, '
         'what was measured, and which physical effect is missing.')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
