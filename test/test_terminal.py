@@ -196,7 +196,7 @@ def test_an_unknown_effect_is_one_line(folder: Path) -> None:
         done = pprs(folder, 'adopt', name, 'run.csv', '--output', 'x.yaml')
         assert done.returncode == 2
         assert done.stderr.count(b'\n') == 1
-        assert b'is no effect' in done.stderr
+        assert b'unknown effect' in done.stderr
 
 
 OUTPUTS = {

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import argparse
 
+from pprs_dynamics.adoption.adopt import adopt
+from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.commands.ledger_entry import Book, check_output
 from pprs_dynamics.commands.output import write_json
@@ -16,8 +18,6 @@ from pprs_dynamics.commands.recordings import (
     read_recordings,
     read_validation,
 )
-from pprs_dynamics.adoption.adopt import adopt
-from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_page import adoption_page

@@ -9,10 +9,10 @@ from typing import Any
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from pprs_dynamics.adoption.loop import REFUSED, adopt_all
 from pprs_dynamics.commands.ledger_entry import Book, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.adoption.loop import REFUSED, adopt_all
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_writer import write_model
