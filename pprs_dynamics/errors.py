@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from pprs_dynamics.plain_text import displayed
+
 
 class Missing:
     """Stands for a value that is not there, which is not the same as None."""
@@ -45,8 +47,8 @@ class UnreadableFileError(PprsError, OSError):
     """A file that does not exist, cannot be read, or is not what it should be."""
 
     def __init__(self, path: object, reason: str) -> None:
-        self.path, self.reason = str(path), reason
-        super().__init__(f'{path}: {reason}')
+        self.path, self.reason = displayed(path), reason
+        super().__init__(f'{self.path}: {reason}')
 
     def __str__(self) -> str:
         return f'{self.path}: {self.reason}'

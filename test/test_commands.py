@@ -98,8 +98,8 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path, arguments: tuple[str
     assert done.returncode == 2
     assert MISTAKES[arguments] in done.stderr
     assert 'Traceback' not in done.stderr
-    # argparse adds its usage above its own line; ours is one line.
-    assert len([line for line in done.stderr.splitlines() if line.startswith('pprs')]) == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith('pprs')
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one_whole(tmp_path: Path) -> None:

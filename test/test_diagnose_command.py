@@ -113,7 +113,7 @@ def test_the_terminal_says_what_why_and_how_to_confirm(folder: Path) -> None:
 
 
 MISTAKES = {
-    ('run.csv', '--validate', 'run.csv'): 'run.csv: is given to be fitted and with --validate',
+    ('run.csv', '--validate', 'run.csv'): 'what is held out must be another recording',
     ('run.csv', '--adopt-all'): '--adopt-all: no --output FILE is given',
     ('run.csv', '--output', 'x.yaml'): '--output: it is given without --adopt-all',
     ('nowhere.csv',): 'nowhere.csv: No such file',

@@ -369,7 +369,8 @@ def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(('arguments', 'sentence'), [
     (('--output', 'a.csv'), 'no recording is given'),
-    (('--purpose', 'commission', '--output', 'a.csv', '--duration', '1'), 'duration is 1 s'),
+    (('--purpose', 'commission', '--output', 'a.csv', '--duration', '1'),
+     "argument --duration: '1' must lie between 5 and 120 s"),
     (('--purpose', 'commission', '--output', 'a.csv', '--margin', '0.95'), 'margin'),
     (('--purpose', 'commission', '--output', 'no/folder.csv', '--duration', '5'), 'no/folder.csv'),
 ])

@@ -7,25 +7,23 @@ from __future__ import annotations
 
 import argparse
 
-from rich.markup import escape
-
 from pprs_dynamics.adoption.adopt import adopt
 from pprs_dynamics.adoption.request import EffectRequest
+from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,
     add_validation,
-    read_all,
+    read_recordings,
     read_validation,
-    show_findings,
 )
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_page import adoption_page
 from pprs_dynamics.report.adoption_tables import adoption_view
 from pprs_dynamics.report.progress import progress_bar
-from pprs_dynamics.report.tables import console
+from pprs_dynamics.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,10 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'the recordings call for; or EFFECT:drive,drive')
     add_recordings(parser)
     add_validation(parser)
-    parser.add_argument('--output', metavar='FILE', required=True, help='model file to write')
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL), required=True,
+                        help='model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
-    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='write a page with all figures')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,9 +47,8 @@ def run(options: argparse.Namespace) -> int:
     model = load_model(base)
     request = EffectRequest.of(options.effect, model.drives)
     request.require_place(model)
-    recordings = read_all(options, screen, model.drives)
-    validation = read_validation(options, screen, model.drives)
-    show_findings((*recordings, *validation), screen)
+    recordings = read_recordings(options, screen, model)
+    validation = read_validation(options, screen, model, recordings)
     with progress_bar(screen, f'adopting {request.name}') as progress:
         answer = adopt(model, request, recordings, validation, options.force,
                        lambda share: progress(share, 1.0))
@@ -58,11 +57,11 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, answer.to_json())
     if options.report:
         page = adoption_page(answer, recordings, validation)
-        screen.print(f'page: {escape(str(page.write(options.report)))}')
+        screen.print(f'page: {shown(page.write(options.report))}')
     if not answer.adopted:
         return 1
     book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
                    dict(zip(options.validate, validation, strict=True)))
     write_model(options.output, book.entered(answer).values, base)
-    screen.print(f'model: {escape(options.output)}')
+    screen.print(f'model: {shown(options.output)}')
     return 0

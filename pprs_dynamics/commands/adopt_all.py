@@ -17,6 +17,7 @@ from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_tables import adoption_view
+from pprs_dynamics.report.terminal import shown
 
 
 def adopt_what_was_found(
@@ -31,7 +32,7 @@ def adopt_what_was_found(
     base = check_output(options.output, options.model)
     book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
                    dict(zip(options.validate, validate, strict=True)))
-    columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn('{task.description}', markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=screen, transient=True) as bar:
         task = bar.add_task('adopting', total=1.0)
         outcome = adopt_all(
@@ -45,5 +46,5 @@ def adopt_what_was_found(
     if outcome.adopted or outcome.ended != REFUSED:
         write_model(options.output, outcome.model.values, base)
         count = len(outcome.adopted)
-        screen.print(f'model, {count} effect{"s" * (count != 1)} added: {escape(options.output)}')
+        screen.print(f'model, {count} effect{"s" * (count != 1)} added: {shown(options.output)}')
     return int(outcome.ended == REFUSED)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from rich.markup import escape
-
 from pprs_dynamics.commands.adopt_all import adopt_what_was_found
+from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,
     add_validation,
-    read_all,
+    read_recordings,
     read_validation,
-    show_findings,
 )
 from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
@@ -23,7 +21,7 @@ from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.report.diagnosis_tables import diagnosis_view
 from pprs_dynamics.report.progress import progress_bar
-from pprs_dynamics.report.tables import console
+from pprs_dynamics.report.terminal import console, shown
 from pprs_dynamics.residuals.measuring import measure_residuals
 
 
@@ -35,10 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser)
     add_validation(parser)
-    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='write a page with all figures')
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
-    parser.add_argument('--output', metavar='FILE', help='model file that --adopt-all writes')
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
+                        help='model file that --adopt-all writes')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -46,9 +46,8 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     screen = console()
     model = load_model(options.model)
-    recordings = read_all(options, screen, model.drives)
-    validate = read_validation(options, screen, model.drives)
-    show_findings((*recordings, *validate), screen)
+    recordings = read_recordings(options, screen, model)
+    validate = read_validation(options, screen, model, recordings)
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
     words = word_diagnosis(diagnosis)
@@ -60,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
             after, _ = measure_residuals(diagnosis.adopted, recordings, progress)
             page = diagnosis_page(diagnosis, words, after, [one.name for one in recordings],
                                   [one.name for one in validate])
-        screen.print(f'page: {escape(str(page.write(options.report)))}')
+        screen.print(f'page: {shown(page.write(options.report))}')
     if options.adopt_all:
         return adopt_what_was_found(options, model, recordings, validate, diagnosis, screen)
     return 0

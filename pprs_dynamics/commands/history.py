@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from rich.markup import escape
-
+from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.errors import ModelError
@@ -17,15 +16,16 @@ from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.history_figures import draw_history
 from pprs_dynamics.report.history_page import history_page
 from pprs_dynamics.report.history_tables import history_view
-from pprs_dynamics.report.tables import console
+from pprs_dynamics.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
     parser.add_argument('--undo', action='store_true', help='take the last step back')
-    parser.add_argument('--output', metavar='FILE', help='model file that --undo writes')
-    parser.add_argument('--report', metavar='FILE',
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
+                        help='model file that --undo writes')
+    parser.add_argument('--report', metavar='FILE', type=output_file(*PAGE, '.png'),
                         help='draw the falling error: a page (.html) or a picture (.png)')
 
 
@@ -33,8 +33,6 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     if options.undo != bool(options.output):
         raise ModelError('--output', options.output, 'be given with --undo, and only then')
-    if options.report and Path(options.report).suffix not in ('.html', '.png'):
-        raise ModelError('--report', options.report, 'end in .html or .png')
     screen = console()
     base = check_output(options.output, options.file) if options.undo else options.file
     model = load_model(base)
@@ -47,12 +45,12 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, {'steps': [step.to_json() for step in steps]})
     if options.report and options.report.endswith('.png'):
-        screen.print(f'picture: {escape(str(draw_history(options.report, steps)))}')
+        screen.print(f'picture: {shown(draw_history(options.report, steps))}')
     elif options.report:
         page = history_page(Path(options.file).name, steps)
-        screen.print(f'page: {escape(str(page.write(options.report)))}')
+        screen.print(f'page: {shown(page.write(options.report))}')
     if options.undo:
         values, step = without_last_step(model.values)
         write_model(options.output, values, base)
-        screen.print(f'{step.effect} taken back: {escape(options.output)}')
+        screen.print(f'{step.effect} taken back: {shown(options.output)}')
     return 0

@@ -6,10 +6,12 @@ import argparse
 from dataclasses import asdict
 
 from pprs_dynamics.commands.output import write_json
-from pprs_dynamics.commands.recordings import add_recordings, read_all
+from pprs_dynamics.commands.recordings import add_recordings, read_each
 from pprs_dynamics.measurement.recording import describe
+from pprs_dynamics.measurement.repeats import find_repeat
 from pprs_dynamics.model.model_file import load_model
-from pprs_dynamics.report.tables import console, recording_table
+from pprs_dynamics.report.tables import recording_table
+from pprs_dynamics.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,14 +22,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    drives = load_model(options.model).drives
-    summaries = [describe(recording) for recording in read_all(options, screen, drives)]
+    recordings = read_each(options.recordings, options, screen, load_model(options.model))
+    summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
         screen.print(recording_table(summary))
         for finding in summary.findings:
-            screen.print(f'[yellow]![/] {finding.text}')
+            screen.print(f'[yellow]![/] {shown(finding.text)}')
         if not summary.findings:
             screen.print('[green]nothing wrong found[/]')
+    repeat = find_repeat(recordings)
+    if repeat is not None:
+        index, clause = repeat
+        screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
     if options.json:
         write_json(options.json, {'recordings': [asdict(summary) for summary in summaries]})
     return 0

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from pprs_dynamics import __version__
 from pprs_dynamics.adoption.adopt import Adoption
-from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
@@ -93,14 +92,9 @@ def check_output(output: str | PathLike[str], model: str | PathLike[str]) -> Pat
     ------
     ModelError
         Where the output is the model itself.
-    UnreadableFileError
-        Where its folder does not exist, or it is a folder.
     """
-    base, target = find_file(model), Path(output)
-    refuse_same_file(target, base)
-    if target.is_dir() or not target.absolute().parent.is_dir():
-        raise UnreadableFileError(target, 'cannot be written: ' + (
-            'it is a folder' if target.is_dir() else 'its folder does not exist'))
+    base = find_file(model)
+    refuse_same_file(output, base)
     return base
 
 

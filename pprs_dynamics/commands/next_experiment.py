@@ -7,14 +7,15 @@ import argparse
 import numpy as np
 from rich.markup import escape
 
-from pprs_dynamics.commands.arguments import at_least, positive, whole
+from pprs_dynamics.commands.arguments import PAGE, POSES, number, output_file, seed
 from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
-from pprs_dynamics.commands.recordings import add_recordings, read_all, show_findings
+from pprs_dynamics.commands.recordings import add_recordings, read_recordings, refuse_inputs
 from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.next_experiment import (
+    LONGEST,
     PURPOSES,
-    check_duration,
+    SHORTEST,
     check_purpose,
     next_experiment,
 )
@@ -23,52 +24,56 @@ from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.report.experiment_page import experiment_page
 from pprs_dynamics.report.experiment_tables import experiment_view
 from pprs_dynamics.report.progress import progress_bar
-from pprs_dynamics.report.tables import console
+from pprs_dynamics.report.terminal import console, shown
 
 RATE = 100.0  # [Hz], the default of play_trajectory
+FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
 LIMITS = MotionLimits()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser, required=False)
-    parser.add_argument('--output', metavar='FILE.csv', required=True,
-                        help='poses for play_trajectory')
+    parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
+                        required=True, help='poses for play_trajectory')
     parser.add_argument('--purpose', choices=PURPOSES, default='separate',
                         help='separate: what the recordings leave open (default); commission: '
                         'the first motion of a new robot')
-    parser.add_argument('--seed', type=whole, default=0, help='of the search (default 0)')
-    parser.add_argument('--duration', type=positive, default=20.0, help='[s] (default 20)')
-    parser.add_argument('--rate', type=positive, default=RATE,
+    parser.add_argument('--seed', type=seed, default=0, help='of the search (default 0)')
+    parser.add_argument('--duration', type=number(SHORTEST, LONGEST, 's'), default=20.0,
+                        help='[s] (default 20)')
+    parser.add_argument('--rate', type=number(1.0, FASTEST, 'Hz'), default=RATE,
                         help='of the poses, as play_trajectory is to play them [Hz] (default 100)')
-    parser.add_argument('--velocity', type=positive, default=LIMITS.velocity,
+    parser.add_argument('--velocity', type=number(0.0, 100.0, 'm/s', above=True),
+                        default=LIMITS.velocity,
                         help=f'limit of every drive [m/s] (default {LIMITS.velocity:g})')
-    parser.add_argument('--acceleration', type=positive, default=LIMITS.acceleration,
+    parser.add_argument('--acceleration', type=number(0.0, 1e4, 'm/s^2', above=True),
+                        default=LIMITS.acceleration,
                         help=f'limit of every drive [m/s^2] (default {LIMITS.acceleration:g})')
-    parser.add_argument('--tilt', type=positive, default=LIMITS.tilt,
+    parser.add_argument('--tilt', type=number(0.0, np.pi, 'rad', above=True), default=LIMITS.tilt,
                         help=f'limit of the platform [rad] (default {LIMITS.tilt:g})')
-    parser.add_argument('--condition', type=at_least(1.0), default=LIMITS.condition_number,
+    parser.add_argument('--condition', type=number(1.0, 1e6), default=LIMITS.condition_number,
                         help='limit of the condition number, where the model file allows more '
                         f'(default {LIMITS.condition_number:g})')
-    parser.add_argument('--margin', type=at_least(0.0), default=LIMITS.margin,
+    parser.add_argument('--margin', type=number(0.0, 0.9), default=LIMITS.margin,
                         help='share of every limit, those of the model file included, that stays '
                         f'unused (default {LIMITS.margin:g})')
-    parser.add_argument('--noise', type=positive, default=0.05,
+    parser.add_argument('--noise', type=number(0.0, 1e3, 'N', above=True), default=0.05,
                         help='of the efforts over 0.01 s, for --purpose commission without '
                         'recordings [N] (default 0.05)')
-    parser.add_argument('--report', metavar='FILE.html', help='write a page with all figures')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='write a page with all figures')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     check_purpose(options.purpose, options.recordings)
-    check_duration(options.duration)
     limits = MotionLimits(options.velocity, options.acceleration, options.tilt,
                           options.condition, options.margin)
     model = DriveModel.load(check_output(options.output, options.model))
-    recordings = read_all(options, screen, model.drives)
-    show_findings(recordings, screen)
+    refuse_inputs(options.output, options.recordings)
+    recordings = read_recordings(options, screen, model)
     with progress_bar(screen, 'designing') as progress:
         experiment = next_experiment(
             model, recordings, options.purpose, limits, options.duration, options.seed,
@@ -83,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
                                   'output': options.output})
     if options.report:
         page = experiment_page(experiment, motion)
-        screen.print(f'page: {escape(str(page.write(options.report)))}')
+        screen.print(f'page: {shown(page.write(options.report))}')
     screen.print('[bold]play it[/]: ' + escape(
         f'ros2 run pprs_dynamics play_trajectory --ros-args -p source:=csv -p '
         f'file:={options.output} -p rate:={options.rate} -p lead_in:=3.0'))

@@ -9,6 +9,7 @@ from typing import Any
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.model.atomic_file import write_text as write_text
+from pprs_dynamics.plain_text import displayed
 
 
 def make_folder(path: str | PathLike[str]) -> Path:
@@ -23,15 +24,20 @@ def make_folder(path: str | PathLike[str]) -> Path:
 
 
 def write_json(path: str | PathLike[str], content: Any) -> None:
-    """Write JSON atomically; numbers that are not finite become null, as JSON has none."""
-    write_text(path, json.dumps(_finite(content), indent=2, ensure_ascii=False) + '\n')
+    """Write JSON atomically; numbers that are not finite become null, as JSON has none.
+
+    Names of files that are not UTF-8 become what `displayed` makes of them.
+    """
+    write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + '\n')
 
 
-def _finite(content: Any) -> Any:
+def _plain(content: Any) -> Any:
     if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
+        return {displayed(key): _plain(value) for key, value in content.items()}
     if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
+        return [_plain(value) for value in content]
+    if isinstance(content, str):
+        return displayed(content)
     if isinstance(content, float) and content - content != 0.0:
         return None
     return content

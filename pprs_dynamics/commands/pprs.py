@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import argparse
 import ast
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import NoReturn
 
 from pprs_dynamics import __version__
+from pprs_dynamics.commands.arguments import JSON, output_file
+from pprs_dynamics.commands.streams import lasting_output
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.plain_text import displayed
 from pprs_dynamics.threads import use_one_thread
 
 # Each a module of this folder with a docstring, add_arguments and run.
@@ -27,26 +30,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
     use_one_thread()
     given = sys.argv[1:] if arguments is None else list(arguments)
-    options = _parser(given).parse_args(given)
+    with lasting_output() as output:
+        options = _parser(given).parse_args(given)
+        status = _run(options)
+    if output.error is None or isinstance(output.error, BrokenPipeError):
+        # A reader of our output that went away, e.g. `head`, had enough of it.
+        return status
+    print(f'pprs {options.command}: output: {output.error.strerror}', file=sys.stderr)
+    return 2
+
+
+def _run(options: argparse.Namespace) -> int:
     try:
         status: int = _module(options.command).run(options)
-        sys.stdout.flush()
     except PprsError as error:
         print(f'pprs {options.command}: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f'pprs {options.command}: interrupted', file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        # The reader of our output, e.g. `head`, went away: nothing is left to say to it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except OSError as error:
         # A full disk, a folder without permission: the name and the system's own reason.
-        print(f'pprs {options.command}: {error.filename or "output"}: {error.strerror}',
-              file=sys.stderr)
+        print(f'pprs {options.command}: {displayed(error.filename or "output")}: '
+              f'{error.strerror}', file=sys.stderr)
         return 2
     return status
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line, without all that would be right; --help has that."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        self.exit(2, f'{self.prog}: {message}\n')
 
 
 def _module(command: str) -> ModuleType:
@@ -62,7 +78,7 @@ def _summary(command: str) -> str:
 
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser, with the arguments of the command that is called."""
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog='pprs', description='Dynamics of the 3-PPRS parallel robot: what the model says, '
         'what was measured, and which physical effect is missing.')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
@@ -72,7 +88,8 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=summary, description=summary)
         command.add_argument('--model', metavar='FILE', default='config/paper.yaml',
                              help='model file (default: the paper\'s robot, config/paper.yaml)')
-        command.add_argument('--json', metavar='FILE', help='write the result as JSON too')
+        command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
+                             help='write the result as JSON too')
         if name in given:
             # Only this one: importing all would take longer than most of them run.
             _module(name).add_arguments(command)

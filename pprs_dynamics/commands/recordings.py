@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
-
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.conventions import find_mistakes
+from pprs_dynamics.measurement.readings import POSITION_UNIT
 from pprs_dynamics.measurement.recording import Recording, read_recording
+from pprs_dynamics.measurement.repeats import find_repeat
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.plain_text import displayed
 from pprs_dynamics.report.progress import progress_bar
+from pprs_dynamics.report.terminal import shown
 
 
 def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
@@ -29,39 +35,70 @@ def add_validation(parser: argparse.ArgumentParser) -> None:
                         'may be repeated')
 
 
-def read_all(options: argparse.Namespace, screen: Any, drives: tuple[str, ...]) -> list[Recording]:
-    """Read the drives of every recording of the arguments, with progress."""
-    return _read(options.recordings, options, screen, drives)
-
-
-def read_validation(options: argparse.Namespace, screen: Any, drives: tuple[str, ...],
+def read_recordings(options: argparse.Namespace, screen: Any, model: ForceModel,
                     ) -> list[Recording]:
-    """Read the drives of every recording that is held out, with progress.
+    """Read every recording of the arguments, and print what is wrong with them.
 
     Raises
     ------
     UnreadableFileError
-        Where one is to be fitted, too; or as `read_recording`.
+        Where one holds the samples of another; or as `read_recording`.
     """
-    fitted = {Path(path).resolve() for path in options.recordings}
-    for path in options.validate:
-        if Path(path).resolve() in fitted:
-            raise UnreadableFileError(path, 'is given to be fitted and with --validate, but what '
-                                      'is held out must be another recording')
-    return _read(options.validate, options, screen, drives)
+    recordings = read_each(options.recordings, options, screen, model)
+    _refuse_repeats(options.recordings, recordings, (), 'every recording may be given once')
+    _show_findings(options.recordings, recordings, screen, model)
+    return recordings
 
 
-def show_findings(recordings: Sequence[Recording], screen: Any) -> None:
-    """Print what is wrong with recordings."""
-    for recording in recordings:
-        for finding in recording.findings:
-            screen.print(f'[yellow]![/] {escape(recording.name)}: {escape(finding.text)}')
+def read_validation(options: argparse.Namespace, screen: Any, model: ForceModel,
+                    fitted: Sequence[Recording]) -> list[Recording]:
+    """Read every recording that is held out, and print what is wrong with them.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where one holds the samples of another, or of one that is fitted; or as `read_recording`.
+    """
+    recordings = read_each(options.validate, options, screen, model)
+    _refuse_repeats(options.validate, recordings, fitted,
+                    'what is held out must be another recording')
+    _show_findings(options.validate, recordings, screen, model)
+    return recordings
 
 
-def _read(paths: Sequence[str], options: argparse.Namespace, screen: Any,
-          drives: tuple[str, ...]) -> list[Recording]:
+def read_each(paths: Sequence[str], options: argparse.Namespace, screen: Any, model: ForceModel,
+              ) -> list[Recording]:
+    """Read recordings one by one; what their numbers rather mean is added to their findings."""
     recordings = []
     for path in paths:
-        with progress_bar(screen, f'reading {path}') as progress:
-            recordings.append(read_recording(path, drives, options.topic, progress))
+        with progress_bar(screen, f'reading {displayed(path)}') as progress:
+            recording = read_recording(path, model.drives, options.topic, progress)
+            mistakes = find_mistakes(model, recording)
+            recordings.append(replace(recording, findings=(*mistakes, *recording.findings)))
     return recordings
+
+
+def refuse_inputs(output: str, inputs: Sequence[str]) -> None:
+    """Raise UnreadableFileError where a file would be written over one that is read."""
+    for path in map(Path, inputs):
+        if path.exists() and Path(output).exists() and path.samefile(output):
+            raise UnreadableFileError(output, 'it is read, too, but what is written must be '
+                                      'another file')
+
+
+def _show_findings(paths: Sequence[str], recordings: Sequence[Recording], screen: Any,
+                   model: ForceModel) -> None:
+    """Print what is wrong with recordings; refuse positions that no mechanism can follow."""
+    for path, recording in zip(paths, recordings, strict=True):
+        for finding in recording.findings:
+            if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
+                raise UnreadableFileError(path, f'{finding.what}, but they must be metres')
+            screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
+
+
+def _refuse_repeats(paths: Sequence[str], recordings: Sequence[Recording],
+                    earlier: Sequence[Recording], rule: str) -> None:
+    repeat = find_repeat(recordings, earlier)
+    if repeat is not None:
+        index, clause = repeat
+        raise UnreadableFileError(paths[index], f'{clause}, but {rule}')

@@ -18,7 +18,8 @@ from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.reproduction import Reproduction, reproduce
 from pprs_dynamics.report.figures import draw_figure_8, draw_figure_9
-from pprs_dynamics.report.tables import claims_table, console
+from pprs_dynamics.report.tables import claims_table
+from pprs_dynamics.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     for file in filter(None, (folder / 'claims.json', options.json)):
         write_json(file, content)
     screen.print(claims_table(result.claims))
-    screen.print(f'written: {", ".join(str(file) for file in written)}, {folder / "claims.json"}')
+    screen.print('written: ' + ', '.join(map(shown, (*written, folder / 'claims.json'))))
     return 0
 
 

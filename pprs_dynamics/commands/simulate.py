@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pprs_dynamics.commands.arguments import at_least, positive, whole
+from pprs_dynamics.commands.arguments import PAGE, RECORDING, number, output_file, seed
 from pprs_dynamics.commands.output import write_json
+from pprs_dynamics.commands.recordings import refuse_inputs
 from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
@@ -19,42 +20,46 @@ from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.robot_view import write_robot_page
-from pprs_dynamics.report.tables import console
+from pprs_dynamics.report.terminal import console, shown
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM, draw_effects
 from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import SensorSettings
 
 RATE = 500.0
+LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 FEEDFORWARDS = ('friction', 'rigid_body', 'none')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    parser.add_argument('--output', metavar='RECORDING', required=True,
+    parser.add_argument('--output', metavar='RECORDING', type=output_file(*RECORDING),
+                        required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
                         choices=(*HIDDEN_EFFECTS, RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
                         f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}')
-    parser.add_argument('--scale', type=at_least(0.0), default=1.0,
+    parser.add_argument('--scale', type=number(0.0, 1e6), default=1.0,
                         help='multiplies the strength of the effects (default 1)')
-    parser.add_argument('--seed', type=whole, default=0, help='of noise and effects (default 0)')
+    parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',
                         help='helix, excitation, or a CSV of poses (default excitation)')
-    parser.add_argument('--duration', type=positive, default=40.0,
+    parser.add_argument('--duration', type=number(1.0, LONGEST, 's'), default=40.0,
                         help='of an excitation [s] (default 40)')
-    parser.add_argument('--path-seed', type=whole, default=0, help='of an excitation (default 0)')
-    parser.add_argument('--noise', type=at_least(0.0), default=0.08,
+    parser.add_argument('--path-seed', type=seed, default=0, help='of an excitation (default 0)')
+    parser.add_argument('--noise', type=number(0.0, 1e3, 'N'), default=0.08,
                         help='of the efforts, standard deviation [N] (default 0.08)')
     parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
                         help='what the robot is driven with (default friction)')
-    parser.add_argument('--report', metavar='FILE.html', help='the robot moving, as a page')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='the robot moving, as a page')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
+    refuse_inputs(options.output, (options.path,))
     model = DriveModel.load(options.model)
     motion = _motion(options)
     forces = model.drive_forces(motion)
@@ -73,13 +78,13 @@ def run(options: argparse.Namespace) -> int:
     write_recording(options.output, Recording.from_arrays(
         Path(options.output).name, result.time, result.position, result.velocity, result.effort))
     for note in result.notes:
-        screen.print(f'[yellow]{note.time:.2f} s {note.code}[/]: {note.message}')
+        screen.print(f'[yellow]{note.time:.2f} s {note.code}[/]: {shown(note.message)}')
     if options.report:
         write_robot_page(options.report, model, motion, 'The simulated motion')
     if options.json:
         write_json(options.json, _content(options, result))
     hidden = f'{len(effects)} hidden effect{"s" * (len(effects) != 1)}'
-    screen.print(f'{len(result.time)} samples at {RATE:g} Hz, {hidden}: {options.output}')
+    screen.print(f'{len(result.time)} samples at {RATE:g} Hz, {hidden}: {shown(options.output)}')
     return 0
 
 

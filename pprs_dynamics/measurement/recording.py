@@ -15,6 +15,7 @@ from pprs_dynamics.measurement.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.defects import Judgement
 from pprs_dynamics.measurement.samples import Finding, Progress, Samples, counted
 from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.plain_text import displayed
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Recording:
     Parameters
     ----------
     name : str
-        For people: the file's name.
+        For people: the file's name, as `displayed`.
     drives : tuple of D str
     time : (N,) array
         [s], counted from `epoch`; strictly increasing within each segment.
@@ -208,7 +209,7 @@ def read_recording(
         if isinstance(error, UnreadableFileError):
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
-    recording = _judged(path.name, samples)
+    recording = _judged(displayed(path.name), samples)
     if not len(recording.time):
         raise UnreadableFileError(
             path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '

@@ -5,14 +5,11 @@ The same `build_model` serves files and the nodes' parameters: both are flat key
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
@@ -28,6 +25,7 @@ from pprs_dynamics.errors import MISSING, ModelError, UnreadableFileError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.robot import Geometry, Masses, Robot
 from pprs_dynamics.model.axis_model import AxisModel
+from pprs_dynamics.model.bounded_yaml import parse, read_text
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.effects_block import ADDED, added_effects, check_tolerances, suggestion
 from pprs_dynamics.model.keys import (
@@ -78,31 +76,17 @@ def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     UnreadableFileError
-        Where it cannot be read, is not YAML, or has no `ros__parameters`.
+        Where it cannot be read, is not YAML within bounds, or has no `ros__parameters`.
     ModelError
         For a list that mixes whole and decimal numbers, which ROS 2 refuses.
     """
-    try:
-        text = Path(path).read_text(encoding='utf-8')
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
-    except UnicodeDecodeError:
-        raise UnreadableFileError(path, 'not a text file in UTF-8') from None
-    return parse_parameters(text, path)
+    return parse_parameters(read_text(path), path)
 
 
 def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any]:
     """Return the same of a file's text; `path` is named in errors."""
-    try:
-        content = yaml.load(text, Loader=_StrictLoader)
-    except (yaml.YAMLError, ValueError) as error:
-        raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
     flat: dict[str, Any] = {}
-    try:
-        pairs = list(_flatten(_parameters_block(path, content)))
-    except RecursionError:
-        raise UnreadableFileError(path, 'not a model file: it contains itself') from None
-    for key, value in pairs:
+    for key, value in _flatten(_parameters_block(path, parse(text, path))):
         if key in flat:
             raise ModelError(key, value, 'stand once: it is given nested and with dots', str(path))
         flat[key] = value
@@ -114,7 +98,7 @@ def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any
 
 def other_nodes(text: str) -> dict[str, Any]:
     """Return the blocks of a parameter file's text that are for single nodes, not the model."""
-    content = yaml.load(text, Loader=_StrictLoader)
+    content = parse(text)
     chosen = _parameters_block('', content)
     return {node: block for node, block in content.items()
             if block['ros__parameters'] is not chosen}
@@ -289,30 +273,3 @@ def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, 
             yield from _flatten(value, f'{prefix}{key}.')
         else:
             yield f'{prefix}{key}', value
-
-
-def _one_line(error: Exception) -> str:
-    return ' '.join(str(error).split())
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """YAML that refuses the same key twice: the later one would win in silence."""
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
-                raise yaml.constructor.ConstructorError(
-                    None, None, 'a key must be a word', key_node.start_mark)
-            key = key_node.value
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'the key {key!r} stands twice', key_node.start_mark)
-            seen.add(key)
-        return super().construct_mapping(node, deep=deep)
-
-
-# ROS 2 reads 1e-3 and 1.0e2 as numbers; YAML 1.1, which PyYAML follows, as words.
-_StrictLoader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$'),
-    list('-+0123456789.'))

@@ -9,8 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from pprs_dynamics.model.bounded_yaml import read_text
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.model_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.plain_text import displayed
 
 OPTION = '--params-file'
 
@@ -20,10 +22,23 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
 
     Without any it is the package's own model that a node runs.
     """
-    paths = [Path(value) for option, value in pairwise(arguments)
-             if option == OPTION] or [find_file(DEFAULT_MODEL)]
-    return [{'file': str(path.resolve()), 'sha256': _digest(path.read_bytes())}
+    paths = _paths(arguments) or [find_file(DEFAULT_MODEL)]
+    return [{'file': displayed(path.resolve()), 'sha256': _digest(path.read_bytes())}
             for path in paths if path.is_file()]
+
+
+def check_files(arguments: Sequence[str]) -> None:
+    """Raise UnreadableFileError where a parameter file on a command line is out of bounds.
+
+    ROS 2 takes a minute over a list that is nested 10^5 deep, and longer over larger ones.
+    """
+    for path in _paths(arguments):
+        if path.is_file():  # what is not, ROS 2 refuses; a pipe can be read only once
+            read_text(path)
+
+
+def _paths(arguments: Sequence[str]) -> list[Path]:
+    return [Path(value) for option, value in pairwise(arguments) if option == OPTION]
 
 
 def fingerprint(model: DriveModel) -> str:

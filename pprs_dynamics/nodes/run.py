@@ -14,6 +14,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.nodes.executor import PromptExecutor, StopSignals
+from pprs_dynamics.nodes.provenance import check_files
 
 
 class Finished(Exception):
@@ -33,7 +34,10 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
     stop = _Stop()
     StopSignals(stop)
     try:
+        check_files(sys.argv if args is None else args)
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except PprsError as error:
+        return _complain(str(error))
     except RCLError as error:
         # An unreadable parameter file, or arguments that are none.
         return _complain(' '.join(str(error).split()))

@@ -68,10 +68,10 @@ def _parts(answer: Adoption) -> Iterator[Any]:
 
 def _table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]] | Any,
            caption: str | None = None) -> Table:
-    table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD,
-                  caption=caption, caption_justify='left')
+    table = Table(title=escape(title), title_justify='left', title_style='bold',
+                  box=box.SIMPLE_HEAD, caption=caption and escape(caption), caption_justify='left')
     for number, heading in enumerate(headings):
-        table.add_column(heading, justify='left' if number == 0 else 'right')
+        table.add_column(escape(heading), justify='left' if number == 0 else 'right')
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     return table

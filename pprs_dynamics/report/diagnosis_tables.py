@@ -114,7 +114,7 @@ def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
            right: Sequence[int] = ()) -> Table:
     table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
     for number, heading in enumerate(headings):
-        table.add_column(heading, justify='right' if number in right else 'left',
+        table.add_column(escape(heading), justify='right' if number in right else 'left',
                          no_wrap=number in right or number == 0)
     for row in rows:
         table.add_row(*row)

@@ -13,8 +13,9 @@ HIGH = 0.5  # use of a limit, from which on it is shown
 def experiment_view(experiment: Experiment) -> Any:
     """Return what a motion is for, what it promises, and which limits it uses."""
     from rich.console import Group
+    from rich.markup import escape
 
-    parts: list[Any] = [f'[bold]{experiment.text}[/]']
+    parts: list[Any] = [f'[bold]{escape(experiment.text)}[/]']
     if experiment.bouts:
         parts.append(_table('What it would tell', BOUT_HEADINGS, bout_rows(experiment)))
     if experiment.accuracies:
@@ -62,7 +63,7 @@ def _table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -
 
     table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
     for heading in headings:
-        table.add_column(heading)
+        table.add_column(escape(heading))
     for row in rows:
         table.add_row(*map(escape, row))
     return table

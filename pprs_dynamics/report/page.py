@@ -10,6 +10,7 @@ from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.model.atomic_file import write_text
+from pprs_dynamics.plain_text import PLAIN
 
 _STYLE = '''
 body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; margin: 0 auto; max-width: 1180px;
@@ -119,5 +120,6 @@ class Page:
         UnreadableFileError
             Where it cannot be written.
         """
-        write_text(path, self.html())
+        # Names of files may hold bytes that are no text.
+        write_text(path, self.html().encode(errors=PLAIN).decode())
         return Path(path)

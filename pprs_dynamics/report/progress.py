@@ -12,7 +12,7 @@ def progress_bar(console: Any, what: str) -> Iterator[Callable[[float, float], N
     """Show a bar while the block lasts; call the given function with (done, total)."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn('{task.description}'), BarColumn(),
+    columns = (TextColumn('{task.description}', markup=False), BarColumn(),
                TextColumn('{task.percentage:3.0f} %'), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=None)

@@ -6,22 +6,13 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from pprs_dynamics.diagnosis.comparison import Comparison
-from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.measurement.recording import Summary
 from pprs_dynamics.model.reproduction import Claim
 
 
-def console() -> Any:
-    """Return rich's console, or raise MissingLibraryError."""
-    try:
-        from rich.console import Console
-    except ImportError:
-        raise MissingLibraryError('rich', 'showing tables', 'report') from None
-    return Console()
-
-
 def claims_table(claims: Iterable[Claim]) -> Any:
     """Return the paper's claims against what comes out."""
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(title='The paper\'s claims, and what comes out', show_lines=True)
@@ -29,7 +20,7 @@ def claims_table(claims: Iterable[Claim]) -> Any:
         table.add_column(heading, max_width=width)
     table.add_column('reproduced')
     for claim in claims:
-        table.add_row(claim.claim, claim.paper, claim.found,
+        table.add_row(escape(claim.claim), escape(claim.paper), escape(claim.found),
                       '[green]yes[/]' if claim.reproduced else '[red]no[/]')
     return table
 
@@ -44,10 +35,10 @@ def recording_table(summary: Summary) -> Any:
         f'segment{"s" * (len(summary.segments) != 1)}, {summary.duration:.2f} s at '
         f'{summary.rate:.6g} Hz'), caption=escape(summary.source))
     for heading in ('drive', 'position [m]', 'velocity [m/s]', 'effort [N]', 'measured'):
-        table.add_column(heading, justify='left' if heading == 'drive' else 'right')
+        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
     for drive, found in summary.drives.items():
-        table.add_row(drive, _span(found.position), _span(found.velocity), _span(found.effort),
-                      f'{found.measured:.1%}')
+        table.add_row(escape(drive), _span(found.position), _span(found.velocity),
+                      _span(found.effort), f'{found.measured:.1%}')
     return table
 
 
@@ -65,6 +56,7 @@ def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
 
 def comparison_table(comparison: Comparison) -> Any:
     """Return how wrong the model is, drive by drive."""
+    from rich.markup import escape
     from rich.table import Table
 
     colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
@@ -72,9 +64,9 @@ def comparison_table(comparison: Comparison) -> Any:
                   f'{_percent(comparison.relative)}')
     for heading in ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained',
                     'noise [N]'):
-        table.add_column(heading, justify='left' if heading == 'drive' else 'right')
+        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
     for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
-        table.add_row(f'[{colours[drive.grade]}]{row[0]}[/]', *row[1:7])
+        table.add_row(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
     return table
 
 

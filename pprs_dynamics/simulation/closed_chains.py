@@ -323,6 +323,11 @@ class ClosedChains:
         return loads
 
     @property
+    def warnings(self) -> int:
+        """How often the engine has warned that it could not solve something."""
+        return int(self.data.warning.number.sum())
+
+    @property
     def rotation(self) -> Array:
         """From `platform` to `base` at the last evaluation, (3, 3); a view."""
         return self._rotation

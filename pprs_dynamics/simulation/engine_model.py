@@ -21,6 +21,9 @@ def load_engine() -> Any:
         import mujoco
     except ImportError:
         raise MissingLibraryError('mujoco', 'the simulated robot', 'sim') from None
+    if mujoco.get_mju_user_warning() is None:
+        # Its own way writes MUJOCO_LOG.TXT into the user's folder; warnings are counted anyway.
+        mujoco.set_mju_user_warning(lambda message: None)
     return mujoco
 
 

@@ -34,6 +34,7 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.simulation.closed_chains import (
     DRIVE_DOFS,
     ClosedChains,
@@ -55,6 +56,9 @@ SOLVER_ITERATIONS = 40
 # Stops at the ends of the strokes.
 STOP_STIFFNESS = 1e5  # [N/m]
 STOP_DAMPING = 300.0  # [N s/m]
+# Share of the shorter stroke in one time step, 100 m/s for the paper's robot, beyond which the
+# stops at its ends are not seen.
+LONGEST_MOVE = 0.1
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,15 @@ class Truth:
     gap: float
 
 
+class UnsolvedError(PprsError, ArithmeticError):
+    """A step that neither the engine nor the time step can follow: what it gives is no motion."""
+
+    def __init__(self, time: float, found: str) -> None:
+        self.found = f'at {time:.6g} s {found}'
+        super().__init__(f'the simulated robot: {self.found}, but forces and hidden effects must '
+                         'be such as a mechanism can have')
+
+
 class Plant:
     """The mechanism under drive efforts.
 
@@ -151,6 +164,9 @@ class Plant:
         self._all_velocities = np.zeros(15)
         self._acceleration = np.zeros(15)
         self._loads = np.zeros(12)
+        strokes = self.upper - self.lower
+        self._fastest = LONGEST_MOVE * float(strokes.min()) / self.settings.step
+        self._widest = 3 * float(strokes.max())  # a whole stroke beyond the end
         self.place(self.position)
 
     @property
@@ -183,12 +199,14 @@ class Plant:
         ------
         SingularityError
             Where the drives can no longer hold the platform.
+        UnsolvedError
+            Where the step has no solution that means anything.
         """
         h, chains = self.settings.step, self.chains
         qpos, y, last = chains.qpos, self.velocity, self._acceleration
         for change in self._body_changes:
             change.advance(chains, self.time + h / 2)
-        start = qpos.take(DRIVE_DOFS)
+        start, before = qpos.take(DRIVE_DOFS), qpos.copy()
         chains.engine.mj_integratePos(
             chains.model, qpos, self._all_velocities + h / 4 * last, h / 2)
         position = qpos.take(DRIVE_DOFS)
@@ -209,10 +227,22 @@ class Plant:
         chains.engine.mj_integratePos(
             chains.model, qpos, velocities + h / 4 * acceleration, h / 2)
         self.velocity = y + h * y_dot
+        reason = self._unsolved()
+        if reason:
+            qpos[:], self.velocity = before, np.zeros(6)
+            raise UnsolvedError(self.time, reason)
         qpos[DRIVE_DOFS] = start + h / 2 * (y + self.velocity)
         self._all_velocities = velocities + h / 2 * acceleration
         self._acceleration = acceleration
         self.time += h
+
+    def _unsolved(self) -> str:
+        """Return why the last step is no motion of a mechanism, or nothing."""
+        if not np.abs(self.velocity).max() < self._fastest or self.chains.warnings:
+            return 'the engine could not solve its motion'
+        if np.abs(2 * self.position - self.lower - self.upper).max() > self._widest:
+            return 'a drive has gone through the stop at its end'
+        return ''
 
     def observe(self, effort: Array) -> Truth:
         """Return what the mechanism does now, when the drives apply efforts (6,) [N]."""

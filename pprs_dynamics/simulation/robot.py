@@ -11,7 +11,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth
+from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth, UnsolvedError
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
 
 
@@ -31,6 +31,11 @@ class SimulatedRobot:
     rate : float
         Ticks per second [Hz].
     plant, control, sensors : settings, optional
+
+    Attributes
+    ----------
+    unsolved : UnsolvedError or None
+        Why it stopped, where that is not a matter of the mechanism.
 
     Raises
     ------
@@ -55,6 +60,7 @@ class SimulatedRobot:
                                     self.sensors.smoothing)
         self._ticks = 0
         self._stopped = False
+        self.unsolved: UnsolvedError | None = None
         self.place(self.plant.position)
 
     @property
@@ -108,8 +114,9 @@ class SimulatedRobot:
             if not self._stopped:
                 try:
                     plant.step(effort)
-                except SingularityError as error:
+                except (SingularityError, UnsolvedError) as error:
                     self._stop(now + k * step, error)
+                    self.unsolved = error if isinstance(error, UnsolvedError) else None
             self.sensors.read_encoders(plant.position, plant.velocity)
         self._ticks += 1
         assert measurement is not None
@@ -121,7 +128,7 @@ class SimulatedRobot:
         self._effort = effort
         return effort
 
-    def _stop(self, now: float, error: SingularityError) -> None:
+    def _stop(self, now: float, error: SingularityError | UnsolvedError) -> None:
         self._stopped = True
         self.plant.velocity = np.zeros(6)
         self.notes.append(Note(now, 'STOPPED', f'the robot stopped: {error.found}'))

@@ -153,6 +153,8 @@ def simulate(
     SingularityError
         Where the reference starts out of reach. A robot that comes to a singular pose on its
         way stops there and notes it.
+    UnsolvedError
+        Where the engine finds no motion, as with effects far beyond what a machine has.
     """
     robot = SimulatedRobot(model.values, effects, seed=seed, rate=rate, plant=plant,
                            control=control, sensors=sensors)
@@ -164,6 +166,8 @@ def simulate(
             robot.command(reference.setpoint(k),
                           reference.setpoint(k + 1) if k + 1 < len(reference) else None)
         measurement, moment = robot.tick_with_truth(truth)
+        if robot.unsolved is not None:
+            raise robot.unsolved
         measured.append(measurement)
         true.append(moment)
         if progress is not None and k % max(1, samples // 100) == 0:
