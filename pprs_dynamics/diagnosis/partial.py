@@ -9,6 +9,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.diagnosis.rivals import RivalEffect
 from pprs_dynamics.diagnosis.statements import UNITS
 from pprs_dynamics.residuals.bins import bin_edges
 from pprs_dynamics.residuals.profiles import Profile, error_profile
@@ -48,11 +49,12 @@ class PartialResidual:
     span: slice
 
 
-def partial_residual(diagnosis: Diagnosis, found: FoundEffect) -> PartialResidual:
+def partial_residual(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> PartialResidual:
     """Return what the recordings say of one effect when all others are in the model."""
     drive = int(np.argmax(np.sqrt(np.mean(found.force ** 2, axis=0))))
     force = found.force[:, drive]
-    without = _with_error(diagnosis.residuals, diagnosis.remaining + found.force)
+    left = found.remaining if isinstance(found, RivalEffect) else diagnosis.remaining
+    without = _with_error(diagnosis.residuals, left + found.force)
     variable, share = _most_telling(without, drive, force)
     profile, fitted = None, np.zeros(0)
     noise = diagnosis.noise.get(without.drives[drive])

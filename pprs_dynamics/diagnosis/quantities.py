@@ -9,7 +9,7 @@ INTERVAL = 2.0  # standard deviations that ± stands for, about 95 %
 # Values below a size are read in another unit: size, factor, name.
 READ_IN = {'m': (1.0, 1e3, 'mm'), 'm/s': (1.0, 1e3, 'mm/s'), 's': (0.1, 1e3, 'ms'),
            'kg': (0.1, 1e3, 'g'), 'rad': (inf, 180 / pi, '°')}
-PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²'}
+PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s²'}
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
@@ -30,9 +30,33 @@ def with_uncertainty(value: float, std: float, unit: str) -> str:
     return f'{round(value, decimals):.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
 
 
-def newtons(value: float) -> str:
-    """Return a force [N] with three digits."""
-    return f'{value:.3g} N'
+def newtons(value: float, digits: int = 3) -> str:
+    """Return a force [N] with as many digits, never as a power of ten."""
+    return f'{plain(value, digits)} N'
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Return a number with as many digits, never as a power of ten."""
+    if not isfinite(value) or value == 0:
+        return f'{value:g}'
+    decimals = max(digits - 1 - floor(log10(abs(value))), 0)
+    text = f'{value:.{decimals}f}'
+    return text.rstrip('0').rstrip('.') if '.' in text else text
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with two digits below 10 %; 'none' for NaN."""
+    if not isfinite(share):
+        return 'none'
+    return f'{100 * share:.0f} %' if abs(share) >= 0.0995 else f'{plain(100 * share, 2)} %'
+
+
+def change(before: float, after: float) -> str:
+    """Return 'falls from A to B', with digits that show it, or that it does not fall [N]."""
+    if after >= before:
+        return f'does not fall ({newtons(before)} before, {newtons(after)} after)'
+    digits = next((n for n in range(3, 7) if plain(before, n) != plain(after, n)), 6)
+    return f'falls from {newtons(before, digits)} to {newtons(after, digits)}'
 
 
 def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:

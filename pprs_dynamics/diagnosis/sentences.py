@@ -2,28 +2,67 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, WithinModelError
 from pprs_dynamics.diagnosis.quantities import (
     INTERVAL,
+    change,
     listed,
     name_drives,
     newtons,
+    plain,
     sentence,
     with_uncertainty,
 )
-from pprs_dynamics.diagnosis.unknown_words import describe_unexplained, place_of
+from pprs_dynamics.diagnosis.rivals import RivalEffect
+from pprs_dynamics.diagnosis.statements import Statement
+from pprs_dynamics.diagnosis.unknown_words import describe_unexplained, place_of, place_on
 from pprs_dynamics.effects.asymmetric_friction import AsymmetricFriction
-from pprs_dynamics.effects.catalogue import find_effect
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import Parameter
 from pprs_dynamics.selection.estimates import Calibration, Estimate
 
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
-SEPARATE = 'pprs next-experiment RECORDING --output next.csv'
+SECOND = 'SECOND_RECORDING'  # that is still to be made
+
+
+@dataclass(frozen=True)
+class GivenFiles:
+    """Names of the files of a diagnosis, for commands that can be copied.
+
+    Parameters
+    ----------
+    recordings, validate : tuple of str
+    model : str
+        '' for the default.
+    """
+
+    recordings: tuple[str, ...] = ('RECORDING',)
+    validate: tuple[str, ...] = ()
+    model: str = ''
+
+    def command(self, *words: str, held_out: bool = False) -> str:
+        """Return a command of `pprs` on the recordings, then options; quoted for a shell.
+
+        Parameters
+        ----------
+        words : str
+            The command and its first arguments; from the first that starts with `--` on they
+            stand behind the recordings.
+        held_out : bool
+            Whether it takes --validate.
+        """
+        first = next((k for k, word in enumerate(words) if word.startswith('--')), len(words))
+        given = ['pprs', *words[:first], *self.recordings]
+        if held_out:
+            given += [part for name in self.validate for part in ('--validate', name)]
+        given += ['--model', self.model] if self.model else []
+        return shlex.join([*given, *words[first:]])
 
 
 @dataclass(frozen=True)
@@ -68,35 +107,73 @@ class Sentences:
     ----------
     headline : str
         The verdict.
-    effects, unexplained : tuple of Finding
-        In the order of `Diagnosis.effects` and `Diagnosis.depends_on`.
+    effects : tuple of Finding
+        In the order of `Diagnosis.effects`.
+    rivals : tuple of Finding
+        In the order of those given to `word_diagnosis`.
+    unexplained : tuple of Finding
+        In the order of `unexplained_groups`.
     suspects, within_model_error, calibrated, warnings : tuple of str
-    following : str
-        What to do next.
+    following, command : str
+        What to do next, in words and for a shell.
     """
 
     headline: str
     effects: tuple[Finding, ...]
+    rivals: tuple[Finding, ...]
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
     within_model_error: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
     following: str
+    command: str
 
 
-def word_diagnosis(diagnosis: Diagnosis) -> Sentences:
-    """Return a diagnosis in words."""
+def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = GivenFiles(),
+                   rivals: Sequence[RivalEffect] = ()) -> Sentences:
+    """Return a diagnosis in words.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    files : GivenFiles, optional
+        For the command to go on with.
+    rivals : sequence of RivalEffect, optional
+        As `rival_effects` finds them.
+    """
+    following, command = _following(diagnosis, files)
     return Sentences(
         _headline(diagnosis),
         tuple(_effect(diagnosis, one, k == 0) for k, one in enumerate(diagnosis.effects)),
-        tuple(Finding(*describe_unexplained(one, bool(diagnosis.effects)))
-              for one in diagnosis.depends_on),
+        tuple(_rival(diagnosis, one) for one in rivals),
+        tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
+              for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
         tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
         tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
-        diagnosis.warnings,
-        _following(diagnosis))
+        diagnosis.warnings, following, command)
+
+
+def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
+    """Return the statements on what no effect explains, those of one pattern together."""
+    groups: dict[object, list[Statement]] = {}
+    for one in diagnosis.depends_on:
+        groups.setdefault((one.variable, one.kind, one.range), []).append(one)
+    return [tuple(group) for group in groups.values()]
+
+
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best."""
+    every = diagnosis.residuals.drives
+    return [(' and '.join(with_drives(_plain_name(name), drives, every)
+                          for name, drives in one.names) or 'nothing missing',
+             'the best' if one.cost <= 0 else f'+{plain(one.cost, 2)}') for one in diagnosis.sets]
+
+
+def _plain_name(name: str) -> str:
+    unknown, comma, variable = name.partition(', ')
+    return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
 
 
 def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
@@ -112,37 +189,47 @@ def with_drives(name: str, drives: tuple[str, ...] | None, every: tuple[str, ...
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    first, last = diagnosis.effects[:1], diagnosis.effects[-1:]
-    named = listed([_or_rivals(diagnosis, one) for one in diagnosis.effects])
-    fall = '' if not first else (
-        f' With {"it" if len(diagnosis.effects) == 1 else "them"} the error falls from '
-        f'{newtons(first[0].error_before)} to {newtons(last[0].error_after)}')
-    noise = newtons(diagnosis.noise_floor)
-    doubted = _doubted(diagnosis)
-    doubt = (f' On what was held out it does not fall with {listed(doubted)}.' if doubted else '')
+    held = [one for one in diagnosis.effects if _holds(one)]
+    named = listed([_or_rivals(diagnosis, one) for one in held])
+    doubt = _doubt(diagnosis)
+    fall = '' if not held else (
+        f' With {"it" if len(held) == 1 else "them"} the error '
+        f'{change(diagnosis.effects[0].error_before, held[-1].error_after)}')
     if diagnosis.verdict == 'unknown':
-        places = listed([f'on {one.drive}, {place_of(one.variable)}'
-                         for one in diagnosis.depends_on[:2]])
-        more = len(diagnosis.depends_on) - 2
+        groups = unexplained_groups(diagnosis)
+        places = listed([place_on(group) for group in groups[:2]])
+        more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if first else ''
+        beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
+    noise = newtons(diagnosis.noise_floor)
     if diagnosis.verdict == 'adequate':
-        return (f'Nothing is missing beyond noise: what the model leaves, {noise} rms, depends on '
-                'nothing known. Effects much weaker than that could still hide in it.')
-    # Only the widths of reversals are fitted and yet not part of the model.
-    level = (', which is the noise.' if last[0].error_after <= AT_NOISE * diagnosis.noise_floor
-             else f'. The noise is {noise}; the rest lies near reversals, where friction '
-             'turns over in another width than the model\'s.')
-    if diagnosis.verdict == 'ambiguous':
-        return f'The model lacks {named}: this data cannot tell which.{fall}{level}{doubt}'
-    return f'The model lacks {named}.{fall}{level}{doubt}'
+        return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
+                'that could still hide in it.')
+    if not held:
+        return f'Nothing that was found holds on held-out data.{doubt}'
+    left = held[-1].error_after
+    level = (', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
+             else f'. The noise is {noise}; the rest is within the model error of what was found.'
+             if diagnosis.within_model_error
+             # Only the widths of reversals are fitted and yet not part of the model.
+             else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
+             'over in another width than the model\'s.')
+    which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
+    return f'The model lacks {named}{which}.{fall}{level}{doubt}'
 
 
 def _doubted(diagnosis: Diagnosis) -> list[str]:
     """Return effects that held-out data do not confirm."""
     return [one.name for one in diagnosis.effects if not _holds(one)]
+
+
+def _doubt(diagnosis: Diagnosis) -> str:
+    names = _doubted(diagnosis)
+    return '' if not names else (
+        f' {listed(names)} lower{"s" * (len(names) == 1)} the error of the fit, but not the one on '
+        'held-out data.')
 
 
 def _holds(found: FoundEffect) -> bool:
@@ -162,7 +249,9 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card
     title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
-    what = f'The model lacks {title}: {_parameters(diagnosis, found)}'
+    lacks = f'The model lacks {title}' if _holds(found) else (
+        f'Fitted, but not confirmed: {title}')
+    what = f'{lacks}: {_parameters(diagnosis, found)}'
     if issubclass(found.effect, MeasurementEffect):
         what += ('. This is what the sensor says, not what the drive must do: it enters '
                  'comparisons and the monitor, never a command')
@@ -173,7 +262,18 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
          *_two_in_one(diagnosis, found), *_bound(found)))
 
 
-def _parameters(diagnosis: Diagnosis, found: FoundEffect) -> str:
+def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
+    card = rival.effect.card
+    title = with_drives(rival.name, rival.drives, diagnosis.residuals.drives)
+    return Finding(
+        f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '
+        f'{_parameters(diagnosis, rival)}.',
+        f'With it the error is {newtons(rival.error_after)}, and the cost of the set is '
+        f'{plain(rival.cost, 2)} above the best one.', sentence(card.causes),
+        sentence(card.confirm), sentence(card.looks_like))
+
+
+def _parameters(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
     fitted = _fitted(diagnosis, found)
     drives = {drive for drive, _, _ in fitted}
     if len(drives) <= MOST_LISTED:
@@ -193,7 +293,8 @@ def _parameters(diagnosis: Diagnosis, found: FoundEffect) -> str:
     return ', '.join(phrases)
 
 
-def _fitted(diagnosis: Diagnosis, found: FoundEffect) -> list[tuple[str, Parameter, Estimate]]:
+def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
+            ) -> list[tuple[str, Parameter, Estimate]]:
     """Return drive ('' for none), parameter and estimate of what was not left at zero."""
     known = {parameter.name: parameter for parameter in found.effect.parameters}
     order = ['', *diagnosis.residuals.drives]
@@ -206,31 +307,24 @@ def _fitted(diagnosis: Diagnosis, found: FoundEffect) -> list[tuple[str, Paramet
 
 
 def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
-    change = f'{newtons(found.held_out_before)} to {newtons(found.held_out_after)}'
     fresh = diagnosis.held_out_on == 'validation'
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
-    held_out += (f'falls from {change}' if _holds(found) else
-                 f'does not fall ({change}): do not adopt it')
+    held_out += change(found.held_out_before, found.held_out_after)
+    held_out += '' if _holds(found) else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'With it the error falls from {newtons(found.error_before)} to '
-            f'{newtons(found.error_after)}. {held_out}. Evidence {found.evidence:.0f}, where 0 is '
-            'the threshold.')
+    return (f'With it the error {change(found.error_before, found.error_after)}. {held_out}. '
+            f'Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
 def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
     rivals = _rivals(diagnosis, found)
     if not rivals:
         return []
-    remark = (f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
-              f'explain it about as well. A motion that tells them apart: {SEPARATE}.')
-    for name in rivals:
-        effect = find_effect(name)
-        if effect is not None:
-            remark += f' {name} would be confirmed so: {effect.card.confirm}.'
-    return [remark]
+    return [f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
+            'explain it about as well.']
 
 
 def _negative(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
@@ -303,23 +397,27 @@ def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
             f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')
 
 
-def _following(diagnosis: Diagnosis) -> str:
+def _following(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
+    """Return what to do next, and the command for it."""
+    repeat = files.command('diagnose', SECOND)
     if diagnosis.verdict == 'unknown':
-        return ('Look at the curve of what remains (--report), look at that place on the machine, '
-                'and repeat the recording: what comes back is the machine. A form of your own can '
-                'join the catalogue as one file.')
+        return ('Look at that place on the machine, and record the motion again: what comes back '
+                'is the machine. Then diagnose both recordings', repeat)
     if diagnosis.verdict == 'ambiguous':
-        return f'Record a motion that tells the candidates apart: {SEPARATE}'
+        return ('Record a motion that tells the candidates apart; this designs it',
+                files.command('next-experiment', '--output', 'next.csv'))
     if doubted := _doubted(diagnosis):
-        return (f'Do not add {listed(doubted)} on this evidence: what was held out speaks against '
-                'it. Record another motion, and fit both')
-    if diagnosis.verdict == 'effect':
-        name = diagnosis.effects[0].name
-        if len(diagnosis.effects) > 1:
-            return ('Confirm them on the machine, then add them one by one (pprs adopt) or all: '
-                    'pprs diagnose RECORDING --validate ANOTHER --adopt-all --output new.yaml')
-        return (f'Confirm it on the machine, then add it: pprs adopt {name} RECORDING --output '
-                'new.yaml --validate ANOTHER')
+        return (f'Do not add {listed(doubted)} on this evidence. Record another motion, and '
+                'diagnose both recordings', repeat)
+    if len(diagnosis.effects) == 1:
+        found = diagnosis.effects[0]
+        return ('Confirm it on the machine, then add it', files.command(
+            'adopt', found.name, '--output', f'with_{found.name}.yaml', held_out=True))
+    if diagnosis.effects:
+        return ('Confirm them on the machine, then add them', files.command(
+            'diagnose', '--adopt-all', '--output', 'better.yaml', held_out=True))
     if diagnosis.suspects:
-        return 'Repeat the recording: what comes back is the machine, what does not was noise'
-    return 'Nothing to add. Another motion may show what this one does not excite'
+        return ('Repeat the recording: what comes back is the machine, what does not was noise',
+                repeat)
+    return ('Nothing to add. Another motion may show what this one does not excite',
+            GivenFiles((SECOND,), (), files.model).command('diagnose'))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pprs_dynamics.diagnosis.quantities import sentence
+from collections.abc import Sequence
+
+from pprs_dynamics.diagnosis.quantities import listed, sentence
 from pprs_dynamics.diagnosis.statements import WORDS, Statement
 
 # What it could come from, and how to look, by what the error depends on.
@@ -47,23 +49,35 @@ SHAPES = {
     'fading': 'a step where the motion reverses, which fades with speed',
     'fast': 'a curve that shows at speed',
     'scatter': 'scatter larger than elsewhere, with no shift',
+    'bump': 'a bump', 'level': 'a slow drift without a pattern',
     'ripple': 'a wave', 'line': 'a vibration at one frequency',
 }
 
 
 def describe_unexplained(
-    statement: Statement, beside_effects: bool,
+    group: Sequence[Statement], beside_effects: bool,
 ) -> tuple[str, str, str, str, str]:
-    """Return title, what, why, cause and how to confirm."""
-    drive, place = statement.drive, place_of(statement.variable)
-    text = statement.text.removeprefix(f'{drive}: ')
+    """Return title, what, why, cause and how to confirm, of one pattern on one or more drives."""
+    first = group[0]
+    drives = listed([one.drive for one in group])
+    texts = '; '.join(one.text if len(group) > 1 else one.text.removeprefix(f'{one.drive}: ')
+                      for one in group)
     left = 'what the effects found leave' if beside_effects else 'the error'
-    what = (f'Something on {drive} that no effect of the catalogue explains, {place}. Its shape '
-            f'is {SHAPES.get(statement.kind, "drawn in the report")}: in {left}, {text}.')
-    why = (f'Noise like this one does not do that (evidence {statement.evidence:.0f}, where 0 is '
+    what = (f'Something on {drives} that no effect of the catalogue explains, '
+            f'{place_of(first.variable)}. Its shape is '
+            f'{SHAPES.get(first.kind, "drawn in the report")}: in {left}, {texts}.')
+    evidence = max(one.evidence for one in group)
+    why = ('Its noise is compared with that of the other drives, which move alike.'
+           if first.kind == 'level' else
+           f'Noise like this one does not do that (evidence {evidence:.0f}, where 0 is '
            'the threshold), and every effect of the catalogue explains it worse.')
-    cause, confirm = LEADS[_lead(statement.variable)]
-    return f'unknown on {drive}, {place}', what, why, sentence(cause), sentence(confirm)
+    cause, confirm = LEADS[_lead(first.variable)]
+    return f'unknown {place_on(group)}', what, why, sentence(cause), sentence(confirm)
+
+
+def place_on(group: Sequence[Statement]) -> str:
+    """Return on which drives and depending on what a pattern lies."""
+    return f'on {listed([one.drive for one in group])}, {place_of(group[0].variable)}'
 
 
 def place_of(variable: str) -> str:

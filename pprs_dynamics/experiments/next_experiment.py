@@ -36,7 +36,7 @@ class PurposeError(PprsError, ValueError):
 
 
 @dataclass(frozen=True)
-class Bout:
+class ExpectedEvidence:
     """What a motion promises for one contest.
 
     Parameters
@@ -95,7 +95,7 @@ class Experiment:
     kind : {'separate', 'estimate', 'excite', 'commission'}
     subjects : tuple of str
         Effects in question.
-    bouts : tuple of Bout
+    contests : tuple of ExpectedEvidence
     accuracies : tuple of Accuracy
     expected_evidence : float
         The least of all contests that it decides; without contests, of all effects in question
@@ -113,7 +113,7 @@ class Experiment:
 
     kind: str
     subjects: tuple[str, ...]
-    bouts: tuple[Bout, ...]
+    contests: tuple[ExpectedEvidence, ...]
     accuracies: tuple[Accuracy, ...]
     expected_evidence: float
     hidden: tuple[str, ...]
@@ -127,13 +127,13 @@ class Experiment:
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """All pairs in question."""
         return tuple(dict.fromkeys(tuple(sorted((one.truth, one.rival)))  # type: ignore[misc]
-                                   for one in self.bouts))
+                                   for one in self.contests))
 
     @property
     def separates(self) -> tuple[tuple[str, str], ...]:
         """Pairs that it tells apart whichever of the two is true."""
         return tuple(pair for pair in self.pairs if all(
-            one.probability >= SURE for one in self.bouts if {one.truth, one.rival} == {*pair}))
+            one.probability >= SURE for one in self.contests if {one.truth, one.rival} == {*pair}))
 
     @property
     def fails(self) -> tuple[tuple[str, str], ...]:
@@ -173,7 +173,7 @@ class Experiment:
                 'expected_evidence': self.expected_evidence,
                 'question': self.kind, 'subjects': list(self.subjects),
                 'hidden': list(self.hidden), 'text': self.text,
-                'contests': [one.to_json() for one in self.bouts],
+                'contests': [one.to_json() for one in self.contests],
                 'accuracy': [one.to_json() for one in self.accuracies],
                 'limits': self.limits, 'duration': self.duration}
 
@@ -245,28 +245,28 @@ def check_duration(duration: float) -> None:
 def experiment_of(question: Question, found: Found) -> Experiment:
     """Return a motion with what it promises for a question."""
     known, after = question.known, question.known + found.gram
-    bouts = tuple(bout for one in question.contests for bout in _bouts(one, known, after))
-    decided = [one.expected for one in bouts if one.probability >= SURE]
+    contests = tuple(found for one in question.contests for found in _expected(one, known, after))
+    decided = [one.expected for one in contests if one.probability >= SURE]
     evidences = _evidences(question, after)
-    if bouts:
-        expected = min(decided or [one.expected for one in bouts])
+    if contests:
+        expected = min(decided or [one.expected for one in contests])
     else:
         expected = min(evidences.values(), default=0.0)
     return Experiment(
-        question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), bouts,
+        question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), contests,
         tuple(_accuracies(question, known, after)), expected,
-        () if bouts else tuple(name for name, one in evidences.items() if one <= 0),
+        () if contests else tuple(name for name, one in evidences.items() if one <= 0),
         dict(zip(limit_names(question.model), map(float, found.uses), strict=True)),
         found.path.duration, found.path.motion,
         lambda time: forces_of(question.model, [found.path], time), question.model)
 
 
-def _bouts(contest: Contest, known: Array, after: Array) -> list[Bout]:
+def _expected(contest: Contest, known: Array, after: Array) -> list[ExpectedEvidence]:
     """Return what a motion promises for every pair of effects of a contest."""
     expected, gained = contest.evidence(known, after), contest.gained(known, after)
     # Twice a log-likelihood ratio scatters by twice the root of its mean.
     sure = float(norm.cdf((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
-    return [Bout(truth, rival, contest.now, expected, sure)
+    return [ExpectedEvidence(truth, rival, contest.now, expected, sure)
             for truth, rival in product(*contest.sides)]
 
 

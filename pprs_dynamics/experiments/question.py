@@ -26,7 +26,7 @@ from pprs_dynamics.regression.design import Design
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate, Prices
 from pprs_dynamics.selection.decisions import DECISIONS
-from pprs_dynamics.selection.expansion import Selection, rebuilt, select
+from pprs_dynamics.selection.expansion import Selection, select
 from pprs_dynamics.selection.form import without_remainders
 from pprs_dynamics.selection.rivals import Rival, find_rivals
 from pprs_dynamics.selection.search import Search
@@ -121,7 +121,7 @@ def _separation(selection: Selection, adopted: CandidateSet, rivals: Sequence[Ri
             pairs |= new
             sets.append(rival.found)
     search = _common_search(selection, sets)
-    placed = [search.evaluate(rebuilt(search, one)) for one in sets]
+    placed = [search.evaluate(search.library.rebuilt(one.candidates)) for one in sets]
     terms = _Terms()
     parts = [terms.of_set(one) for one in placed]
     further = {(k, j): terms.on_drives_of(placed[k], placed[j])

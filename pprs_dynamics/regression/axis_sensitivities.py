@@ -36,8 +36,8 @@ class AxisSensitivities(Sensitivities):
         numbers = np.zeros((len(self.numbers), *state.velocity.shape))
         for row, number in enumerate(self.numbers):
             numbers[row] = self.sensed(self._of_number(number, state), state)
-        dry = sum(effect.dry(state.guide_load) for effect in self.model.effects
-                  if isinstance(effect, AxisFriction))
+        dry = sum((effect.dry(state.guide_load) for effect in self.model.effects
+                   if isinstance(effect, AxisFriction)), np.zeros_like(state.guide_load))
         width = np.asarray(self.model.reversal.velocity)
         widths = np.stack([self.sensed(column, state) for column in reversal_columns(
             dry, state.velocity, state.direction, width)])

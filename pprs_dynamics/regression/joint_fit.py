@@ -157,7 +157,8 @@ class Regression:
         size = len(next(iter(grams.values()))) if grams else 1
         precision = np.zeros((size, size)) + precision
         scale = np.trace(precision) / size
-        return precision + (1e-9 * scale + 1e-300) * np.eye(size)
+        full: Array = precision + (1e-9 * scale + 1e-300) * np.eye(size)
+        return full
 
     def products(self, a: Block, b: Block | None, d: int) -> Array:
         """Return the band sums of a block's rows with another's, or with the base and error."""
@@ -239,7 +240,8 @@ class Regression:
 
     def remaining(self, fit: JointFit, d: int) -> Array:
         """Return the DCT coefficients of what a fit leaves on a drive, (n,) [N]."""
-        rest = self.base[d][-1] - fit.coefficients[self.base_index[d]] @ self.base[d][:-1]
+        rest: Array = (self.base[d][-1]
+                       - fit.coefficients[self.base_index[d]] @ self.base[d][:-1])
         for block in fit.blocks:
             if d in block.rows:
                 rest = rest - fit.of(block) @ block.rows[d]

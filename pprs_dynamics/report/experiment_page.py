@@ -12,9 +12,9 @@ from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.report.comparison_figures import LINES
 from pprs_dynamics.report.experiment_tables import (
     ACCURACY_HEADINGS,
-    BOUT_HEADINGS,
+    CONTEST_HEADINGS,
     accuracy_rows,
-    bout_rows,
+    contest_rows,
     limit_rows,
 )
 from pprs_dynamics.report.page import Page, plotly_objects
@@ -32,12 +32,12 @@ def experiment_page(experiment: Experiment, motion: PlatformMotion) -> Page:
     """
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
-    if experiment.bouts:
+    if experiment.contests:
         page.heading('What it would tell')
-        page.text('Evidence is twice the log-likelihood ratio less the penalties that the '
-                  'diagnosis takes; the chance is that of the rival falling so far behind that '
-                  'the diagnosis drops it.', 'note')
-        page.table(BOUT_HEADINGS, bout_rows(experiment))
+        page.text('Evidence is by how much the rival costs more in a diagnosis of all recordings; '
+                  'the chance is that of the rival falling so far behind that it is told as a '
+                  'rival no more.', 'note')
+        page.table(CONTEST_HEADINGS, contest_rows(experiment))
     page.heading('The motion')
     page.figure(animate_robot(experiment.model, motion, 'The designed motion'))
     page.figure(_platform(motion))

@@ -16,8 +16,8 @@ def experiment_view(experiment: Experiment) -> Any:
     from rich.markup import escape
 
     parts: list[Any] = [f'[bold]{escape(experiment.text)}[/]']
-    if experiment.bouts:
-        parts.append(_table('What it would tell', BOUT_HEADINGS, bout_rows(experiment)))
+    if experiment.contests:
+        parts.append(_table('What it would tell', CONTEST_HEADINGS, contest_rows(experiment)))
     if experiment.accuracies:
         parts.append(_table('Standard deviations', ACCURACY_HEADINGS,
                             accuracy_rows(experiment)[:MOST_SHOWN]))
@@ -30,14 +30,14 @@ def experiment_view(experiment: Experiment) -> Any:
     return Group(*parts)
 
 
-BOUT_HEADINGS = ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance')
+CONTEST_HEADINGS = ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance')
 ACCURACY_HEADINGS = ('number', 'before', 'after', 'matters from', 'unit')
 
 
-def bout_rows(experiment: Experiment) -> list[tuple[str, ...]]:
+def contest_rows(experiment: Experiment) -> list[tuple[str, ...]]:
     """Return one row of text per contest; the page and the terminal show them."""
     return [(one.truth, one.rival, f'{one.now:.0f}', f'{one.expected:.0f}',
-             f'{one.probability:.0%}') for one in experiment.bouts]
+             f'{one.probability:.0%}') for one in experiment.contests]
 
 
 def accuracy_rows(experiment: Experiment) -> list[tuple[str, ...]]:

@@ -60,7 +60,8 @@ class NoiseShapes:
     @property
     def is_slow(self) -> np.typing.NDArray[np.bool_]:
         """True for the corners that count as slow noise, (J,)."""
-        return self.corners < SLOW_SHARE * self.corners[-1]
+        slow: np.typing.NDArray[np.bool_] = self.corners < SLOW_SHARE * self.corners[-1]
+        return slow
 
     def spectrum(self, amplitudes: Array) -> Array:
         """Return S at the bands, (..., B), of amplitudes (..., J + 1) [N^2]."""
@@ -165,7 +166,8 @@ class NoiseSpectrum:
 
     @property
     def _is_slow(self) -> np.typing.NDArray[np.bool_]:
-        return self.corners < SLOW_SHARE * self.corners[-1]
+        slow: np.typing.NDArray[np.bool_] = self.corners < SLOW_SHARE * self.corners[-1]
+        return slow
 
     def _rms_of(self, chosen: np.typing.NDArray[np.bool_]) -> float:
         part = replace(self, amplitudes=np.where(chosen, self.amplitudes, 0.0))

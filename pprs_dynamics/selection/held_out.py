@@ -72,10 +72,10 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
         series = regression.series[d]
         at = np.searchsorted(series.index, edges)
         for k in range(BLOCKS):
-            part = slice(at[k], at[k + 1])
-            left = stacked[-1, part] - fits[k, index] @ stacked[:-1, part]
+            block = slice(at[k], at[k + 1])
+            left = stacked[-1, block] - fits[k, index] @ stacked[:-1, block]
             losses[k] += float(left @ left)
-            rest = (rows[-1, part] - plain[k, index] @ rows[:-1, part])[series.known[part]]
+            rest = (rows[-1, block] - plain[k, index] @ rows[:-1, block])[series.known[block]]
             squares, count = squares + float(rest @ rest), count + len(rest)
     # Numbers that are stretched beyond what is known of them cost their share in every block.
     losses += np.einsum('kp,pq,kq->k', fits, prior, fits) / BLOCKS

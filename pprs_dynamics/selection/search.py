@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain, combinations
 
 import numpy as np
@@ -226,7 +227,7 @@ class Search:
                 if (effect, d) not in taken:
                     price = library.prices.of_placement(effect, local.trials[effect.name])
                     found.setdefault(effect, []).append(
-                        (offer.gain - price, lambda offer=offer: library.full(offer)))
+                        (offer.gain - price, partial(library.full, offer)))
         best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
         for placement in (*library.structure, *library.spanning) if drive is None else ():
             key = (placement.term.effect, placement.drive)
@@ -235,7 +236,7 @@ class Search:
                 if key not in best or net > best[key][0]:
                     best[key] = (net, placement)
         for (effect, _), (net, placement) in best.items():
-            found.setdefault(effect, []).append((net, lambda placement=placement: placement))
+            found.setdefault(effect, []).append((net, partial(_same, placement)))
         return found
 
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
@@ -457,6 +458,10 @@ class Search:
             gap = float(known[at] - known[at - 1])
             reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
         return reach
+
+
+def _same(placement: Placement) -> Placement:
+    return placement
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
