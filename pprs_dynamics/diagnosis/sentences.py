@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, WithinModelError
@@ -399,7 +399,7 @@ def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
 
 def _following(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
-    repeat = files.command('diagnose', SECOND)
+    repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.verdict == 'unknown':
         return ('Look at that place on the machine, and record the motion again: what comes back '
                 'is the machine. Then diagnose both recordings', repeat)

@@ -1,0 +1,74 @@
+"""Rivals of adopted effects, fitted: what stands in their place in sets nearly as good."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.selection.estimates import Estimate, estimate
+from pprs_dynamics.selection.expansion import linear_prediction
+
+
+@dataclass(frozen=True)
+class RivalEffect:
+    """An effect that would explain the recordings about as well as an adopted one.
+
+    Parameters
+    ----------
+    of : str
+        The adopted effect.
+    effect : type of CatalogueEffect
+    drives : tuple of str or None
+    parameters : dict of str to Estimate
+    error_after : float
+        With it in place of the adopted one [N].
+    cost : float
+        Of its set, above the best one's.
+    force, remaining : (M, D) array
+        What it contributes, and what its set leaves [N].
+    """
+
+    of: str
+    effect: type[CatalogueEffect]
+    drives: tuple[str, ...] | None
+    parameters: dict[str, Estimate]
+    error_after: float
+    cost: float
+    force: Array
+    remaining: Array
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+
+def rival_effects(diagnosis: Diagnosis) -> tuple[RivalEffect, ...]:
+    """Return each rival that a diagnosis names, from the best set that holds it."""
+    selection = diagnosis.selection
+    if selection is None:
+        return ()
+    found = []
+    for of, name in ((names[0], name) for names in diagnosis.indistinguishable
+                     for name in names[1:]):
+        best = next((one for one in selection.ranked if name in {c.name for c in one.effects}
+                     and of not in {c.name for c in one.effects}), None)
+        if best is None:
+            continue
+        search = (selection.last if any(one is best for one in selection.last.evaluated.values())
+                  else selection.first)
+        candidate = next(c for c in best.effects if c.name == name)
+        measured = search.regression.residuals.measured
+        remaining = measured - linear_prediction(search, best)
+        drives = candidate.drives
+        found.append(RivalEffect(
+            of, candidate.effect,
+            None if drives is None else tuple(search.design.drives[d] for d in drives),
+            estimate(search, best, candidate).parameters,
+            float(np.sqrt(np.nanmean(remaining ** 2))), best.cost - selection.best.cost,
+            best.force(candidate, measured.shape), remaining))
+    return tuple(found)
