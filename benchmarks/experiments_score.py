@@ -189,7 +189,7 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
         'effect': name, 'seed': seed, 'scale': robot.scale, 'motion': start.how,
         'rivals': rivals_of(name, question),
         'promised': [list(pair) for pair in experiment.separates],
-        'probability': min((b.probability for b in experiment.bouts if b.truth == name),
+        'probability': min((b.probability for b in experiment.contests if b.truth == name),
                            default=1.0),
         'expected_evidence': experiment.expected_evidence,
         'largest_use': max(experiment.limits.values()), **cost}

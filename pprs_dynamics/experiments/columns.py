@@ -29,6 +29,7 @@ from pprs_dynamics.regression.base_columns import (
 )
 from pprs_dynamics.regression.design import Design, FullRate, Rows, Term
 from pprs_dynamics.regression.platform_sensitivities import ChunkSensitivities
+from pprs_dynamics.regression.sensitivities import DRIVE_WIDTHS
 from pprs_dynamics.residuals.residuals import Residuals
 
 HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
@@ -123,10 +124,17 @@ class ColumnPlan:
 
     @classmethod
     def of_design(cls, design: Design, terms: Sequence[FittedTerm]) -> ColumnPlan:
-        """Return the plan of a design's base columns and more."""
+        """Return the plan of a design's base columns and more.
+
+        A drive that stood has no columns of its reversals in the design, but may turn over in a
+        motion.
+        """
         assert isinstance(design.given, DriveModel)
         assert isinstance(design.model, DriveModel)
-        return cls(design.given, design.model, design.base, tuple(terms))
+        moved = {one.drive for one in design.base if isinstance(one, ReversalShape)}
+        stood = [drive for drive in range(len(DRIVES)) if drive not in moved]
+        return cls(design.given, design.model, (*design.base, *reversal_shapes(stood)),
+                   tuple(terms))
 
     @property
     def size(self) -> int:
@@ -151,7 +159,7 @@ class ColumnPlan:
 
     def on_recordings(self, design: Design) -> Columns:
         """Return all columns on the recordings of the design that the plan is of."""
-        return self._by_drive([one.rows for one in design.base], design)
+        return self._by_drive([one.rows for one in self.base], design)
 
     def on_motions(self, forces: DriveForces, time: Array, block: int = 1) -> list[Columns]:
         """Return the columns of motions one after the other, each at the same times.
@@ -257,3 +265,9 @@ def _felt(column: BaseColumn, rows: Rows) -> Rows:
         return {column.drive: rows[column.drive]}
     return rows
 
+
+
+def reversal_shapes(drives: Sequence[int]) -> list[ReversalShape]:
+    """Return the columns of reversals of drives, without rows."""
+    # One for every width, and one for friction that differs by direction while it turns over.
+    return [ReversalShape({}, 1.0, drive) for _ in (*DRIVE_WIDTHS, None) for drive in drives]

@@ -9,7 +9,7 @@ import numpy as np
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.experiments.columns import ColumnPlan, FittedTerm
+from pprs_dynamics.experiments.columns import ColumnPlan, FittedTerm, reversal_shapes
 from pprs_dynamics.experiments.criteria import Precision, free_of
 from pprs_dynamics.experiments.information import Information
 from pprs_dynamics.experiments.question import Question, subjects_of
@@ -28,7 +28,7 @@ from pprs_dynamics.regression.base_columns import (
 from pprs_dynamics.regression.design import FREE, Design
 from pprs_dynamics.regression.joint_fit import Regression
 from pprs_dynamics.regression.platform_sensitivities import PASSIVE_WIDTHS
-from pprs_dynamics.regression.sensitivities import DRIVE_WIDTHS, known_numbers
+from pprs_dynamics.regression.sensitivities import known_numbers
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.selection.candidates import Prices
 from pprs_dynamics.selection.decisions import DECISIONS
@@ -96,9 +96,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
 def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:
     """Return what is fitted on any recording of a model, as columns without rows."""
     base: list[BaseColumn] = [KnownNumber({}, 1.0, number) for number in known_numbers(model)]
-    # One for every width, and one for friction that differs by direction while it turns over.
-    base += [ReversalShape({}, 1.0, drive) for _ in (*DRIVE_WIDTHS, None)
-             for drive in range(len(DRIVES))]
+    base += reversal_shapes(range(len(DRIVES)))
     base += [ReversalShape({}, 1.0, None) for _ in PASSIVE_WIDTHS]
     for effect in model.effects:
         if isinstance(effect, CatalogueEffect):
