@@ -114,14 +114,19 @@ EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_
            'effects.payload_mass.mass': 0.1}
 
 
+@pytest.fixture(scope='module')
+def design(model: DriveModel, parameters: np.ndarray) -> Design:
+    """Columns on a recording of a robot that has effects already."""
+    model = build_robot({**model.values, **EFFECTS})
+    motion = FAMILY.path(parameters).motion(np.arange(0.0, DURATION, 0.002))
+    return Design.of(model, [recorded(model, motion, 0, 0.0)])
+
+
 def test_what_a_motion_would_tell_is_what_its_recording_tells(
-    model: DriveModel, parameters: np.ndarray,
+    design: Design, parameters: np.ndarray,
 ) -> None:
     """The columns on a motion nobody made agree with those of the diagnosis on its recording."""
-    model = build_robot({**model.values, **EFFECTS})
     path = FAMILY.path(parameters)
-    time = np.arange(0.0, DURATION, 0.002)
-    design = Design.of(model, [recorded(model, path.motion(time), 0, 0.0)])
     regression = Regression(design.residuals, design.base)
     white = np.zeros((6, len(regression.noise_shapes.corners) + 1))
     white[:, 0] = 0.05 ** 2
@@ -131,13 +136,32 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     known = information.of_recordings(design, regression, fit) - information.prior()
     # Smoothing drops half a window at either end, and the transform a few samples more.
     time = design.recordings[0].time[:5 * len(regression.series[0])]
-    columns = plan.on_motions(forces_of(model, [path], time), time, 5)[0]
+    columns = plan.on_motions(forces_of(plan.model, [path], time), time, 5)[0]
     told = information.of_motion(columns, len(time) * 0.002)
     scale = np.sqrt(np.diag(known))
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
     assert {type(one) for one in plan.base} == {
         KnownNumber, ReversalShape, PresentCoefficient, PresentShape}
+
+
+def test_a_drive_that_stood_may_turn_over_in_a_motion(
+    design: Design, parameters: np.ndarray,
+) -> None:
+    """A recording of a drive that stands has no columns of its reversals; a motion has them."""
+    stood = replace(design, base=tuple(
+        one for one in design.base if not (isinstance(one, ReversalShape) and one.drive == 2)))
+    time = np.arange(120) * DURATION / 120
+    found = []
+    for one in (design, stood):
+        plan = ColumnPlan.of_design(one, ())
+        forces = forces_of(plan.model, [FAMILY.path(parameters)], time)
+        index, rows = plan.on_motions(forces, time)[0][2]
+        mine = [k for k, at in enumerate(index) if isinstance(plan.base[at], ReversalShape)
+                and plan.base[at].drive == 2]
+        found.append(rows[mine])
+        assert np.all(np.abs(rows[mine]).max(axis=1) > 0.01)
+    assert np.array_equal(*found)
 
 
 def test_few_samples_tell_nearly_the_same(model: DriveModel, parameters: np.ndarray) -> None:
@@ -184,6 +208,18 @@ def test_a_rival_that_can_do_the_same_is_never_told() -> None:
     columns = np.column_stack((columns, columns @ (1.0, 2.0)))
     contest = Contest(_explained('a', (2,), [3.0]), _explained('b', (0, 1), [1.0, 1.0]), (0, 1))
     assert contest.misfit(columns.T @ columns) < 1e-4
+
+
+def test_a_rival_that_its_shape_says_all_of_is_not_scaled() -> None:
+    rng = np.random.default_rng(4)
+    columns = rng.normal(size=(60, 3))
+    # A delay of the wrong length does not become right by a factor.
+    rival = Explanation(('time_delay',), (), (), (1,), np.ones(1))
+    force, base = 3.0 * columns[:, 1] + columns[:, 0], columns[:, [2]]
+    left = force - columns[:, 1]
+    rest = left - base @ np.linalg.lstsq(base, left)[0]
+    contest = Contest(_explained('a', (0, 1), [1.0, 3.0]), rival, (2,))
+    assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
 
 
 def test_precision_is_the_scatter_of_estimates() -> None:
@@ -323,6 +359,9 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     assert ('coulomb_friction', 'load_friction') in pairs
     assert ('load_friction', 'coulomb_friction') in pairs
     assert ('coulomb_friction', 'asymmetric_friction') not in pairs
+    costs = {one.effects[0].name: one.cost for one in (adopted, free, other)}
+    for contest in question.contests:
+        assert contest.now == costs[contest.rival.name] - costs[contest.truth.name]
     # What the same motion tells again doubles the misfit and leaves the priors as they are.
     fine = np.arange(0.0, DURATION, 0.002)
     columns = question.plan.on_motions(forces_of(model, [path], fine), fine, 5)[0]
@@ -330,6 +369,8 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     for contest in question.contests:
         once = contest.misfit(question.known)
         assert once < contest.misfit(again) < 2.6 * once + 1.0
+        assert contest.evidence(question.known, again) == pytest.approx(
+            contest.now + contest.misfit(again) - once)
 
 
 # The command.
