@@ -92,8 +92,8 @@ def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> di
         diagnosis = diagnose(model, [recording])
         seconds = time.perf_counter() - start
         said = diagnosis.to_json()
-        selector = getattr(diagnosis, 'selector', None)
-        oracle = consult(selector, truth) if selector else {}
+        selection = getattr(diagnosis, 'selection', None)
+        oracle = consult(selection, truth) if selection else {}
     except Exception:  # the table counts it, and the run goes on
         return {'name': case.name, 'row': case.row, 'failed': traceback.format_exc()}
     said = {**said, 'candidates': said.get('candidates', [])[:CANDIDATES]}
