@@ -148,28 +148,28 @@ def test_a_step_taken_back_gives_the_old_file_to_the_byte(files: Files) -> None:
     assert all('#' in line for line in changed)
 
 
-def offered(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
-    return adopt(DriveModel.load(files.model), EffectRequest.of(text), files.recordings[:1], validation,
-                 diagnosis=files.diagnosis, **options)
+def requested(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
+    return adopt(DriveModel.load(files.model), EffectRequest.of(text), files.recordings[:1],
+                 validation, diagnosis=files.diagnosis, **options)
 
 
 @pytest.mark.parametrize('effect', [WRONG, 'payload_mass', 'time_delay', 'quadratic_friction'])
 def test_a_wrong_effect_is_refused_and_the_right_one_named(files: Files, effect: str) -> None:
-    answer = offered(files, effect)
+    answer = requested(files, effect)
     assert not answer.adopted
     assert f'{HIDDEN} on' in answer.reason
     assert 'explains these recordings better' in answer.reason
 
 
 def test_an_effect_that_makes_another_recording_worse_is_refused(files: Files) -> None:
-    answer = offered(files, HIDDEN, files.other_robot)
+    answer = requested(files, HIDDEN, files.other_robot)
     assert not answer.adopted
     assert 'the error on the validation recordings does not fall' in answer.reason
     assert answer.held_out_after > answer.held_out_before
 
 
 def test_blocks_of_the_same_recording_are_told_as_weak_evidence(files: Files) -> None:
-    answer = offered(files, HIDDEN)
+    answer = requested(files, HIDDEN)
     assert answer.adopted
     assert answer.held_out_on == 'blocks'
     assert any('weak evidence' in remark and '--validate' in remark
@@ -338,27 +338,27 @@ def test_the_loop_walks_by_itself_until_nothing_is_left(
 
 
 def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is offered once more after something else was adopted, and told in the end."""
+    """It is requested once more after something else was adopted, and told in the end."""
     effects = [SimpleNamespace(name=name, effect=SimpleNamespace(name=name), drives=('slide_1',),
                                evidence=100.0) for name in ('force_ripple', 'coulomb_friction')]
-    offered: list[str] = []
+    asked: list[str] = []
 
     def found(model: tuple[str, ...], *_: object) -> SimpleNamespace:
         left = tuple(one for one in effects if one.name not in model)
         return SimpleNamespace(effects=left, indistinguishable=(), depends_on=())
 
-    def answer(model: tuple[str, ...], offer: Offer, *_: object, **__: object) -> SimpleNamespace:
-        name = offer.effect.name
-        offered.append(name)
+    def answer(model: tuple[str, ...], request: EffectRequest, *_: object, **__: object) -> SimpleNamespace:
+        name = request.effect.name
+        asked.append(name)
         good = name != 'force_ripple'
-        return SimpleNamespace(offer=offer, adopted=good, reason='it does not fall', rivals=(),
+        return SimpleNamespace(request=request, effect=name, adopted=good, reason='it does not fall', rivals=(),
                                after=(*model, name) if good else model)
 
     for name, fake in (('diagnose', found), ('adopt', answer), ('original', lambda model: model),
-                       ('Offer', lambda effect, _: SimpleNamespace(effect=effect))):
+                       ('EffectRequest', lambda effect, _: SimpleNamespace(effect=effect))):
         monkeypatch.setattr(loop, name, fake)
     walk: Any = loop.adopt_all((), [])  # type: ignore[arg-type]
-    assert offered == ['force_ripple', 'coulomb_friction', 'force_ripple']
+    assert asked == ['force_ripple', 'coulomb_friction', 'force_ripple']
     assert walk.model == ('coulomb_friction',)
     assert (walk.ended, walk.reason) == ('refused', 'force_ripple: it does not fall')
 
@@ -379,10 +379,10 @@ def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> N
     assert len(first) == 64
 
 
-def test_an_offer_is_read_in_one_way() -> None:
-    offer = EffectRequest.of('coulomb_friction: lift_2,slide_1,lift_2')
-    assert offer.drives == ('slide_1', 'lift_2')
-    assert replace(offer, drives=None) == EffectRequest.of('coulomb_friction')
+def test_a_request_is_read_in_one_way() -> None:
+    request = EffectRequest.of('coulomb_friction: lift_2,slide_1,lift_2')
+    assert request.drives == ('slide_1', 'lift_2')
+    assert replace(request, drives=None) == EffectRequest.of('coulomb_friction')
 
 
 @pytest.mark.parametrize(('text', 'named'), [('coulomb_friction:slide_1,lift_1', 'slide_1'),

@@ -8,21 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pprs_dynamics.diagnosis.noise import (
-    effective_samples,
-    find_repetition,
-    fit_noise,
-    unrepeated,
-)
 from scipy.signal import lfilter
 
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import Localisation
+from pprs_dynamics.regression.joint_fit import Regression
+from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
 
 PERIOD = 0.01
-NOWHERE = Localisation((), {}, np.inf)
+NOWHERE = Localisation((), {})
 
 
 def ar1(phi: float, samples: int, rng: np.random.Generator) -> np.ndarray:
@@ -42,6 +38,12 @@ def recording(error: np.ndarray, effort: np.ndarray) -> Residuals:
         model, {'rigid_body': 0.9 * model, 'passive_friction': 0.1 * model},
         {'position': np.stack([np.sin(time + k) for k in range(width)], axis=1),
          'velocity': np.stack([np.cos(time + k) for k in range(width)], axis=1)}, PERIOD)
+
+
+def noise_of(residuals: Residuals) -> NoiseSpectrum:
+    """Return the noise of the first drive."""
+    regression = Regression(residuals)
+    return regression.noise(regression.fit(()))[0]
 
 
 @pytest.mark.parametrize('width', [1, 6])
@@ -112,66 +114,13 @@ def test_noise_is_called_noise_and_an_error_beyond_it_is_set_against_the_models_
     assert 'more than passive friction contributes' in loud.verdict
 
 
-@pytest.mark.parametrize('phi', [0.0, 0.9, 0.97])
-def test_effective_samples_of_ar1_noise_follow_its_correlation(phi: float) -> None:
-    rng = np.random.default_rng(7)
-    found = [effective_samples(fit_noise(ar1(phi, 8000, rng), [slice(0, 8000)]), 8000)
-             for _ in range(9)]
-    # phi is known to sqrt((1 - phi^2) / N), which at 0.97 is 9 % of 1 - phi, and thrice that
-    # over nine records' median is ample.
-    assert np.median(found) == pytest.approx(8000 * (1 - phi) / (1 + phi), rel=0.15)
-
-
-def test_noise_near_a_unit_root_is_not_taken_for_faster_noise() -> None:
-    rng = np.random.default_rng(8)
-    distance = [fit_noise(ar1(0.998, 4000, rng), [slice(0, 4000)]).filter.sum()
-                for _ in range(30)]
-    # Yule-Walker on these records gives about 0.004; what is true is 0.002.
-    assert 0.001 < np.median(distance) < 0.0032
-
-
-@pytest.mark.parametrize('phi', [0.0, 0.97])
-def test_whitened_noise_is_white_of_unit_variance_also_across_segments(phi: float) -> None:
-    rng = np.random.default_rng(9)
-    stretches = [slice(0, 1500), slice(1500, 1600), slice(1650, 4000)]
-    noise = np.concatenate([ar1(phi, 1500, rng), ar1(phi, 100, rng), np.zeros(50),
-                            ar1(phi, 2350, rng)])
-    model = fit_noise(noise, stretches)
-    white = model.whiten(noise, stretches)
-    assert np.all(white[1600:1650] == 0)
-    used = np.concatenate([white[part] for part in stretches])
-    # Variance of N samples is known to sqrt(2 / N) = 0.023, a correlation to 1 / sqrt(N) = 0.016.
-    assert used.var() == pytest.approx(1, abs=0.1)
-    for lag in (1, 5, 50):
-        assert abs(np.mean(used[lag:] * used[:-lag])) < 0.07
-
-
-def test_surrogates_have_the_spread_and_memory_of_the_noise_they_stand_for() -> None:
-    rng = np.random.default_rng(10)
-    model = fit_noise(0.2 * ar1(0.9, 8000, rng), [slice(0, 8000)])
-    copies = model.surrogate(8000, rng, 8)
-    assert copies.std() == pytest.approx(0.2, rel=0.1)
-    assert np.mean(copies[:, 1:] * copies[:, :-1]) / copies.var() == pytest.approx(0.9, abs=0.02)
-
-
-def test_what_does_not_repeat_is_the_noise_of_a_periodic_motion() -> None:
-    rng = np.random.default_rng(11)
-    time = PERIOD * np.arange(4000)
-    turn = 2 * np.pi * time / 6.4
-    positions = np.stack((np.sin(turn), np.cos(turn) + 0.5 * np.sin(3 * turn)), axis=1)
-    assert find_repetition(positions + 1e-6 * rng.normal(size=positions.shape)) == 640
-    error = np.sin(turn) + 0.1 * rng.normal(size=4000)
-    assert unrepeated(error, 640) == pytest.approx(0.1, rel=0.06)
-    assert find_repetition(np.cumsum(rng.normal(size=(4000, 2)), axis=0)) is None
-
-
 def test_profiles_hold_the_mean_within_their_uncertainty() -> None:
     rng = np.random.default_rng(12)
     off = []
     for _ in range(20):
         noise = ar1(0.9, 3000, rng)[:, None]
         profile = error_profile(recording(noise + 0.7, np.zeros((3000, 1))), 0, 'position',
-                                fit_noise(noise[:, 0], [slice(0, 3000)]))
+                                noise_of(recording(noise, np.zeros((3000, 1)))))
         assert profile is not None
         assert profile.samples.sum() == 3000
         off.append((profile.mean - 0.7) / profile.uncertainty)
@@ -183,7 +132,8 @@ def test_spectrum_shows_a_vibration_at_its_frequency_above_the_background() -> N
     rng = np.random.default_rng(13)
     time = PERIOD * np.arange(4000)
     error = (0.1 * rng.normal(size=4000) + 0.3 * np.sin(2 * np.pi * 12.5 * time))[:, None]
-    spectrum = error_spectrum(recording(error, np.zeros_like(error)), 0)
+    residuals = recording(error, np.zeros_like(error))
+    spectrum = error_spectrum(residuals, 0, noise_of(residuals))
     top = int(np.argmax(spectrum.power))
     assert spectrum.frequency[top] == pytest.approx(12.5, abs=0.05)
     quiet = np.abs(spectrum.frequency - 12.5) > 5
@@ -200,3 +150,26 @@ def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:
             ({'model': np.full((50, 2), np.inf)}, 'not finite')]:
         with pytest.raises(ResidualsError, match=words.replace('[', r'\[')):
             replace(right, **change)
+
+
+def test_a_vibration_on_one_drive_is_told_and_no_noise() -> None:
+    rng = np.random.default_rng(15)
+    time = PERIOD * np.arange(4000)
+    error = 0.05 * rng.normal(size=(4000, 6))
+    error[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * time)
+    found = compare(recording(error, 3 * np.sin(0.7 * time)[:, None] * np.ones(6)))
+    assert [(one.drive, one.variable) for one in found.localisation.statements] == [
+        ('drive_3', 'frequency')]
+    assert found.drives['drive_3'].grade == 'poor'
+    assert found.drives['drive_3'].noise_floor == pytest.approx(0.05, rel=0.1)
+    assert 'noise accounts for it on every drive' not in found.verdict
+
+
+def test_a_drive_that_drifts_far_more_than_its_peers_is_told() -> None:
+    rng = np.random.default_rng(16)
+    error = 0.05 * rng.normal(size=(4000, 6))
+    error[:, 2] += 0.5 * ar1(0.995, 4000, rng)
+    found = compare(recording(error, np.ones((4000, 6)) * np.sin(np.arange(4000) / 90)[:, None]))
+    assert ('drive_2', 'time') in [(one.drive, one.variable)
+                                   for one in found.localisation.statements]
+    assert found.drives['drive_2'].grade != 'noise'

@@ -24,7 +24,7 @@ def made_up(seed: int = 0) -> tuple[Regression, list[Block]]:
             BaseColumn({1: rng.normal(size=SAMPLES)}, 4.0)]
     regression = Regression(residuals, base)
     blocks = [regression.block({0: rng.normal(size=(2, SAMPLES))}),
-              regression.block({0: rng.normal(size=(1, SAMPLES)), 1: rng.normal(size=(1, SAMPLES))}),
+              regression.block({d: rng.normal(size=(1, SAMPLES)) for d in (0, 1)}),
               regression.block({1: rng.normal(size=(1, SAMPLES))}, is_fixed=True,
                                precision=np.zeros((0, 0)))]
     return regression, blocks

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pprs_dynamics.diagnosis.joint_fit import Regression
 from ros_processes import environment, executable
 
 from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
@@ -20,7 +19,10 @@ from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import HelicalPath
 from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.model.model_file import build_model, build_robot, read_parameters
+from pprs_dynamics.regression.base_columns import KnownNumber
 from pprs_dynamics.regression.design import Design, sensitivities_of
+from pprs_dynamics.selection.decisions import DECISIONS
+from pprs_dynamics.selection.search import Search
 
 CONFIG = Path(__file__).parents[1] / 'config'
 FILE = CONFIG / 'single_axis.yaml'
@@ -165,7 +167,7 @@ def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
                          **tolerances})
     design = Design.of(model, [bench(1)])
     for column in design.base:
-        if column.number is None:
+        if not isinstance(column, KnownNumber):
             continue
         value, moved = column.number.value, 0.001
         # Away from 0 by a share of one standard deviation.
@@ -181,7 +183,7 @@ def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
               'tolerances.masses.centre': 0.1, 'tolerances.gravity': 0.1}
     model = build_robot(values)
     forces = model.drive_forces(HelicalPath().motion(np.arange(0.0, 1.0, 0.1)))
-    found = sensitivities_of(model)
+    found = sensitivities_of(model, model)
     columns = found.columns(forces)['numbers']
     assert len(found.numbers) == 3
     for number, column in zip(found.numbers, columns, strict=True):
@@ -198,13 +200,12 @@ def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
 
 def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
     model = build_model({**VALUES, 'tolerances.axis.offset': 1.0})
-    regression = Regression(Design.of(model, [bench(3, hidden=False, offset=-0.5)]))
-    noises = {d: series.fit_noise(series.error) for d, series in regression.series.items()}
-    fit = regression.fit((), noises)
-    place = next(k for k, column in enumerate(regression.design.base) if column.number)
-    number = regression.design.base[place].number
-    assert number is not None
-    assert OFFSET - fit.coefficients[place] * number.deviation == pytest.approx(-2.5, abs=0.02)
+    design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
+    found = Search(design, DECISIONS, with_unknown=False).evaluate(())
+    place, number = next((k, column.number) for k, column in enumerate(design.base)
+                         if isinstance(column, KnownNumber))
+    assert OFFSET - found.fit.coefficients[place] * number.deviation == pytest.approx(
+        -2.5, abs=0.02)
 
 
 def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:

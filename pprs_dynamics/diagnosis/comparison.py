@@ -10,11 +10,14 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
+from pprs_dynamics.diagnosis.quantities import newtons, percent
+from pprs_dynamics.diagnosis.statements import Statement
 from pprs_dynamics.residuals.residuals import Residuals
 
 # What is left beyond noise is nothing to speak of below this share of the noise itself: the
 # noise is known to about a tenth, and sqrt(1.1^2 - 1) = 0.46.
 NOISE_SHARE = 0.46
+LEAST_SHARE = 0.01  # of a drive's squared error, that a statement must explain to be made
 GOOD, POOR = 0.05, 0.2  # relative unexplained error below which a model is good, above poor
 # Of the effort's size, below which a changing effort is rounding.
 CONSTANT = 1e-9
@@ -85,6 +88,14 @@ class Comparison:
     verdict: str
     localisation: Localisation
 
+    @property
+    def where(self) -> tuple[Statement, ...]:
+        """Where it fails, what explains most of the squared error first, and nothing slight."""
+        shares = {one: one.mean_square / max(self.drives[one.drive].rms ** 2, 1e-300)
+                  for one in self.localisation.statements if one.drive in self.drives}
+        told = [one for one, share in shares.items() if share >= LEAST_SHARE]
+        return tuple(sorted(told, key=lambda one: -one.mean_square))
+
     def to_json(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
         return {
@@ -92,7 +103,7 @@ class Comparison:
                               for key in ('rms', 'relative', 'bias', 'peak')}
                        for name, drive in self.drives.items()},
             'overall': {'rms': _number(self.rms), 'relative': _number(self.relative)},
-            'where': [statement.to_json() for statement in self.localisation.statements]}
+            'where': [statement.to_json() for statement in self.where]}
 
 
 def compare(residuals: Residuals, localisation: Localisation | None = None) -> Comparison:
@@ -171,34 +182,33 @@ def _verdict(
     parts: Mapping[str, float], grade: str,
 ) -> str:
     of = ('of a constant effort' if np.isnan(relative)
-          else f'of {swing:.3g} N ({relative:.2g} of it)' if relative > 9.995
-          else f'of {swing:.3g} N ({100 * relative:.2g} %)')
-    left = f'the model leaves {rms:.3g} N {of}; '
+          else f'of {newtons(swing)} ({percent(relative)})')
+    left = f'the model leaves {newtons(rms)} {of}; '
     if rms == 0:
         return f'the model leaves nothing {of}'
     if grade == 'noise':
         return left + 'noise accounts for it: nothing else stands out in this recording'
-    left += f'noise accounts for {floor:.3g} N, so {unexplained:.3g} N is unexplained'
+    left += (f'noise accounts for {newtons(floor)}, so {newtons(unexplained)} is unexplained')
     ranked = sorted(((size, part) for part, size in parts.items() if size > 0), reverse=True)
     below = [(size, part) for size, part in ranked if size < unexplained]
     if below:
         size, part = below[0]
-        left += f' - more than {part.replace("_", " ")} contributes ({size:.3g} N)'
+        left += f' - more than {part.replace("_", " ")} contributes ({newtons(size)})'
     elif ranked:
         size, part = ranked[-1]
-        left += f' - less than {part.replace("_", " ")} contributes ({size:.3g} N)'
+        left += f' - less than {part.replace("_", " ")} contributes ({newtons(size)})'
     return f'{left}: {grade}'
 
 
 def _overall_verdict(drives: Mapping[str, DriveComparison], rms: float, relative: float) -> str:
-    share = '' if np.isnan(relative) else f' ({100 * relative:.2g} % of the effort)'
+    share = '' if np.isnan(relative) else f' ({percent(relative)} of the effort)'
     beyond = {name: drive for name, drive in drives.items() if drive.grade != 'noise'}
     if not beyond:
-        return f'the model leaves {rms:.3g} N{share}: noise accounts for it on every drive'
+        return f'the model leaves {newtons(rms)}{share}: noise accounts for it on every drive'
     worst = max(beyond, key=lambda name: beyond[name].unexplained)
     where = 'every drive' if len(beyond) == len(drives) > 1 else ', '.join(beyond)
-    return (f'the model leaves {rms:.3g} N{share}: more than noise on {where}; '
-            f'worst on {worst}, {beyond[worst].unexplained:.3g} N unexplained '
+    return (f'the model leaves {newtons(rms)}{share}: more than noise on {where}; '
+            f'worst on {worst}, {newtons(beyond[worst].unexplained)} unexplained '
             f'({beyond[worst].grade})')
 
 

@@ -68,20 +68,6 @@ def partial_residual(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> 
                            _largest_span(without, force))
 
 
-def remaining_profile(diagnosis: Diagnosis, drive: str, variable: str) -> Profile | None:
-    """Return the mean of what remains on a drive along a variable of the interface."""
-    residuals, noise = remaining_residuals(diagnosis), diagnosis.noise.get(drive)
-    if noise is None:
-        return None
-    name, of, other = variable.partition(' of ')
-    if of:
-        values = residuals.variable(name, residuals.drives.index(other))
-        if values is None:
-            return None
-        residuals = replace(residuals, variables={**residuals.variables, variable: values})
-    return error_profile(residuals, residuals.drives.index(drive), variable, noise, FINE_BINS)
-
-
 def remaining_residuals(diagnosis: Diagnosis) -> Residuals:
     """Return the residuals in which what remains is all of the error."""
     return _with_error(diagnosis.residuals, diagnosis.remaining)

@@ -1,4 +1,4 @@
-"""A few steps uphill within limits, by scipy's sequential quadratic programming.
+"""A few steps upknown within limits, by scipy's sequential quadratic programming.
 
 The criterion is dear and, since drives turn over in a millimetre per second, rough: slopes are
 differences over wide steps, and each round stays near where they were taken.
@@ -24,7 +24,7 @@ Evaluation = Callable[[Array], tuple[Array, Array]]
 """Rows of parameters (M, p) -> values (M,) and room to each limit (M, L), 0 at the limit."""
 
 
-class _Hill:
+class _Evaluated:
     """Values and slopes of an evaluation, each computed once."""
 
     def __init__(self, evaluated: Evaluation, start: Array) -> None:
@@ -73,18 +73,18 @@ def climb(start: Array, evaluated: Evaluation, put_back: Callable[[Array], Array
     put_back : callable
         Returns parameters moved onto the limits: these hold to first order only.
     """
-    hill = _Hill(evaluated, start)
+    known = _Evaluated(evaluated, start)
     best, trust = start, TRUST
     for _ in range(ROUNDS):
         room = trust * np.abs(best).max()
         result = minimize(  # type: ignore[call-overload]
-            lambda z: -hill.at(z)[0], best, jac=lambda z: -hill.slopes(z)[0], method='SLSQP',
+            lambda z: -known.at(z)[0], best, jac=lambda z: -known.slopes(z)[0], method='SLSQP',
             bounds=Bounds(best - room, best + room),
-            constraints={'type': 'ineq', 'fun': lambda z: hill.at(z)[1],
-                         'jac': lambda z: hill.slopes(z)[1]},
+            constraints={'type': 'ineq', 'fun': lambda z: known.at(z)[1],
+                         'jac': lambda z: known.slopes(z)[1]},
             options={'maxiter': ITERATIONS, 'ftol': 1e-3})
         moved = put_back(result.x)
-        if hill.at(moved)[0] > hill.at(best)[0]:
+        if known.at(moved)[0] > known.at(best)[0]:
             best = moved
         else:
             trust /= 2

@@ -144,14 +144,12 @@ class Experiment:
     def text(self) -> str:
         """What it is for, and whether it will do, in one or two sentences."""
         if self.kind == 'separate':
-            told = [f'{a} from {b}' for a, b in self.separates]
-            left = [f'{a} from {b}' for a, b in self.fails]
             found = []
-            if told:
-                found.append(f'This motion tells {", ".join(told)}: evidence of '
+            if self.separates:
+                found.append(f'This motion tells {_listed(self.separates)}: evidence of '
                              f'{self.expected_evidence:.0f} is expected.')
-            if left:
-                found.append(f'It will hardly tell {", ".join(left)}: no motion within these '
+            if self.fails:
+                found.append(f'It will hardly tell {_listed(self.fails)}: no motion within these '
                              'limits that was tried does so for sure.')
             return ' '.join(found)
         last = (f' At the size at which they matter it would not show {", ".join(self.hidden)}: '
@@ -176,6 +174,12 @@ class Experiment:
                 'contests': [one.to_json() for one in self.contests],
                 'accuracy': [one.to_json() for one in self.accuracies],
                 'limits': self.limits, 'duration': self.duration}
+
+
+def _listed(pairs: Sequence[tuple[str, str]]) -> str:
+    """Return pairs in words, those of one effect together."""
+    return '; '.join(f'{name} from {", ".join(other for one, other in pairs if one == name)}'
+                     for name in dict.fromkeys(one for one, _ in pairs))
 
 
 def next_experiment(

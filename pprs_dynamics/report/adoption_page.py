@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.adoption.adopt import Adoption
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.diagnosis.error_steps import ErrorStep
+from pprs_dynamics.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.report.adoption_tables import error_rows, headline, parameter_rows
-from pprs_dynamics.report.comparison_figures import LINES, curve
-from pprs_dynamics.report.diagnosis_figures import before_and_after, waterfall
-from pprs_dynamics.report.page import Page, plotly_objects
+from pprs_dynamics.report.diagnosis_figures import before_and_after, contributions
+from pprs_dynamics.report.page import ErrorRow, Page
 from pprs_dynamics.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.residuals.residuals import Residuals
 
@@ -30,64 +27,47 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     held = (f' Held out: {", ".join(one.name for one in validation)}.' if validation else '')
     page.text(f'Model: {Path(answer.before.source).name or "built in memory"}. Recordings: '
               f'{", ".join(one.name for one in recordings)}.{held}', 'note')
-    page.table(('error on', 'before [N]', 'after [N]', 'change'), error_rows(answer))
+    errors, fallen = rms_by_drive(before), rms_by_drive(after)
+    page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
+                          answer.noise_floor),
+                 *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
+                   for name in errors)],
+                'Error on the recordings, rms, before (grey) and with it (blue); dotted: the '
+                'noise.')
+    page.table(('error on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
+               caption='What was fitted to, and what decides.')
     page.bullets(answer.remarks)
-    page.heading('The error falls')
-    page.text('Root of the mean square; dashed is the noise.', 'note')
-    page.figure(waterfall([_step('model as given', before), _step(answer.effect, after)],
-                          before.drives, answer.noise_floor, answer.noise_floors))
     if answer.parameters:
-        page.heading('What it is')
-        page.table(('parameter', 'value', '± 2 standard deviations', 'unit'),
-                   parameter_rows(answer))
-    parts = _contributions(answer, after)
-    if parts is not None:
-        page.heading('What each added effect contributes')
-        page.figure(parts)
-    page.heading('Before and after')
-    for drive, name in enumerate(before.drives):
-        if name in answer.noise_floors:
-            page.figure(before_and_after(before, after, drive, answer.noise_floors[name]))
+        page.table(('parameter', '± two standard deviations'), parameter_rows(answer),
+                   caption='Its values')
+    _over_time(page, answer, after)
+    with page.fold('Every drive over time, before and after'):
+        page.text('Dotted: two standard deviations of the noise. Drag to zoom, on all drives at '
+                  'once; double-click to return.', 'note')
+        for drive, name in enumerate(before.drives):
+            if name in answer.noise_floors:
+                page.figure(before_and_after(before, after, drive, answer.noise_floors[name]),
+                            f'{name}: effort and error, before and with {answer.effect}.',
+                            over_time=True)
     if answer.calibrated:
-        page.heading('Numbers of the model that move within their tolerances')
-        page.table(('number', 'before', 'after', 'unit'),
-                   [(one.label, f'{one.before:.6g}', f'{one.after:.6g} ± {2 * one.std:.2g}',
-                     one.unit) for one in answer.calibrated])
+        with page.fold('Numbers of the model that move within their tolerances'):
+            page.table(('number', 'before', 'after'),
+                       [(one.label, with_uncertainty(one.before, 0.0, one.unit),
+                         with_uncertainty(one.after, one.std, one.unit))
+                        for one in answer.calibrated])
     return page
 
 
-def _step(label: str, residuals: Residuals) -> ErrorStep:
-    return ErrorStep(label, float(np.sqrt(np.nanmean(residuals.error ** 2))), _by_drive(residuals))
-
-
-def _by_drive(residuals: Residuals) -> Array:
-    found = rms_by_drive(residuals)
-    return np.array([found.get(drive, np.nan) for drive in residuals.drives])
-
-
-def _contributions(answer: Adoption, residuals: Residuals) -> Any | None:
-    """Return the forces of added effects over time, a menu of drives; None for none."""
-    go = plotly_objects()
-    names = [effect.name for effect in answer.after.effects
-             if isinstance(effect, CatalogueEffect) and effect.name in residuals.parts]
-    figure, owners = go.Figure(), list[int]()
-    for drive in range(len(residuals.drives)):
-        for number, name in enumerate(names):
-            force = residuals.parts[name][:, drive]
-            if np.any(force):
-                time, shown = curve(residuals, force)
-                figure.add_trace(go.Scatter(
-                    x=time, y=shown, name=name, mode='lines', showlegend=True,
-                    visible=not owners or owners[0] == drive,
-                    line={'color': LINES[number % len(LINES)], 'width': 1.3}))
-                owners.append(drive)
-    if not owners:
-        return None
-    figure.update_layout(
-        template='plotly_white', height=340, xaxis_title='time [s]', yaxis_title='force [N]',
-        margin={'l': 60, 'r': 20, 't': 50, 'b': 45}, updatemenus=[{
-            'x': 0.0, 'y': 1.02, 'xanchor': 'left', 'yanchor': 'bottom', 'buttons': [
-                {'label': residuals.drives[drive], 'method': 'update',
-                 'args': [{'visible': [owner == drive for owner in owners]}]}
-                for drive in sorted(set(owners))]}])
-    return figure
+def _over_time(page: Page, answer: Adoption, after: Residuals) -> None:
+    """Add the forces of added effects."""
+    forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
+              if isinstance(effect, CatalogueEffect) and effect.name in after.parts}
+    size = sum((np.mean(force ** 2, axis=0) for force in forces.values()),
+               np.zeros(len(after.drives)))
+    if not np.any(size):
+        return
+    with page.fold('What each added effect contributes'):
+        page.menu('Drive', [name for d, name in enumerate(after.drives) if size[d]],
+                  after.drives[int(np.argmax(size))])
+        page.figure(contributions(after, forces), 'What each added effect contributes.',
+                    over_time=True)

@@ -29,17 +29,17 @@ def headline(answer: Adoption) -> str:
     return f'{answer.effect}{on} is adopted: {answer.reason}.'
 
 
-def parameter_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
-    """Return name, value, two standard deviations and unit of each parameter that is not 0."""
-    return [(key, f'{one.value:.6g}', 'not known' if one.std != one.std else f'{2 * one.std:.2g}',
-             one.unit) for key, one in answer.parameters.items() if one.value != 0.0]
+def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
+    """Return each parameter that is not 0, and its value ± two standard deviations."""
+    return [(key, with_uncertainty(one.value, one.std, one.unit))
+            for key, one in answer.parameters.items() if one.value != 0.0]
 
 
 def error_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
     """Return what was measured on, errors before and after [N], and their change."""
     held = ('validation recordings' if answer.held_out_on == VALIDATION
             else 'held-out blocks of the recordings')
-    return [(label, f'{before:.4f}', f'{after:.4f}',
+    return [(label, f'{before:.3f}', f'{after:.3f}',
              f'{after / before - 1:+.1%}' if before else '') for label, before, after in (
                  ('recordings', answer.error_before, answer.error_after),
                  (held, answer.held_out_before, answer.held_out_after))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -9,8 +10,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.comparison import Comparison
+from pprs_dynamics.diagnosis.statements import UNITS, WORDS, Statement
 from pprs_dynamics.report.page import plotly_objects
-from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
+from pprs_dynamics.residuals.noise import NoiseSpectrum
+from pprs_dynamics.residuals.profiles import Profile, error_profile, error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'
@@ -19,31 +22,34 @@ POINTS = 1500  # pairs of extremes shown per curve; a screen has fewer columns
 WORST_SPANS = 3
 WORST_DURATION = 1.0  # [s]
 MAP_CELLS = 20
-# The variables shown, with their units as axis labels.
-VARIABLES = {
-    'velocity': 'velocity [m/s]', 'position': 'position [m]',
-    'acceleration': 'acceleration [m/s²]', 'load': 'guide load [N]',
-    'rod_angle': 'rod angle [rad]', 'time': 'time [s]', 'platform_x': 'platform x [m]',
-    'platform_y': 'platform y [m]', 'platform_z': 'platform z [m]',
-    'platform_tilt': 'platform tilt [rad]', 'platform_turn': 'platform turn [rad]'}
+FINE_BINS = 24
+VARIABLES = ('velocity', 'position', 'acceleration', 'load', 'rod_angle', 'time', 'platform_x',
+             'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
+MARGIN = {'l': 55, 'r': 15, 't': 30, 'b': 40}
+LEGEND = {'orientation': 'h', 'y': 1.02, 'x': 0.0, 'yanchor': 'bottom', 'xanchor': 'left'}
+# The unit stands at the last tick and in what the cursor shows.
+SECONDS = {'ticksuffix': ' s', 'showticksuffix': 'last', 'hoverformat': '.3f'}
+IN_NEWTONS = '%{y:.3f} N'
 
 
-def thinned(time: Array, values: Array, points: int = POINTS) -> tuple[Array, Array]:
-    """Return at most 2 `points` samples that keep every peak: the extremes of equal spans.
+def thinned(time: Array, *curves: Array, points: int = POINTS) -> tuple[Array, ...]:
+    """Return at most 2 `points` samples, the same of all curves, that keep every peak of each.
 
-    Samples that are not finite are left out where their span has others.
+    They are the extremes of equal spans. Samples that are not finite are left out where their
+    span has others.
     """
     if len(time) <= 2 * points:
-        return time, values
-    edges = np.linspace(0, len(time), points + 1).astype(int)
-    kept = []
+        return time, *curves
+    edges = np.linspace(0, len(time), points // len(curves) + 1).astype(int)
+    kept: list[int] = []
     for start, stop in pairwise(edges.tolist()):
-        part = values[start:stop]
-        if np.isfinite(part).any():
-            kept += sorted({start + int(np.nanargmin(part)), start + int(np.nanargmax(part))})
-        else:
-            kept.append(start)
-    return time[kept], values[kept]
+        found = set()
+        for values in curves:
+            part = values[start:stop]
+            if np.isfinite(part).any():
+                found |= {start + int(np.nanargmin(part)), start + int(np.nanargmax(part))}
+        kept += sorted(found or {start})
+    return tuple(values[kept] for values in (time, *curves))
 
 
 def over_time(residuals: Residuals, drive: int, worst: list[tuple[float, float]]) -> Any:
@@ -53,20 +59,27 @@ def over_time(residuals: Residuals, drive: int, worst: list[tuple[float, float]]
 
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06,
                            row_heights=[0.6, 0.4])
-    curves = (('measured', residuals.measured, MEASURED, 1), ('model', residuals.model, MODEL, 1),
-              ('measured minus model', residuals.error, ERROR, 2))
-    for name, values, colour, row in curves:
-        time, shown = curve(residuals, values[:, drive])
-        figure.add_trace(go.Scatter(x=time, y=shown, name=name, mode='lines',
+    time, measured, model = curves_of(residuals, residuals.measured[:, drive],
+                                      residuals.model[:, drive])
+    for name, values, colour, row in (
+            ('measured', measured, MEASURED, 1), ('model', model, MODEL, 1),
+            ('measured minus model', measured - model, ERROR, 2)):
+        figure.add_trace(go.Scatter(x=time, y=values, name=name, mode='lines',
+                                    hovertemplate=IN_NEWTONS,
                                     line={'color': colour, 'width': 1.3}), row=row, col=1)
     for start, end in worst:
         figure.add_vrect(x0=start, x1=end, fillcolor=MARK, opacity=0.25, line_width=0)
+    return in_two_rows(figure, residuals.drives[drive])
+
+
+def in_two_rows(figure: Any, drive: str) -> Any:
+    """Lay out efforts above errors over one time axis."""
+    figure.update_xaxes(**SECONDS)
     figure.update_yaxes(title_text='effort [N]', row=1, col=1)
     figure.update_yaxes(title_text='error [N]', row=2, col=1)
     figure.update_xaxes(title_text='time [s]', row=2, col=1)
-    figure.update_layout(template='plotly_white', height=430, title=residuals.drives[drive],
-                         hovermode='x unified', legend={'orientation': 'h', 'y': 1.12, 'x': 0.3},
-                         margin={'l': 60, 'r': 20, 't': 60, 'b': 45})
+    figure.update_layout(height=400, hovermode='x unified', margin={**MARGIN, 't': 55},
+                         legend={**LEGEND, 'title': {'text': f'<b>{drive}</b>'}})
     return figure
 
 
@@ -87,112 +100,178 @@ def worst_spans(residuals: Residuals, drive: int) -> list[tuple[float, float]]:
     return spans
 
 
-def against_variables(residuals: Residuals, comparison: Comparison) -> Any:
-    """Return mean error over bins of every variable, with its uncertainty; a menu of drives."""
+def against_variables(residuals: Residuals, comparison: Comparison) -> list[tuple[Any, str]]:
+    """Return mean error over bins of every variable with its uncertainty, and captions."""
     go = plotly_objects()
-    from plotly.subplots import make_subplots
-
-    names = [name for name in VARIABLES if residuals.variable(name, 0) is not None]
-    columns = 3
-    rows = -(-len(names) // columns)
-    figure = make_subplots(rows=rows, cols=columns, vertical_spacing=0.09,
-                           horizontal_spacing=0.07)
-    owners = []
-    for drive, drive_name in enumerate(residuals.drives):
-        noise = comparison.localisation.drives[drive_name].noise
-        for number, name in enumerate(names):
+    figures = []
+    for name in VARIABLES:
+        if residuals.variable(name, 0) is None:
+            continue
+        factor, label = axis_of(name)
+        figure = go.Figure()
+        for drive, drive_name in enumerate(residuals.drives):
+            noise = comparison.localisation.drives[drive_name].noise
             profile = None if noise is None else error_profile(residuals, drive, name, noise)
-            if profile is None:
-                continue
-            middle = (profile.edges[1:] + profile.edges[:-1]) / 2
-            figure.add_trace(go.Scatter(
-                x=middle, y=profile.mean, mode='lines+markers', visible=drive == 0,
-                line={'color': ERROR}, marker={'size': 5}, showlegend=False,
-                error_y={'type': 'data', 'array': 2 * profile.uncertainty, 'width': 0,
-                         'thickness': 1},
-                hovertemplate='%{x:.4g}: %{y:.4f} N<extra></extra>'),
-                row=number // columns + 1, col=number % columns + 1)
-            owners.append(drive)
-    for number, name in enumerate(names):
-        place = {'row': number // columns + 1, 'col': number % columns + 1}
-        figure.update_xaxes(title_text=VARIABLES[name], title_standoff=4, **place)
-        figure.add_hline(y=0, line={'color': MEASURED, 'width': 0.8}, **place)
-    figure.update_yaxes(title_text='mean error [N]', col=1)
-    figure.update_layout(template='plotly_white', height=260 * rows + 60,
-                         margin={'l': 60, 'r': 20, 't': 50, 'b': 45},
-                         updatemenus=[_menu(residuals.drives, owners)])
+            if profile is not None:
+                figure.add_trace(_means(go, profile, factor, name, {'drive': drive_name}))
+        figure.add_hline(y=0, line={'color': MEASURED, 'width': 0.8})
+        figure.update_layout(height=240, margin={**MARGIN, 't': 10}, showlegend=False,
+                             xaxis_title=label, yaxis_title='mean error [N]')
+        figures.append((figure, f'Against {WORDS.get(name, name)}.'))
+    return figures
+
+
+def _means(go: Any, profile: Profile, factor: float, variable: str, meta: Any = None) -> Any:
+    middle = factor * (profile.edges[1:] + profile.edges[:-1]) / 2
+    return go.Scatter(
+        x=middle, y=profile.mean, mode='lines+markers', line={'color': ERROR}, meta=meta,
+        marker={'size': 5}, name='mean', error_y={
+            'type': 'data', 'array': 2 * profile.uncertainty, 'width': 0, 'thickness': 1},
+        hovertemplate=f'%{{x:.4g}} {UNITS[variable.partition(" of ")[0]][1]}: '
+                      '%{y:.3f} N<extra></extra>')
+
+
+def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str,
+          ) -> Any | None:
+    """Return an error along what a statement says that it depends on.
+
+    Parameters
+    ----------
+    residuals : Residuals
+        Whose error is drawn.
+    noise : NoiseSpectrum
+        Of the drive.
+    statement : Statement
+    what : str
+        Name of the error, for the axis.
+    """
+    go = plotly_objects()
+    drive = residuals.drives.index(statement.drive)
+    if statement.variable == 'frequency':
+        return _line(residuals, noise, statement, what)
+    variable = 'velocity' if statement.variable == 'direction' else statement.variable
+    profile = _profile(residuals, drive, variable, noise)
+    if profile is None:
+        return None
+    factor, label = axis_of(variable)
+    figure = go.Figure()
+    if statement.kind == 'scatter':
+        middle = factor * (profile.edges[1:] + profile.edges[:-1]) / 2
+        figure.add_trace(go.Scatter(x=middle, y=profile.rms, mode='lines+markers', name='rms',
+                                    hovertemplate=IN_NEWTONS, line={'color': ERROR}))
+    else:
+        figure.add_trace(_means(go, profile, factor, variable))
+    if statement.range is not None and statement.variable == variable:
+        low, high = (factor * end for end in statement.range)
+        figure.add_vrect(x0=low, x1=high, fillcolor=MARK, opacity=0.15, line_width=0)
+    figure.add_hline(y=0, line={'color': MEASURED, 'width': 0.8})
+    kind = 'rms' if statement.kind == 'scatter' else 'mean'
+    figure.update_layout(height=300, margin={**MARGIN, 't': 15}, showlegend=False,
+                         xaxis_title=label, yaxis_title=f'{kind} {what} on {statement.drive} [N]')
     return figure
 
 
+def _profile(residuals: Residuals, drive: int, variable: str, noise: NoiseSpectrum,
+             ) -> Profile | None:
+    """Return means over bins of a variable, also of another drive's."""
+    name, of, other = variable.partition(' of ')
+    if of:
+        values = residuals.variable(name, residuals.drives.index(other))
+        if values is None:
+            return None
+        residuals = replace(residuals, variables={**residuals.variables, variable: values})
+    return error_profile(residuals, drive, variable, noise, FINE_BINS)
+
+
+def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str) -> Any:
+    go = plotly_objects()
+    found = error_spectrum(residuals, residuals.drives.index(statement.drive), noise)
+    keep = found.frequency > 0
+    figure = go.Figure()
+    for name, power, colour in (('error', found.power, ERROR),
+                                ('noise', found.background, MEASURED)):
+        figure.add_trace(go.Scatter(
+            x=found.frequency[keep], y=power[keep], mode='lines', name=name,
+            line={'color': colour, 'width': 1.2}, hovertemplate='%{y:.3g} N²/Hz'))
+    if statement.range is not None:
+        figure.add_vrect(x0=0.98 * statement.range[0], x1=1.02 * statement.range[1],
+                         fillcolor=MARK, opacity=0.3, line_width=0)
+    figure.update_layout(
+        height=300, margin=MARGIN, legend=LEGEND, hovermode='x unified',
+        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'ticksuffix': ' Hz',
+               'showticksuffix': 'last'},
+        yaxis={'type': 'log', 'title': f'{what} on {statement.drive} [N²/Hz]',
+               'exponentformat': 'power'})
+    return figure
+
+
+def axis_of(variable: str) -> tuple[float, str]:
+    """Return factor from SI and label of an axis."""
+    name, of, other = variable.partition(' of ')
+    factor, unit = UNITS[name]
+    return factor, f'{WORDS.get(name, name)}{of}{other} [{unit}]'
+
+
 def over_workspace(residuals: Residuals) -> Any | None:
-    """Return the rms error over the platform's x and y, a menu of drives; None on one axis."""
+    """Return the rms error of each drive over the platform's x and y; None on one axis."""
     go = plotly_objects()
     x, y = residuals.variables.get('platform_x'), residuals.variables.get('platform_y')
     if x is None or y is None or np.ptp(x) == 0 or np.ptp(y) == 0:
         return None
     edges = [np.linspace(axis.min(), axis.max(), MAP_CELLS + 1) for axis in (x, y)]
-    names = ('all drives', *residuals.drives)
     figure = go.Figure()
-    for number in range(len(names)):
-        error = residuals.error if number == 0 else residuals.error[:, number - 1:number]
+    for drive, name in enumerate(residuals.drives):
+        error = residuals.error[:, drive]
         known = np.isfinite(error)
-        squares, count = np.where(known, error, 0.0) ** 2, known.sum(axis=1)
-        total = np.histogram2d(x, y, edges, weights=squares.sum(axis=1))[0]
-        samples = np.histogram2d(x, y, edges, weights=count)[0]
+        total = np.histogram2d(x[known], y[known], edges, weights=error[known] ** 2)[0]
+        samples = np.histogram2d(x[known], y[known], edges)[0]
         rms = np.sqrt(np.divide(total, samples, out=np.full_like(total, np.nan),
                                 where=samples > 0))
         figure.add_trace(go.Heatmap(
-            x=edges[0], y=edges[1], z=rms.T, visible=number == 0, colorscale='Cividis',
-            colorbar={'title': 'rms [N]'}, hovertemplate='%{z:.3f} N<extra></extra>'))
-    figure.update_layout(
-        template='plotly_white', height=520, xaxis_title='platform x [m]',
-        yaxis_title='platform y [m]', margin={'l': 60, 'r': 20, 't': 50, 'b': 45},
-        updatemenus=[_menu(names, list(range(len(names))))])
+            x=1e3 * edges[0], y=1e3 * edges[1], z=rms.T.astype(np.float32), meta={'drive': name},
+            colorscale='Cividis', colorbar={'title': 'rms [N]'},
+            hovertemplate='x %{x:.1f} mm, y %{y:.1f} mm: %{z:.3f} N<extra></extra>'))
+    figure.update_layout(height=460, xaxis_title='platform x [mm]', margin={**MARGIN, 't': 10},
+                         yaxis_title='platform y [mm]')
     figure.update_yaxes(scaleanchor='x')
     return figure
 
 
 def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
-    """Return the error's spectrum beside what its own noise would have; a menu of drives."""
+    """Return the spectrum of each drive's error beside that of its noise."""
     go = plotly_objects()
-    figure, owners = go.Figure(), []
+    figure = go.Figure()
     for drive, name in enumerate(residuals.drives):
         noise = comparison.localisation.drives[name].noise
         if noise is None:
             continue
         found = error_spectrum(residuals, drive, noise)
-        for label, power, colour in (('error', found.power, LINES[drive % len(LINES)]),
-                                     ('its noise model', found.background, MEASURED)):
-            keep = found.frequency > 0
-            frequency, shown = thinned(found.frequency[keep], power[keep])
-            figure.add_trace(go.Scatter(x=frequency, y=shown, name=f'{name}: {label}',
-                                        mode='lines', visible=drive == 0,
-                                        line={'color': colour, 'width': 1.2}))
-            owners.append(drive)
+        keep = found.frequency > 0
+        frequency, power, background = thinned(found.frequency[keep], found.power[keep],
+                                               found.background[keep])
+        for label, values, colour in (('error', power, ERROR), ('noise', background, MEASURED)):
+            figure.add_trace(go.Scatter(
+                x=frequency, y=values, name=f'{name}: {label}', mode='lines',
+                meta={'drive': name}, line={'color': colour, 'width': 1.2},
+                hovertemplate='%{y:.3g} N²/Hz'))
     figure.update_layout(
-        template='plotly_white', height=400, xaxis={'type': 'log', 'title': 'frequency [Hz]'},
-        yaxis={'type': 'log', 'title': 'power [N²/Hz]', 'exponentformat': 'power'},
-        margin={'l': 70, 'r': 20, 't': 50, 'b': 45},
-        legend={'orientation': 'h', 'y': 1.1, 'x': 0.3},
-        updatemenus=[_menu(residuals.drives, owners)])
+        height=360, margin=MARGIN, legend=LEGEND, hovermode='x unified',
+        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'ticksuffix': ' Hz',
+               'showticksuffix': 'last'},
+        yaxis={'type': 'log', 'title': 'power [N²/Hz]', 'exponentformat': 'power'})
     return figure
 
 
-def curve(residuals: Residuals, values: Array) -> tuple[Array, Array]:
-    """Return a thinned curve of all segments, with a break between them."""
+def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:
+    """Return times and curves of all segments at the same samples, with breaks between them."""
     segments = np.unique(residuals.segment)
-    times, shown = [], []
+    parts: list[tuple[Array, ...]] = []
     for segment in segments:
         inside = residuals.segment == segment
-        time, part = thinned(residuals.time[inside], values[inside],
-                             max(50, POINTS // len(segments)))
-        times += [time, time[-1:]]
-        shown += [part, np.array([np.nan])]
-    return np.concatenate(times), np.concatenate(shown)
-
-
-def _menu(names: Any, owners: list[int]) -> dict[str, Any]:
-    return {'x': 0.0, 'y': 1.0, 'xanchor': 'left', 'yanchor': 'bottom', 'buttons': [
-        {'label': name, 'method': 'update',
-         'args': [{'visible': [owner == number for owner in owners]}]}
-        for number, name in enumerate(names)]}
+        time, *curves = thinned(residuals.time[inside], *(one[inside] for one in values),
+                                points=max(50, POINTS // len(segments)))
+        gap = np.array([np.nan])
+        parts.append((np.append(time, time[-1:]), *(np.append(one, gap) for one in curves)))
+    time, *joined = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    # A screen shows no more than single precision holds.
+    return time, *(one.astype(np.float32) for one in joined)

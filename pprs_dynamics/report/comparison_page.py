@@ -9,53 +9,97 @@ from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.report import comparison_figures as figures
-from pprs_dynamics.report.page import Page
+from pprs_dynamics.report.page import ErrorRow, Page
 from pprs_dynamics.report.tables import comparison_rows
 from pprs_dynamics.residuals.residuals import Residuals
 
-HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained', 'noise floor [N]',
+HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained', 'noise [N]',
             'independent samples', 'verdict')
+FIRST = 3  # statements on the first screen
 
 
 def comparison_page(
     model: ForceModel, recordings: Sequence[Recording], residuals: Residuals,
-    comparison: Comparison, notes: Sequence[str],
+    comparison: Comparison, notes: Sequence[str], command: str = '',
 ) -> Page:
-    """Return the page of one comparison, most important first."""
+    """Return the page of one comparison: where it fails on one screen, the rest to be unfolded.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : sequence of Recording
+    residuals : Residuals
+    comparison : Comparison
+        Of them.
+    notes : sequence of str
+        How it was computed.
+    command : str, optional
+        That finds out why.
+    """
     page = Page('Model against measurement')
     page.text(comparison.verdict, 'lead')
     page.text(f'Model: {Path(model.source).name or "built in memory"}. Recordings: '
               f'{", ".join(recording.name for recording in recordings)}.', 'note')
-    page.table(HEADINGS, comparison_rows(comparison),
-               [drive.grade for drive in comparison.drives.values()])
-    page.heading('Where it fails')
-    statements = comparison.localisation.statements
-    if statements:
-        page.bullets([statement.text for statement in statements], numbered=True)
-    else:
-        page.text('Nowhere in particular: nothing stands out against what noise like this one '
-                  'would give.')
-    page.heading('Over time')
-    page.text('The three worst seconds of each drive are marked. Drag to zoom, double-click to '
-              'return. Curves are thinned to the extremes of equal spans: no peak is lost.', 'note')
-    for drive, name in enumerate(residuals.drives):
-        if name in comparison.drives:
-            page.figure(figures.over_time(residuals, drive, figures.worst_spans(residuals, drive)))
-    page.heading('Against what it may depend on')
-    page.text('Mean error over bins, with twice its standard deviation under noise that is '
-              'correlated in time. Choose the drive in the menu.', 'note')
-    page.figure(figures.against_variables(residuals, comparison))
-    chart = figures.over_workspace(residuals)
-    if chart is not None:
-        page.heading('Over the workspace')
-        page.figure(chart)
-    page.heading('Spectrum of the error')
-    page.figure(figures.spectrum(residuals, comparison))
-    page.heading('How it was computed')
-    page.bullets(notes)
+    statements = comparison.where
+    with page.columns():
+        with page.block():
+            page.errors([ErrorRow(name, drive.rms, None, drive.noise_floor)
+                         for name, drive in comparison.drives.items()],
+                        'Error, rms; dotted: the noise.')
+            if statements:
+                page.bullets([one.text for one in statements[:FIRST]], numbered=True)
+            else:
+                page.text('Nowhere in particular: nothing stands out against noise.')
+        if statements:
+            noise = comparison.localisation.drives[statements[0].drive].noise
+            picture = noise and figures.along(residuals, noise, statements[0], 'error')
+            if picture is not None:
+                page.figure(picture, f'Where it fails most: {statements[0].drive}. Bars: two '
+                            'standard deviations under the noise.')
+    if command and any(drive.grade != 'noise' for drive in comparison.drives.values()):
+        page.command('Find out which physical effect is missing', command)
+    if len(statements) > FIRST:
+        with page.fold(f'{len(statements) - FIRST} more places'):
+            page.bullets([one.text for one in statements[FIRST:]])
+    with page.fold('Drive by drive'):
+        page.table(HEADINGS, comparison_rows(comparison),
+                   [drive.grade for drive in comparison.drives.values()])
+    with page.fold('Over time'):
+        page.text('The three worst seconds of each drive are marked. Drag to zoom, on all drives '
+                  'at once; double-click to return. No peak is lost by thinning.', 'note')
+        for drive, name in enumerate(residuals.drives):
+            if name in comparison.drives:
+                page.figure(figures.over_time(residuals, drive, figures.worst_spans(
+                    residuals, drive)), f'{name}: effort, model and their difference.',
+                    over_time=True)
+    _by_drive(page, residuals, comparison)
+    with page.fold('How it was computed'):
+        page.bullets(notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
     if findings:
-        page.heading('What is wrong with the recordings')
-        page.bullets(findings)
+        with page.fold('What is wrong with the recordings'):
+            page.bullets(findings)
     return page
+
+
+def _by_drive(page: Page, residuals: Residuals, comparison: Comparison) -> None:
+    """Add figures of one drive at a time, the worst first."""
+    names = list(comparison.drives)
+    worst = max(names, key=lambda name: comparison.drives[name].unexplained)
+    with page.fold('Against what it may depend on'):
+        page.text('Mean error over bins, with two standard deviations under noise that is '
+                  'correlated in time.', 'note')
+        page.menu('Drive', names, worst)
+        with page.columns():
+            for figure, caption in figures.against_variables(residuals, comparison):
+                page.figure(figure, caption)
+    chart = figures.over_workspace(residuals)
+    if chart is not None:
+        with page.fold('Over the workspace'):
+            page.menu('Drive', names, worst)
+            page.figure(chart, 'Error, rms, over the platform\'s position.')
+    with page.fold('Spectrum of the error'):
+        page.menu('Drive', names, worst)
+        page.figure(figures.spectrum(residuals, comparison),
+                    'Power of the error and of the noise.')

@@ -6,32 +6,40 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.diagnosis.error_steps import error_steps
-from pprs_dynamics.diagnosis.sentences import Finding, Sentences, fitted_values
+from pprs_dynamics.diagnosis.error_steps import ErrorStep, error_steps
+from pprs_dynamics.diagnosis.quantities import newtons
+from pprs_dynamics.diagnosis.rivals import RivalEffect
+from pprs_dynamics.diagnosis.sentences import (
+    Finding,
+    Sentences,
+    fitted_values,
+    set_rows,
+    unexplained_groups,
+)
 from pprs_dynamics.report import diagnosis_figures as figures
 from pprs_dynamics.report.diagnosis_tables import finding_lines, sites
-from pprs_dynamics.report.page import Page
+from pprs_dynamics.report.page import ErrorRow, Page
 from pprs_dynamics.residuals.residuals import Residuals
 
 METHOD = (
     'Model and measured effort get the same treatment; every effect of the catalogue, in every '
     'shape tried and on every drive, is a column of one regression beside the model\'s own numbers '
     'as far as these are free.',
-    'Evidence is twice the gain in log-likelihood under noise that is correlated in time, fitted '
-    'anew with and without the effect, less a penalty for parameters, shapes, drives and names '
-    'that were tried, and less a margin.',
-    'What is adopted must also predict blocks of the recording that it was not fitted to; what '
-    'then remains is searched for dependence on anything known.')
+    'Sets of effects and of patterns of no catalogue are compared by one cost: the penalised '
+    'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
+    'and prices for effects, drives, shapes and patterns that were tried. Evidence of an effect '
+    'is by how much the cost rises without it.')
 EFFECTS = ('effect', 'evidence', 'error before [N]', 'after [N]', 'held out before [N]',
            'after [N]', 'on')
 PARAMETERS = ('effect', 'drive', 'symbol', '± two standard deviations', 'parameter')
+SETS = ('cost', 'set')
 
 
 def diagnosis_page(
     diagnosis: Diagnosis, words: Sentences, after: Residuals, recordings: Sequence[str],
-    validation: Sequence[str] = (),
+    validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
 ) -> Page:
-    """Return the page, most important first.
+    """Return the page: an answer that fits one screen, the rest to be unfolded.
 
     Parameters
     ----------
@@ -42,57 +50,89 @@ def diagnosis_page(
         Of `diagnosis.adopted` on the same recordings.
     recordings, validation : sequence of str
         Names of those fitted, and of those held out.
+    rivals : sequence of RivalEffect
+        As they were given to `word_diagnosis`.
     """
     page = Page(f'Diagnosis: {diagnosis.verdict}')
     page.text(words.headline, 'lead')
     held = f' Held out: {", ".join(validation)}.' if validation else ''
     page.text(f'Model: {Path(diagnosis.model.source).name or "built in memory"}. Recordings: '
               f'{", ".join(recordings)}.{held}', 'note')
-    page.text(f'Next: {words.following}')
-    _warnings(page, words)
-    _findings(page, diagnosis, words)
-    _errors(page, diagnosis, after)
-    _candidates(page, diagnosis)
+    steps = error_steps(diagnosis, after)
+    with page.columns():
+        _errors(page, diagnosis, steps)
+        _first_picture(page, diagnosis)
+    page.command(words.following, words.command)
+    if words.warnings:
+        with page.fold('Warnings', is_open=True):
+            page.bullets(words.warnings)
+    _findings(page, diagnosis, words, rivals)
+    _sets(page, diagnosis)
+    _contributions(page, diagnosis, steps)
     _parameters(page, diagnosis, words)
-    page.heading('Before and after')
-    page.text('Dotted: two standard deviations of the noise. Drag to zoom, double-click to return.',
-              'note')
-    for drive, name in enumerate(diagnosis.residuals.drives):
-        if name in diagnosis.noise_floors:
-            page.figure(figures.before_and_after(diagnosis.residuals, after, drive,
-                                                 diagnosis.noise_floors[name]))
-    page.heading('How it was found')
-    page.text(' '.join(METHOD))
-    if diagnosis.notes:
-        page.bullets(diagnosis.notes)
+    with page.fold('Every drive over time, before and after'):
+        page.text('Dotted: two standard deviations of the noise. Drag to zoom, on all drives at '
+                  'once; double-click to return.', 'note')
+        for drive, name in enumerate(diagnosis.residuals.drives):
+            if name in diagnosis.noise_floors:
+                page.figure(figures.before_and_after(
+                    diagnosis.residuals, after, drive, diagnosis.noise_floors[name]),
+                    f'{name}: effort and error, with the model as given and with what was found.',
+                    over_time=True)
+    with page.fold('How it was found'):
+        page.text(' '.join(METHOD))
+        if diagnosis.notes:
+            page.bullets(diagnosis.notes)
     return page
 
 
-def _warnings(page: Page, words: Sentences) -> None:
-    if words.warnings:
-        page.heading('Warnings')
-        page.bullets(words.warnings)
+def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
+    first, last, floors = steps[0], steps[-1], diagnosis.noise_floors
+    fell = len(steps) > 1
+    rows = [ErrorRow('all drives', first.overall, last.overall if fell else None,
+                     diagnosis.noise_floor)]
+    rows += [ErrorRow(name, first.drives[d], last.drives[d] if fell else None, floors[name])
+             for d, name in enumerate(diagnosis.residuals.drives) if name in floors]
+    page.errors(rows, 'Error, rms, before (grey) and with what was found (blue); dotted: the noise.'
+                if fell else 'Error, rms; dotted: the noise.')
 
 
-def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
+def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
+    """Add the one picture that shows what was found."""
+    if diagnosis.depends_on and not diagnosis.effects:
+        statement = diagnosis.depends_on[0]
+        picture = figures.unknown_picture(diagnosis, statement)
+        if picture is not None:
+            page.figure(picture, f'What no effect explains, on {statement.drive}.')
+    elif diagnosis.effects:
+        page.figure(*figures.effect_pictures(diagnosis, diagnosis.effects[0])[0])
+
+
+def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
+              rivals: Sequence[RivalEffect]) -> None:
     if words.effects:
-        page.heading('What is missing')
-        page.text('Grey: what the recording says when all but this effect is in the model. Blue: '
-                  'the effect.', 'note')
-    for finding, one in zip(words.effects, diagnosis.effects, strict=True):
-        page.card(finding.title, _lines(finding, one.effect.card.equation),
-                  figures.effect_picture(diagnosis, one))
+        with page.fold('What was found, why, and how to confirm it'):
+            for finding, one in zip(words.effects, diagnosis.effects, strict=True):
+                page.card(finding.title, _lines(finding, one.effect.card.equation),
+                          figures.effect_pictures(diagnosis, one))
+                for said, rival in zip(words.rivals, rivals, strict=True):
+                    if rival.of == one.name:
+                        page.card(said.title, _lines(said, rival.effect.card.equation),
+                                  figures.effect_pictures(diagnosis, rival))
     if words.unexplained:
-        page.heading('What no effect of the catalogue explains')
-    for finding, statement in zip(words.unexplained, diagnosis.depends_on, strict=True):
-        page.card(finding.title, finding_lines(finding),
-                  figures.unknown_picture(diagnosis, statement))
+        with page.fold('What no effect of the catalogue explains'):
+            for finding, group in zip(words.unexplained, unexplained_groups(diagnosis),
+                                      strict=True):
+                pictures = [(figures.unknown_picture(diagnosis, one), f'{one.drive}.')
+                            for one in group]
+                page.card(finding.title, finding_lines(finding),
+                          [(figure, text) for figure, text in pictures if figure is not None])
     for title, lines in (('Suspects: effects that slow noise would explain as well',
-                          words.suspects), ('Within the model error of an adopted effect',
-                           words.within_model_error)):
+                          words.suspects), ('Within the model error of what was found',
+                                            words.within_model_error)):
         if lines:
-            page.heading(title)
-            page.bullets(lines)
+            with page.fold(title):
+                page.bullets(lines)
 
 
 def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
@@ -100,48 +140,52 @@ def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
     return [lines[0], ('equation', equation), ('looks like', finding.mark), *lines[1:]]
 
 
-def _errors(page: Page, diagnosis: Diagnosis, after: Residuals) -> None:
-    page.heading('How the error falls')
-    steps = error_steps(diagnosis, after)
-    if len(steps) > 1:
-        numbered = ', '.join(f'+{k} {step.label}' for k, step in enumerate(steps) if k)
-        page.text('Both ends are what a comparison with these models says; in between, parameters '
-                  f'are those of the last fit. Dashed: the noise, {diagnosis.noise_floor:.3g} N over '
-                  f'all drives. Steps of the small pictures: {numbered}.', 'note')
-        page.figure(figures.waterfall(steps, after.drives, diagnosis.noise_floor,
-                                      diagnosis.noise_floors))
-    else:
-        page.text(f'It does not: the model leaves {steps[0].overall:.4f} N rms, and the noise is '
-                  f'{diagnosis.noise_floor:.4f} N.')
-    if diagnosis.effects:
-        where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
-                 else 'blocks of the same recordings, the weaker evidence')
-        page.text(f'In the order of adoption, with parameters fitted anew at every step. Held out: '
-                  f'{where}.', 'note')
-        page.table(EFFECTS, [
-            (one.name, f'{one.evidence:.0f}', f'{one.error_before:.4f}', f'{one.error_after:.4f}',
-             f'{one.held_out_before:.4f}', f'{one.held_out_after:.4f}',
-             sites(one.drives, diagnosis)) for one in diagnosis.effects])
-        page.heading('What each effect contributes')
-        page.figure(figures.contributions(diagnosis))
-
-
-def _candidates(page: Page, diagnosis: Diagnosis) -> None:
-    if not diagnosis.candidates:
+def _sets(page: Page, diagnosis: Diagnosis) -> None:
+    if not diagnosis.sets:
         return
-    page.heading('Candidates for the first place')
-    page.text('Evidence of each effect alone, 0 is the threshold. Blue: adopted. Yellow: this data '
-              'cannot tell it from an adopted one. Grey: explains less, or nothing beside those.',
-              'note')
-    page.figure(figures.evidence_bars(diagnosis))
+    with page.fold('The best sets of effects, and their costs'):
+        page.text('Cost above that of the best set. 10 stands for odds of 150 to 1: a set that '
+                  'comes nearer is told as a rival.', 'note')
+        page.table(SETS, [(cost, text) for text, cost in set_rows(diagnosis)])
+        if diagnosis.candidates:
+            page.figure(figures.evidence_bars(diagnosis),
+                        'Evidence of each effect alone; 0 is the threshold. Blue: found. Yellow: '
+                        'a rival. Grey: explains less, or nothing beside what was found.')
+
+
+def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
+    if not diagnosis.effects:
+        return
+    where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
+             else 'blocks of the same recordings, the weaker evidence')
+    with page.fold('What each effect does to the error'):
+        if len(steps) > 2:
+            page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
+                         for k, step in enumerate(steps)],
+                        'Error over all drives, rms, as one after the other is added; both ends '
+                        f'are what a comparison says, the noise is '
+                        f'{newtons(diagnosis.noise_floor)}.')
+        page.table(EFFECTS, [
+            (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
+             f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
+             sites(one.drives, diagnosis)) for one in diagnosis.effects],
+            caption='Those with most evidence first, parameters fitted anew at every step. '
+            f'Held out: {where}.')
+        drives = diagnosis.residuals.drives
+        size = sum((one.force ** 2).mean(axis=0) for one in diagnosis.effects)
+        acting = [name for d, name in enumerate(drives) if size[d] > 0]
+        page.menu('Drive', acting, drives[int(size.argmax())])
+        page.figure(figures.contributions(diagnosis.residuals, {
+            one.name: one.force for one in diagnosis.effects}),
+            'What each effect contributes.', over_time=True)
 
 
 def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
     values = fitted_values(diagnosis)
     if values:
-        page.heading('Parameters')
-        page.table(PARAMETERS, [(one.effect, one.drive, one.parameter.symbol, one.text,
-                                 one.parameter.description) for one in values])
+        with page.fold('Values'):
+            page.table(PARAMETERS, [(one.effect, one.drive, one.parameter.symbol, one.text,
+                                     one.parameter.description) for one in values])
     if words.calibrated:
-        page.heading('Numbers of the model that moved within their tolerance')
-        page.bullets(words.calibrated)
+        with page.fold('Numbers of the model that moved within their tolerance'):
+            page.bullets(words.calibrated)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pprs_dynamics.diagnosis.quantities import change, newtons
 from pprs_dynamics.model.ledger import Step
-from pprs_dynamics.report.history_figures import falling_error, falling_error_by_drive
-from pprs_dynamics.report.history_tables import details, step_rows
-from pprs_dynamics.report.page import Page
+from pprs_dynamics.report.history_figures import falling_error_by_drive
+from pprs_dynamics.report.history_tables import details, noise_of, step_rows
+from pprs_dynamics.report.page import ErrorRow, Page
 
 HEADINGS = ('step', 'effect', 'on', 'error before [N]', 'after [N]', 'held out before [N]',
             'after [N]', 'held out', 'date')
@@ -20,16 +21,20 @@ def history_page(name: str, steps: Sequence[Step]) -> Page:
         page.text('No effect was added to this model yet.', 'lead')
         return page
     first, last = steps[0], steps[-1]
-    page.text(f'{len(steps)} step{"s" * (len(steps) > 1)}: the error fell from '
-              f'{first.error_before:.4g} to {last.error_after:.4g} N; noise leaves '
-              f'{min(step.noise_floor for step in steps):.4g} N.', 'lead')
+    noise = noise_of(steps)
+    page.text(f'{len(steps)} step{"s" * (len(steps) > 1)}: the error '
+              f'{change(first.error_before, last.error_after)}; the noise is {newtons(noise)}.',
+              'lead')
+    page.errors([ErrorRow('as given', first.error_before, first.held_out_before, noise),
+                 *(ErrorRow(f'+ {step.effect}', step.error_after, step.held_out_after, noise)
+                   for step in steps)],
+                'Error, rms, after each step. Grey: on the recordings; blue: on held-out data; '
+                'dotted: the noise.', ('recordings [N]', 'held out [N]'))
     page.table(HEADINGS, step_rows(steps))
-    page.heading('The error falls')
-    page.figure(falling_error(steps))
-    if first.measured:
-        page.heading('Drive by drive')
-        page.figure(falling_error_by_drive(steps))
     for number, step in enumerate(steps, start=1):
         page.heading(f'{number}. {step.effect}')
         page.bullets(details(step))
+    if first.measured:
+        with page.fold('Drive by drive'):
+            page.figure(falling_error_by_drive(steps), 'Error of every drive after each step.')
     return page

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import inf
 from typing import Any
 
 from rich import box
@@ -10,6 +11,7 @@ from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
+from pprs_dynamics.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.model.ledger import NOT_KNOWN, Step
 
 BAR = 24  # characters, of the largest error
@@ -23,9 +25,14 @@ def history_view(steps: Sequence[Step]) -> Group:
 def step_rows(steps: Sequence[Step]) -> list[tuple[str, ...]]:
     """Return one row of text per step; the page and the terminal show them."""
     return [(str(number), step.effect, ', '.join(step.drives) or 'structure',
-             f'{step.error_before:.4f}', f'{step.error_after:.4f}', f'{step.held_out_before:.4f}',
-             f'{step.held_out_after:.4f}', held_out(step), step.date[:10])
+             f'{step.error_before:.3f}', f'{step.error_after:.3f}', f'{step.held_out_before:.3f}',
+             f'{step.held_out_after:.3f}', held_out(step), step.date[:10])
             for number, step in enumerate(steps, start=1)]
+
+
+def noise_of(steps: Sequence[Step]) -> float:
+    """Return the noise as the last diagnosis had it [N]."""
+    return steps[-1].noise_floor
 
 
 def held_out(step: Step) -> str:
@@ -36,8 +43,7 @@ def held_out(step: Step) -> str:
 
 def details(step: Step) -> list[str]:
     """Return what a step was made from, in sentences."""
-    values = [f'{name} = {value:.5g}' + ('' if std >= NOT_KNOWN else f' ± {2 * std:.2g}')
-              + f' {unit}' * (unit != '1')
+    values = [f'{name} = {with_uncertainty(value, inf if std >= NOT_KNOWN else std, unit)}'
               for name, value, std, unit in zip(step.parameters, step.values, step.std,
                                                 step.units, strict=False) if value]
     spans = [f'{name} ({last - first:.1f} s, sha256 {digest[:12]}…)'
@@ -64,17 +70,17 @@ def _parts(steps: Sequence[Step]) -> Iterator[Any]:
         table.add_column(heading, justify='right' if heading in ('error', 'held out') else 'left',
                          no_wrap=heading != 'effect')
     largest = max(max(step.error_before, step.error_after) for step in steps)
-    table.add_row('', 'before', f'{steps[0].error_before:.4f}',
-                  f'{steps[0].held_out_before:.4f}', _bar(steps[0].error_before, largest, 'red'))
+    table.add_row('', 'before', f'{steps[0].error_before:.3f}',
+                  f'{steps[0].held_out_before:.3f}', _bar(steps[0].error_before, largest, 'red'))
     for number, step in enumerate(steps, start=1):
-        again = f' (on other recordings {step.error_before:.4f} before)' if number > 1 and (
+        again = f' (on other recordings {step.error_before:.3f} before)' if number > 1 and (
             step.sha256 != steps[number - 2].sha256) else ''
         on = f' on {", ".join(step.drives)}' if step.drives else ''
         table.add_row(f'{number}', escape(f'+ {step.effect}{on}{again}'),
-                      f'{step.error_after:.4f}', f'{step.held_out_after:.4f}',
+                      f'{step.error_after:.3f}', f'{step.held_out_after:.3f}',
                       _bar(step.error_after, largest, 'green'))
-    noise = min(step.noise_floor for step in steps)
-    table.add_row('', 'noise', f'{noise:.4f}', '', _bar(noise, largest, 'white'))
+    noise = noise_of(steps)
+    table.add_row('', 'noise', f'{noise:.3f}', '', _bar(noise, largest, 'white'))
     yield table
     for number, step in enumerate(steps, start=1):
         yield f'[bold]{number}. {escape(step.effect)}[/]'
