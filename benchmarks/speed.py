@@ -209,13 +209,21 @@ class _CountedTable(dict[Any, Any]):
         return _Counted(0.0)
 
 
+def _counted(named: Any) -> Any:
+    """Return parameters with counting floats."""
+    if not isinstance(named, tuple):
+        return _Counted(named)
+    elements = [_counted(element) for element in named]
+    return type(named)(*elements) if hasattr(named, '_fields') else tuple(elements)
+
+
 def operations(model: DriveModel, motion: PlatformMotion) -> None:
     """Print the floating-point operations of one sample."""
     _Counted.counts.clear()
     one_pass = model._one_pass
     assert one_pass is not None
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    forces_kernel([_Counted(x) for x in one_pass.numbers.tolist()], 0, table, _CountedTable())
+    forces_kernel(_counted(one_pass.parameters.named), 0, table, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

@@ -31,8 +31,10 @@ from pprs_dynamics.errors import (
     WorkspaceError,
 )
 from pprs_dynamics.mechanism.forward_kinematics import home_pose, solve_forward_kinematics
-from pprs_dynamics.mechanism.inverse_kinematics import solve_inverse_kinematics
-from pprs_dynamics.mechanism.jacobians import compute_jacobians, condition_number
+from pprs_dynamics.mechanism.inverse_kinematics import chain_table, solve_inverse_kinematics
+from pprs_dynamics.mechanism.jacobians import condition_number, inverse_table
+from pprs_dynamics.mechanism.robot import Robot
+from pprs_dynamics.mechanism.state import solve_mechanism
 
 POSES = 4000
 # Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
@@ -61,8 +63,8 @@ DIFFERENCE_TOLERANCE = 1e-9
 
 def solve(geometry, motion):
     """Return chains and Jacobians of a motion."""
-    chains = solve_inverse_kinematics(geometry, motion)
-    return chains, compute_jacobians(geometry, chains)
+    state = solve_mechanism(Robot(geometry, paper_model().robot.masses), motion)
+    return state.chains, state.jacobians
 
 
 def home_determinant(geometry):
@@ -435,8 +437,8 @@ def test_condition_limit_is_where_it_says(elbow):
 
 def test_exactly_singular_B_raises_even_without_a_limit():
     geometry = paper_geometry()
-    chains = solve_inverse_kinematics(geometry, PlatformMotion.at_rest(home_position()))
+    chains = chain_table(geometry, PlatformMotion.at_rest(home_position()), 1e-6)
     # Joints of the platform on top of each other: no moment about any axis through them.
-    collapsed = replace(chains, arm=type(chains.arm)(*(0 * part for part in chains.arm)))
+    chains[:, :9] = 0.0
     with pytest.raises(SingularityError, match=r'det \[B\]'):
-        compute_jacobians(geometry, collapsed)
+        inverse_table(geometry, chains, np.inf)

@@ -11,7 +11,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Effect
 from pprs_dynamics.mechanism.state import MechanismState
 
-Six = tuple[float, float, float, float, float, float]
+SixFloats = tuple[float, float, float, float, float, float]
 
 
 def drive_friction(c: Any, mu: Any, q_dot: Any, load: Any, sgn: Any) -> Any:
@@ -32,8 +32,8 @@ class ActiveFriction(Effect):
     """
 
     name: ClassVar[str] = 'active_friction'
-    viscous: Six
-    coulomb: Six
+    viscous: SixFloats
+    coulomb: SixFloats
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^m, (N, 6) [N]."""

@@ -15,8 +15,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.effects.passive_friction import (
     Resistances,
-    overcome,
     resistance,
+    resistance_forces,
 )
 from pprs_dynamics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.mechanism.state import MechanismState
@@ -50,4 +50,4 @@ class RevoluteFriction(PassiveJointEffect):
         """Return the effect's drive forces [N], (N, 6)."""
         speed = np.abs(state.chains.u_dot)
         k = resistance(self.values['viscous'], self.values['torque'], speed, state.reversal.rate)
-        return overcome(state, Resistances(k, np.zeros_like(k)))
+        return resistance_forces(state, Resistances(k, np.zeros_like(k)))

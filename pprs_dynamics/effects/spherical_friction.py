@@ -15,8 +15,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.effects.passive_friction import (
     Resistances,
-    overcome,
     resistance,
+    resistance_forces,
     spherical_speed,
 )
 from pprs_dynamics.effects.structure_effect import PassiveJointEffect
@@ -52,4 +52,4 @@ class SphericalFriction(PassiveJointEffect):
         """Return the effect's drive forces [N], (N, 6)."""
         speed = spherical_speed(state)
         k = resistance(self.values['viscous'], self.values['torque'], speed, state.reversal.rate)
-        return overcome(state, Resistances(np.zeros_like(k), k))
+        return resistance_forces(state, Resistances(np.zeros_like(k), k))

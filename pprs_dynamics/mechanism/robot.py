@@ -1,8 +1,8 @@
-"""What the robot is: geometry, masses and gravity."""
+"""The robot: geometry, masses and gravity."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,15 +10,15 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.mechanism.numbers import geometry_numbers, robot_numbers
-from pprs_dynamics.mechanism.vectors import (  # noqa: F401 - vectors for all
-    ChainVector,
-    Vector,
-    add,
-    cross,
-    in_base,
-    in_chain,
+from pprs_dynamics.mechanism.kernel_parameters import (
+    Chain,
+    ChainMasses,
+    GeometryParameters,
+    KernelParameters,
+    PlatformBody,
+    RobotParameters,
 )
+from pprs_dynamics.mechanism.vectors import ChainVector, Vector, in_base, in_chain
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 AXIS = 'axis'  # the drive of a single axis
@@ -32,14 +32,7 @@ class ChainFrames:
     ----------
     angles : sequence of 3 floats
         Chain angles delta_i [rad].
-
-    Attributes
-    ----------
-    numbers : (24,) array
-        See `Geometry.numbers`.
     """
-
-    numbers: Array
 
     def __init__(self, angles: tuple[float, float, float]) -> None:
         self.cos = np.cos(angles)
@@ -86,7 +79,6 @@ class Geometry:
     chain_angles: tuple[float, float, float]
     platform_angles: tuple[float, float, float]
     elbow: str = 'up'
-    frames: ChainFrames = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ('base_radius', 'platform_radius', 'rod_length'):
@@ -100,8 +92,6 @@ class Geometry:
             _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
                      'hold three different directions')
         _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
-        object.__setattr__(self, 'frames', ChainFrames(self.chain_angles))
-        self.frames.numbers = geometry_numbers(self)
         turned = np.subtract(self.platform_angles, self.chain_angles)
         span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
         _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
@@ -112,10 +102,24 @@ class Geometry:
         """Sign of sin u_i."""
         return 1.0 if self.elbow == 'up' else -1.0
 
-    @property
-    def numbers(self) -> Array:
-        """What kernels take, see `geometry_numbers`."""
-        return self.frames.numbers
+    @cached_property
+    def frames(self) -> ChainFrames:
+        """The frames of the chains."""
+        return ChainFrames(self.chain_angles)
+
+    @cached_property
+    def kernel_parameters(self) -> KernelParameters[GeometryParameters]:
+        """Lengths and the constants of the chains."""
+        frames, delta = self.frames, np.asarray(self.chain_angles)
+        joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
+        left = np.linalg.pinv(np.stack((-frames.sin, frames.cos), axis=1))
+        # The weights with which the three directions n_i add up to nothing.
+        balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
+        constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
+                             axis=1).tolist()
+        first, second, third = (Chain(*chain) for chain in constants)
+        return KernelParameters(GeometryParameters(
+            self.base_radius, self.rod_length, self.elbow_sign, (first, second, third)))
 
 
 @dataclass(frozen=True)
@@ -191,9 +195,16 @@ class Robot:
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
 
     @cached_property
-    def numbers(self) -> Array:
-        """What kernels take, see `robot_numbers`."""
-        return robot_numbers(self)
+    def kernel_parameters(self) -> KernelParameters[RobotParameters]:
+        """Geometry, masses and gravity."""
+        masses = self.masses
+        first, second, third = (ChainMasses(*chain) for chain in zip(
+            masses.slides, masses.lifts, masses.rods, strict=True))
+        body = PlatformBody(masses.total, Vector(*masses.centre), Vector(*masses.inertia[:3]),
+                            Vector(*masses.inertia[3:]))
+        return KernelParameters(RobotParameters(
+            self.geometry.kernel_parameters.named, body, (first, second, third),
+            Vector(*self.gravity)))
 
 
 def _require(key: str, value: Any, condition: bool, rule: str) -> None:

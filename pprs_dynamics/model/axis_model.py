@@ -20,7 +20,7 @@ from pprs_dynamics.effects.load_friction import LoadFriction
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.robot import AXIS
-from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
+from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
 from pprs_dynamics.model.keys import AXIS_KEYS
 
 
@@ -149,7 +149,7 @@ class AxisModel(ForceModel):
             effect.check_memory(state.memories)
             if not effect.is_measurement:
                 parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-        return AxisForces(np.sum(list(parts.values()), axis=0), parts, mechanism)
+        return AxisForces(total_force(tuple(parts.values())), parts, mechanism)
 
     def variables(self, state: AxisState) -> dict[str, Array]:
         """Return nothing: an axis has its own motion alone."""

@@ -18,7 +18,7 @@ from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES, Robot
 from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
-from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
+from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
 from pprs_dynamics.model.keys import KEYS
 from pprs_dynamics.model.limits import Limits
 from pprs_dynamics.model.one_pass import FORCES, OnePass
@@ -209,8 +209,7 @@ class DriveModel(ForceModel):
             for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-            total: Array = np.sum(list(parts.values()), axis=0)                # Eq. (14)
-        return DriveForces(total, parts, mechanism)
+            return DriveForces(total_force(tuple(parts.values())), parts, mechanism)
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return loads of the guides, rod angles, and where the platform is."""

@@ -1,4 +1,4 @@
-"""What every model is: forces that drives must apply for a motion, as a sum over a list.
+"""The base of all models: forces that drives must apply for a motion, as a sum over a list.
 
 The diagnosis works on any of them: it asks a model for its drives, its numbers, its forces and
 what its sensors say, never for what it moves.
@@ -22,6 +22,14 @@ from pprs_dynamics.mechanism.state import DriveStates
 from pprs_dynamics.model.keys import Key
 
 RIGID_BODY = 'rigid_body'
+
+
+def total_force(parts: tuple[Any, ...]) -> Any:
+    """Return the drive force Q^m, the sum of its parts, of numbers as of arrays."""
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part                                                   # Eq. (14)
+    return total
 
 
 @dataclass(frozen=True)

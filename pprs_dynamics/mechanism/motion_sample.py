@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 
 from pprs_dynamics.mechanism.vectors import Vector
 
-MOTION_COLUMNS = 19
-
 
 class Rotation(NamedTuple):
     """Rot, from `platform` to `base`, by its columns."""
