@@ -158,8 +158,7 @@ def resistance_forces(
     """
     k = np.concatenate(resistances, axis=1)
     force, kinematics = np.empty(k.shape), state.kinematics
-    parameters = KernelParameters(TransferParameters(
-        state.robot.geometry.kernel_parameters.named, printed))
+    parameters = state.robot.geometry.kernel_parameters.extended(TransferParameters, printed)
     evaluate(transfer_kernel, parameters, kinematics.chain_table, kinematics.inverse_table, k,
              force)
     return force
@@ -274,8 +273,8 @@ class WholeMechanismFriction(PassiveFriction):
         """Return Delta Q^p, (N, 6) [N], by virtual power."""
         kinematics, reactions = state.kinematics, state.rigid_body.reaction_table
         force = np.empty((len(reactions), 6))
-        parameters = KernelParameters(PassiveParameters(
-            state.robot.geometry.kernel_parameters.named, self.printed, self.joints))
+        parameters = state.robot.geometry.kernel_parameters.extended(
+            PassiveParameters, self.printed, self.joints)
         evaluate(passive_kernel, parameters, kinematics.chain_table, kinematics.inverse_table,
                  reactions, kinematics.turnover(state.reversal.rate), force)
         return force

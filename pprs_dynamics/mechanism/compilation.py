@@ -59,7 +59,7 @@ def _template(row: Any, *tables: Any) -> int:
 def _compiled_loop(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
     import numba
 
-    own = {'kernel': _compiled(kernel), 'read': numba.njit(forceinline=True)(_reader(named))}
+    own = {'kernel': _compiled(kernel), 'read': _inlined(_reader(named))}
     loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
                         f'{kernel.__name__}_loop')
     # Numba looks only at the file of the loop when it decides whether what it kept is up to
@@ -93,8 +93,6 @@ def _reader(named: tuple[Any, ...]) -> Any:
 @cache
 def _compiled(function: FunctionType) -> Any:
     """Return a function of this package, and all that it calls, for Numba."""
-    import numba
-
     namespace = dict(function.__globals__)
     for name in _names(function.__code__) & namespace.keys():
         namespace[name] = _callee(namespace[name])
@@ -102,10 +100,17 @@ def _compiled(function: FunctionType) -> Any:
     clone = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__,
                          cells)
     clone.__module__ = function.__module__
-    # Inlined all of them, or their many results are copied through memory: four times slower.
-    # Nobody calls them from Python, and wrappers for that would take half of the compiling.
+    return _inlined(clone)
+
+
+def _inlined(function: FunctionType) -> Any:
+    """Return a function that Numba inlines where it is called."""
+    import numba
+
+    # Else their many results are copied through memory: four times slower. Nobody calls them from
+    # Python, and wrappers for that would take half of the compiling.
     return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
-                      no_cfunc_wrapper=True)(clone)
+                      no_cfunc_wrapper=True)(function)
 
 
 def _callee(used: Any) -> Any:

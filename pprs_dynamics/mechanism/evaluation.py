@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,18 +40,21 @@ def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) 
     tables : arrays
         C-contiguous; the first is (N, k), N samples.
     """
-    try:
-        loop = _loops[kernel]
-    except KeyError:
-        loop = _loops[kernel] = _loop(kernel, parameters)
-    return loop(parameters.row, *tables) if _compile is not None else loop(parameters, *tables)
+    loop = _loops.get(kernel)
+    if loop is None:
+        if not is_compiled():
+            return evaluate_plainly(kernel, parameters, *tables)
+        assert _compile is not None
+        loop = _loops[kernel] = _compile(kernel, parameters.named)
+    return loop(parameters.row, *tables)
 
 
 def evaluate_if_ready(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
     """Run a kernel as `evaluate` does, compiled only where something has been compiled before."""
-    if _decided:
-        return evaluate(kernel, parameters, *tables)
-    return evaluate_plainly(kernel, parameters, *tables)
+    loop = _loops.get(kernel)
+    if loop is not None:
+        return loop(parameters.row, *tables)
+    return (evaluate if _decided else evaluate_plainly)(kernel, parameters, *tables)
 
 
 def evaluate_plainly(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
@@ -92,10 +94,3 @@ def _on_floats(
         if not kernel(p, s, *views):
             return s
     return -1
-
-
-def _loop(kernel: Kernel, parameters: KernelParameters[Any]) -> Callable[..., int]:
-    if is_compiled():
-        assert _compile is not None
-        return _compile(kernel, parameters.named)
-    return partial(evaluate_plainly, kernel)

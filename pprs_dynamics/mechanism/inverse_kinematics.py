@@ -16,7 +16,7 @@ from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.mechanism.arithmetic import sqrt
 from pprs_dynamics.mechanism.chains import CHAINS, each_chain
 from pprs_dynamics.mechanism.evaluation import evaluate
-from pprs_dynamics.mechanism.kernel_parameters import Chain, GeometryParameters, KernelParameters
+from pprs_dynamics.mechanism.kernel_parameters import Chain, GeometryParameters
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.motion_sample import MotionSample, Rotation, motion_sample, turned
 from pprs_dynamics.mechanism.robot import Geometry
@@ -236,7 +236,7 @@ def solve_inverse_kinematics(
 def chain_table(geometry: Geometry, motion: PlatformMotion, minimum_sine: float) -> Array:
     """Return the motion of the chains as a table for kernels, see `solve_inverse_kinematics`."""
     table = np.empty((len(motion), CHAIN_COLUMNS))
-    parameters = KernelParameters(ReachParameters(geometry.kernel_parameters.named, minimum_sine))
+    parameters = geometry.kernel_parameters.extended(ReachParameters, minimum_sine)
     if evaluate(chain_kernel, parameters, motion.rows, table) >= 0:
         _require_reach(table[:, 9:12], geometry)
         _require_upright_rods(table[:, 12:15], minimum_sine)

@@ -23,7 +23,6 @@ from pprs_dynamics.mechanism.closure import (
 )
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics
-from pprs_dynamics.mechanism.kernel_parameters import KernelParameters
 from pprs_dynamics.mechanism.robot import Geometry
 
 
@@ -112,8 +111,8 @@ def inverse_table(geometry: Geometry, chains: Array, condition_limit: float) -> 
         limit.
     """
     inverse, bound = np.empty((len(chains), INVERSE_COLUMNS)), np.empty((len(chains), 1))
-    parameters = KernelParameters(InverseParameters(
-        geometry.kernel_parameters.named, condition_limit ** 2, geometry.platform_radius))
+    parameters = geometry.kernel_parameters.extended(
+        InverseParameters, condition_limit ** 2, geometry.platform_radius)
     if evaluate(inverse_kernel, parameters, chains, inverse, bound) >= 0:
         _require_regular(inverse)
         # The Frobenius condition number is never below the 2-norm one and costs a twentieth:

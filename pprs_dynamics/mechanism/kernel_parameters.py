@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from pprs_dynamics.mechanism.vectors import Vector
 
 P = TypeVar('P', bound=tuple[Any, ...])
+Q = TypeVar('Q', bound=tuple[Any, ...])
 
 
 class KernelParameters(Generic[P]):
@@ -31,15 +32,24 @@ class KernelParameters(Generic[P]):
 
     def __init__(self, named: P) -> None:
         self.named = named
-        self.row = np.array(list(_numbers(named)))
+        self.row = np.array(_numbers(named))
+
+    def extended(self, form: Callable[..., Q], *others: Any) -> KernelParameters[Q]:
+        """Return the parameters `form(named, *others)`, a named tuple that begins with these."""
+        extended: KernelParameters[Q] = object.__new__(KernelParameters)
+        extended.named = form(self.named, *others)
+        extended.row = np.concatenate((self.row, _numbers(others)))
+        return extended
 
 
-def _numbers(named: tuple[Any, ...]) -> Iterator[float]:
+def _numbers(named: tuple[Any, ...]) -> list[float]:
+    numbers: list[float] = []
     for value in named:
         if isinstance(value, tuple):
-            yield from _numbers(value)
+            numbers += _numbers(value)
         else:
-            yield float(value)
+            numbers.append(float(value))
+    return numbers
 
 
 class Chain(NamedTuple):

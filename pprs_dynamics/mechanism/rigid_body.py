@@ -26,7 +26,6 @@ from pprs_dynamics.mechanism.inverse_kinematics import (
 )
 from pprs_dynamics.mechanism.kernel_parameters import (
     ChainMasses,
-    KernelParameters,
     PlatformBody,
     RobotParameters,
 )
@@ -284,7 +283,7 @@ def solve_bodies(
     reactions = np.empty((samples, 18))
     loads = (np.zeros((samples, 9)) if load is None
              else np.concatenate((load.wrench, load.hinge), axis=1))
-    parameters = KernelParameters(BodyParameters(robot.kernel_parameters.named, printed))
+    parameters = robot.kernel_parameters.extended(BodyParameters, printed)
     evaluate(body_kernel, parameters, motion.rows, chains, inverse, loads, force, guide_load,
              reactions)
     return RigidBody(force, guide_load, reactions)

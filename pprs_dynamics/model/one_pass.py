@@ -35,7 +35,7 @@ from pprs_dynamics.mechanism.inverse_kinematics import (
     chain_motions,
 )
 from pprs_dynamics.mechanism.joint_rates import turnover
-from pprs_dynamics.mechanism.kernel_parameters import KernelParameters, RobotParameters
+from pprs_dynamics.mechanism.kernel_parameters import RobotParameters
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
@@ -102,10 +102,10 @@ class OnePass:
         self._bounds = limits.rod_sine, limits.condition_number
         drives = zip(active.viscous, active.coulomb, np.broadcast_to(reversal.velocity, 6).tolist(),
                      strict=True)
-        self.parameters = KernelParameters(ForcesParameters(
-            robot.kernel_parameters.named, robot.geometry.platform_radius, float(printed),
+        self.parameters = robot.kernel_parameters.extended(
+            ForcesParameters, robot.geometry.platform_radius, float(printed),
             float(passive.printed), limits.rod_sine, limits.condition_number ** 2, reversal.rate,
-            passive.joints, tuple(DriveFriction(*drive) for drive in drives)))
+            passive.joints, tuple(DriveFriction(*drive) for drive in drives))
 
     def forces(self, motion: PlatformMotion) -> Array | None:
         """Return total, rigid body, active and passive friction, (4, N, 6) [N].
