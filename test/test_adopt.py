@@ -31,8 +31,9 @@ from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.model.ledger import read_steps
-from pprs_dynamics.model.model_file import build_model, default_parameters, read_parameters
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.model.parameter_file import default_parameters, read_parameters
 from pprs_dynamics.residuals.measuring import measure_residuals
 
 BENCHMARKS = Path(__file__).parents[1] / 'benchmarks'

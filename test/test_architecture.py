@@ -45,6 +45,27 @@ def imports(file: Path) -> set[str]:
     return names
 
 
+def imported_files(file: Path) -> set[Path]:
+    """Return the files of the package that a file imports anywhere, in functions too."""
+    names = imports(file)
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {f'{node.module}.{alias.name}' for alias in node.names}
+    paths = (PACKAGE.parent.joinpath(*name.split('.')).with_suffix('.py') for name in names)
+    return {path for path in paths if path.is_file() and PACKAGE in path.parents}
+
+
+def circles(graph: dict[Path, set[Path]]) -> set[Path]:
+    """Return the files of a graph of imports that import each other, over however many files."""
+    left = {file: set(used) for file, used in graph.items()}
+    # Files are taken away that import none of the rest, then those that none of the rest imports.
+    for _ in range(2):
+        while free := {file for file, used in left.items() if not used & left.keys()}:
+            left = {file: used for file, used in left.items() if file not in free}
+        left = {file: {other for other in left if file in left[other]} for file in left}
+    return set(left)
+
+
 def files() -> list[Path]:
     return sorted(file for file in PACKAGE.rglob('*.py') if file.parent != PACKAGE)
 
@@ -60,6 +81,21 @@ def test_arrows_point_one_way(file: Path) -> None:
         assert not libraries & ROS
     if folder not in ('report', 'commands'):
         assert not libraries & PLOTTING
+
+
+def test_no_file_imports_one_that_imports_it() -> None:
+    found = circles({file: imported_files(file) for file in files()})
+    assert {str(file.relative_to(PACKAGE)) for file in found} == set()
+
+
+def test_a_circle_that_a_local_import_hides_is_found(tmp_path: Path) -> None:
+    a, b, c, d = (tmp_path / name for name in 'abcd')
+    assert circles({a: {b}, b: {c}, c: set()}) == set()
+    assert circles({a: {b}, b: {c}, c: {b, d}, d: set()}) == {b, c}
+    line = PACKAGE / 'mechanism' / 'motion.py'
+    hidden = tmp_path / 'hidden.py'
+    hidden.write_text('def f():\n    from pprs_dynamics.mechanism import motion\n')
+    assert imported_files(hidden) == {line}
 
 
 @pytest.mark.parametrize('file', sorted((PACKAGE / 'nodes').glob('*.py')), ids=lambda f: f.name)

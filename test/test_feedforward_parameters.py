@@ -116,7 +116,7 @@ def test_many_parameters_change_at_once_or_not_at_all(caller: Caller) -> None:
 
 
 @pytest.mark.parametrize(('name', 'value', 'told'), [
-    ('masses.payload', -1.0, 'masses.payload is -1.0, but it must be a number, at least 0'),
+    ('masses.payload', -1.0, 'masses.payload is -1.0, must be at least 0'),
     ('masses.paylod', 1.0, 'did you mean masses.payload'),
     ('limits.effort', [1.0, 2.0], 'limits.effort is [1.0, 2.0]'),
     ('friction.approach', 'third', 'whole_mechanism'),

@@ -19,8 +19,9 @@ from rclpy.node import Node
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.model.atomic_file import write_text
-from pprs_dynamics.model.model_file import build_model, default_parameters, read_parameters
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import edit_model, format_model, write_model
+from pprs_dynamics.model.parameter_file import default_parameters, read_parameters
 
 PAPER = Path(__file__).parents[1] / 'config' / 'paper.yaml'
 # Numbers whose shortest text is a trap: whole, tiny, huge, not representable, negative zero.

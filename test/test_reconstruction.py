@@ -438,7 +438,7 @@ def test_a_single_axis_is_smoothed_but_has_no_platform():
     found = smooth_drives(recording)
     assert rms(found.velocity - real.drives.velocity[found.index, :1]) < 1e-5
     assert any('velocities of axis' in note for note in found.notes)
-    with pytest.raises(MotionError, match='they are axis, but it must be slide_1'):
+    with pytest.raises(MotionError, match='they are axis, must be slide_1'):
         reconstruct(MODEL, recording)
 
 

@@ -89,13 +89,13 @@ def test_its_parameters_are_checked_like_any_others(installed: Path, tmp_path: P
         'active': ['eddy_brake'],
         'eddy_brake': {'slide_2': {'coefficient': -3.0, 'critical_velocity': 0.05}}})
     done = python(LOAD, installed, file)
-    assert 'effects.eddy_brake.slide_2.coefficient is -3.0, but it must lie in' in done.stdout
+    assert 'effects.eddy_brake.slide_2.coefficient is -3.0, must be between' in done.stdout
 
 
 def test_without_the_package_the_effect_is_unknown(tmp_path: Path) -> None:
     file = model_file(tmp_path, {'active': ['eddy_brake']})
     done = python(LOAD, tmp_path, file)
-    assert "name known effects, not 'eddy_brake'" in done.stdout
+    assert 'effects.active: unknown effect eddy_brake (known: ' in done.stdout
 
 
 LIST = '''

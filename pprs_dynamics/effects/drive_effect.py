@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import CatalogueEffect, names
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import ModelError, UnknownNameError
 from pprs_dynamics.mechanism.robot import AXIS, DRIVES
 from pprs_dynamics.mechanism.state import DriveStates
 
@@ -140,8 +140,7 @@ class DriveEffect(CatalogueEffect):
                              f'{{{names(cls.parameters)}}}')
         for drive in values:
             if drive not in (*DRIVES, AXIS):
-                raise ModelError(f'{prefix}.{drive}', values[drive],
-                                 f'sit on one of the drives {", ".join(DRIVES)}')
+                raise UnknownNameError('drive', drive, DRIVES, prefix)
         return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
                     for drive, block in values.items()})
 

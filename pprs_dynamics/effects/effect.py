@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.mechanism.state import MechanismState
 
 
@@ -60,11 +60,11 @@ class Parameter:
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ModelError(key, value, 'be a number')
+            raise ModelError(key, value, f'be a number ({self.description} [{self.unit}])')
         # Bounds are finite, so that what lies within is, too.
         if not self.lower <= value <= self.upper:
-            raise ModelError(key, value, f'lie in [{self.lower:g}, {self.upper:g}] '
-                             f'{self.unit} ({self.description})')
+            raise ModelError(key, value, f'be between {self.lower:g} and {self.upper:g} '
+                             f'({self.description} [{self.unit}])')
         return float(value)
 
 
@@ -232,8 +232,8 @@ class CatalogueEffect(Effect):
         known = {parameter.name: parameter for parameter in cls.parameters}
         for name in values:
             if name not in known:
-                raise ModelError(f'{prefix}.{name}', values[name],
-                                 f'not be there: {cls.name} has {names(cls.parameters)}')
+                raise UnknownNameError('key', f'{prefix}.{name}',
+                                       [f'{prefix}.{parameter}' for parameter in known])
         checked = {}
         for name, parameter in known.items():
             if name not in values and parameter.default is None:

@@ -5,6 +5,7 @@ F = M (q_ddot - g) + F_v q_dot + F_c sgn(q_dot) + offset + effects, positive alo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -13,15 +14,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.load_friction import LoadFriction
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.robot import AXIS
+from pprs_dynamics.model.effects_block import added_effects
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
-from pprs_dynamics.model.keys import AXIS_KEYS
+from pprs_dynamics.model.keys import AXIS_KEYS, is_axis
+from pprs_dynamics.model.parameter_file import find_file, read_parameters
+from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
 
 @dataclass(frozen=True)
@@ -116,12 +121,29 @@ class AxisModel(ForceModel):
         ModelError
             For a key that is unknown, missing, of the wrong type or impossible, and for a 3-PPRS.
         """
-        from pprs_dynamics.model.model_file import load_model
+        file = find_file(path)
+        return cls.from_parameters(read_parameters(file), source=str(file))
 
-        model = load_model(path)
-        if not isinstance(model, AxisModel):
-            raise ModelError('geometry', 'that of a 3-PPRS', 'be a single axis', model.source)
-        return model
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> AxisModel:
+        """Build the model from flat keys and values, each checked; see `build_model`.
+
+        Raises
+        ------
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for those of
+            a 3-PPRS.
+        """
+        with source_of_errors(source):
+            if not is_axis(parameters):
+                raise ModelError('axis.mass', MISSING, 'be given: this needs a single axis')
+            values = checked_values(parameters)
+            friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])
+            effects = (friction, AxisOffset(values['axis.offset']),
+                       *added_effects(parameters, cls))
+            return cls(mass=values['axis.mass'], gravity=values['axis.gravity'], effects=effects,
+                       reversal=Reversal(values['friction.reversal_velocity']), values=values,
+                       source=source)
 
     @classmethod
     def offers(cls, effect: type[CatalogueEffect]) -> bool:

@@ -53,20 +53,26 @@ class Key:
 
     @property
     def rule(self) -> str:
-        """What a value must be, completing "it must ..."."""
+        """The requirement on a value, completing "must ..."."""
         if self.choices:
             return f'be one of {", ".join(self.choices)} ({self.description})'
-        count = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
-        limits = []
+        form = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
+        return self._described(f'{form} {self._bounds}' if self._bounds else form)
+
+    @property
+    def _bounds(self) -> str:
+        bounds = []
         if self.positive:
-            limits.append('greater than 0')
+            bounds.append('greater than 0')
         elif self.lower > -math.inf:
-            limits.append(f'at least {self.lower:g}')
+            bounds.append(f'at least {self.lower:g}')
         if self.upper < math.inf:
-            limits.append(f'at most {self.upper:g}')
-        bounds = f', {" and ".join(limits)}' if limits else ''
+            bounds.append(f'at most {self.upper:g}')
+        return ' and '.join(bounds)
+
+    def _described(self, rule: str) -> str:
         unit = f' [{self.unit}]' if self.unit else ''
-        return f'{count}{bounds} ({self.description}{unit})'
+        return f'{rule} ({self.description}{unit})'
 
     def check(self, value: Any) -> Any:
         """Return the value as a word, a float or a tuple of floats, or raise ModelError."""
@@ -83,12 +89,13 @@ class Key:
         return tuple(self._number(element, list(value)) for element in value)
 
     def _number(self, element: Any, value: Any) -> float:
-        # Compared before it is converted: a whole number of any length compares.
-        good = (isinstance(element, (int, float)) and not isinstance(element, bool)
-                and max(self.lower, -LARGEST) <= element <= min(self.upper, LARGEST)
-                and not (self.positive and element <= 0))
-        if not good:
+        if isinstance(element, bool) or not isinstance(element, (int, float)):
             raise ModelError(self.name, value, self.rule)
+        # Compared before it is converted: a whole number of any length compares.
+        if not -LARGEST <= element <= LARGEST:
+            raise ModelError(self.name, value, self._described('be finite'))
+        if not self.lower <= element <= self.upper or (self.positive and element <= 0):
+            raise ModelError(self.name, value, self._described(f'be {self._bounds}'))
         return float(element)
 
 
@@ -153,6 +160,10 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
         default=0.0),
     Key('friction.reversal_velocity', 'width in which sgn turns over', 'm/s', positive=True),
 )}
+
+
+# Blocks whose keys are not listed one by one.
+ADDED = ('effects.', 'tolerances.', 'history.')
 
 
 def is_axis(names: Iterable[str]) -> bool:

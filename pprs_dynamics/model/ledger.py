@@ -12,7 +12,7 @@ from dataclasses import MISSING as NO_DEFAULT
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -200,8 +200,8 @@ def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
         found[one.name] = _checked(key, block[one.name], str(one.type))
     unknown = [name for name in block if name.split('.')[0] not in {f.name for f in fields(Step)}]
     if unknown:
-        raise ModelError(f'{prefix}.{unknown[0]}', block[unknown[0]], 'not be there: no such key '
-                         'of a step')
+        raise UnknownNameError('key', f'{prefix}.{unknown[0]}',
+                               [f'{prefix}.{field.name}' for field in fields(Step)])
     return Step(**found)
 
 

@@ -23,12 +23,8 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.atomic_file import write_text
 from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, keys_of
-from pprs_dynamics.model.model_file import (
-    build_model,
-    other_nodes,
-    parse_parameters,
-    read_parameters,
-)
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.model.parameter_file import other_nodes, parse_parameters, read_parameters
 
 WRITTEN = ('effects', 'history')  # blocks of commands; the rest is people's
 INDENT = '  '
