@@ -146,14 +146,6 @@ def test_whitened_noise_is_white_of_unit_variance_also_across_segments(phi: floa
         assert abs(np.mean(used[lag:] * used[:-lag])) < 0.07
 
 
-def test_surrogates_have_the_spread_and_memory_of_the_noise_they_stand_for() -> None:
-    rng = np.random.default_rng(10)
-    model = fit_noise(0.2 * ar1(0.9, 8000, rng), [slice(0, 8000)])
-    copies = model.surrogate(8000, rng, 8)
-    assert copies.std() == pytest.approx(0.2, rel=0.1)
-    assert np.mean(copies[:, 1:] * copies[:, :-1]) / copies.var() == pytest.approx(0.9, abs=0.02)
-
-
 def test_what_does_not_repeat_is_the_noise_of_a_periodic_motion() -> None:
     rng = np.random.default_rng(11)
     time = PERIOD * np.arange(4000)

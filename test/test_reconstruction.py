@@ -27,7 +27,7 @@ from pprs_dynamics.measurement.live_reconstruction import LiveReconstruction
 from pprs_dynamics.measurement.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.sampling_grid import find_grid
-from pprs_dynamics.measurement.treatment import LiveTreatment, Treatment, block_length
+from pprs_dynamics.measurement.treatment import Treatment, block_length
 from pprs_dynamics.mechanism import forward_motion
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.mechanism.forward_motion import (
@@ -567,20 +567,22 @@ def test_velocities_are_judged_drive_by_drive_and_a_missing_one_is_not_used():
 # Live ----------------------------------------------------------------------------------------
 
 def play(recording, polynomial, block):
-    """Return live samples, and the blocks of effort and velocity."""
-    live, treatment = LiveReconstruction(polynomial), LiveTreatment(block)
-    samples, blocks = [], []
+    """Return live samples, and the blocks of effort and velocity in each stretch."""
+    live = LiveReconstruction(polynomial)
+    samples, stretches = [], []
     for time, q, F in zip(recording.time, recording.position, recording.effort, strict=True):
         sample = live.push(time, q, F)
         if sample is None:
             continue
         if sample.is_start:
-            treatment.reset()
+            stretches.append([])
         samples.append(sample)
-        mean = treatment.push(np.concatenate((sample.effort, sample.velocity)))
-        if mean is not None:
-            blocks.append(mean)
-    return live, samples, np.array(blocks)
+        stretches[-1].append(np.concatenate((sample.effort, sample.velocity)))
+    blocks = []
+    for stretch in stretches:
+        whole = len(stretch) // block * block
+        blocks.append(Treatment(np.arange(0, whole, block), whole)(np.array(stretch[:whole])))
+    return live, samples, np.concatenate(blocks)
 
 
 def test_live_and_offline_agree_to_rounding_across_a_gap():

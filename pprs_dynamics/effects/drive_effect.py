@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -34,11 +34,6 @@ class DriveSamples:
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
                    state.guide_load[:, drive], memory)
-
-    def with_memory(self, memory: Any) -> DriveSamples:
-        """Return the same with a memory."""
-        return replace(self, memory=memory)
-
 
 @dataclass(frozen=True)
 class DriveRange:

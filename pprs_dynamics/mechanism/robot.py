@@ -18,7 +18,7 @@ from pprs_dynamics.mechanism.kernel_parameters import (
     PlatformBody,
     RobotParameters,
 )
-from pprs_dynamics.mechanism.vectors import ChainVector, Vector, in_base, in_chain
+from pprs_dynamics.mechanism.vectors import ChainVector, Vector, in_base
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 AXIS = 'axis'  # the drive of a single axis
@@ -26,7 +26,7 @@ ELBOWS = ('up', 'down')
 
 
 class ChainFrames:
-    """The three chain frames (e_i, n_i, k), and the way between them and `base`.
+    """The three chain frames (e_i, n_i, k) in `base`.
 
     Parameters
     ----------
@@ -37,20 +37,6 @@ class ChainFrames:
     def __init__(self, angles: tuple[float, float, float]) -> None:
         self.cos = np.cos(angles)
         self.sin = np.sin(angles)
-
-    def components(self, vector: Array) -> ChainVector:
-        """Return the chain components of a vector given in `base`.
-
-        Parameters
-        ----------
-        vector : (N, 3) or (N, 3, 3) array
-            One vector for all chains, or one per chain (axis 1).
-        """
-        if vector.ndim == 2:
-            vector = vector[:, None, :]
-        x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
-        e, n, k = in_chain(self, Vector(x, y, z))
-        return ChainVector(e, n, np.broadcast_to(k, e.shape))
 
     def base(self, vector: ChainVector) -> Array:
         """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""

@@ -57,7 +57,7 @@ class Kinematics:
     Raises
     ------
     WorkspaceError, SingularityError
-        On first use, see `solve_inverse_kinematics` and `compute_jacobians`.
+        On first use, see `solve_inverse_kinematics` and `inverse_table`.
     """
 
     def __init__(
@@ -206,7 +206,7 @@ def solve_mechanism(
     Raises
     ------
     WorkspaceError, SingularityError
-        See `solve_inverse_kinematics` and `compute_jacobians`.
+        See `solve_inverse_kinematics` and `inverse_table`.
     """
     kinematics = Kinematics(robot.geometry, motion, minimum_sine, condition_limit)
     state = MechanismState(robot, motion, kinematics, reversal or Reversal(), printed)

@@ -110,4 +110,4 @@ class DrivenMotion:
         """Return what platform and rods do at one sample."""
         qpos, qvel, rotation = self.qpos[sample], self.qvel[sample], self.rotation[sample]
         return PlatformMoment(float(self.time[sample]), qpos[9:12], rotation, qvel[9:12],
-                              rotation @ qvel[12:], qpos[2:9:3], qvel[2:9:3])
+                              rotation @ qvel[12:], qpos[2:9:3])

@@ -98,8 +98,8 @@ class PlatformMoment:
     position, velocity, angular_velocity : (3,) arrays
         Of the platform.
     rotation : (3, 3) array
-    rod_angle, rod_rate : (3,) arrays
-        u_i and its rate.
+    rod_angle : (3,) array
+        u_i [rad].
     """
 
     time: float
@@ -108,7 +108,6 @@ class PlatformMoment:
     velocity: Array
     angular_velocity: Array
     rod_angle: Array
-    rod_rate: Array
 
 
 class HiddenEffect(ABC):

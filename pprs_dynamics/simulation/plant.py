@@ -52,7 +52,6 @@ from pprs_dynamics.simulation.resistance import Resistance
 
 LOAD_ROUNDS = 20
 LOAD_TOLERANCE = 3e-5  # [N], between rounds; what is left in the forces is below mu times it
-SOLVER_ITERATIONS = 40
 # Stops at the ends of the strokes.
 STOP_STIFFNESS = 1e5  # [N/m]
 STOP_DAMPING = 300.0  # [N s/m]
@@ -283,7 +282,7 @@ class Plant:
         rotation, velocities = chains.rotation.copy(), chains.qvel
         moment = PlatformMoment(
             time, chains.qpos[9:12].copy(), rotation, velocities[9:12].copy(),
-            rotation @ velocities[12:], chains.qpos[2:9:3].copy(), velocities[2:9:3].copy())
+            rotation @ velocities[12:], chains.qpos[2:9:3].copy())
         for effect in self._structure_forces:
             hinges, force, torque = effect.apply(moment)
             passive[:3] += hinges

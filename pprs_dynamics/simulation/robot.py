@@ -73,11 +73,6 @@ class SimulatedRobot:
         """What the robot has had to say."""
         return self.control.notes
 
-    @property
-    def stopped(self) -> bool:
-        """True after the mechanism came to a singular pose: it moves no more."""
-        return self._stopped
-
     def place(self, position: Array, velocity: Array | None = None) -> None:
         """Put the drives at encoder positions (6,) [m], at rest or with velocities [m/s].
 
