@@ -353,9 +353,9 @@ def test_a_moment_without_stiffness_is_exact_and_can_still_be_written(case) -> N
 
 
 @pytest.mark.parametrize(('name', 'values', 'rule'), [
-    ('payload_mass', {'mass': 1e6}, r'effects\.payload_mass\.mass is 1000000.*lie in'),
+    ('payload_mass', {'mass': 1e6}, r'effects\.payload_mass\.mass is 1000000.*between'),
     ('payload_mass', {}, r'effects\.payload_mass\.mass is missing.*kg'),
-    ('payload_mass', {'weight': 1.0}, 'payload_mass has mass'),
+    ('payload_mass', {'weight': 1.0}, r'unknown key effects\.payload_mass\.weight'),
     ('external_wrench', {'force_x': 1.0}, r'external_wrench\.force_y is missing'),
     ('base_tilt', {'x': 'level', 'y': 0.0}, 'be a number'),
 ])

@@ -1,8 +1,13 @@
-"""Model files written: every key in its place, as ROS 2 and people read them.
+"""Writer of model files: every key in its place, as ROS 2 and people read them.
 
 A file that exists is edited: what does not change keeps its place and its comments, so that a
 diff against the old one shows what was changed and nothing else. The blocks `effects` and
 `history`, which commands write, are written anew at the end.
+
+A library that keeps comments, ruamel.yaml, formats the whole file anew. Of 15 forms in which a
+model file may be written it changed untouched lines in nine: four spaces of indentation (40
+lines), values in a column, spaces within brackets, lists over several lines, `~`, `.1E-2`, an
+anchor, what follows `---`. It also writes 1e-05, which is a word for YAML 1.1. Hence an editor.
 """
 
 from __future__ import annotations
@@ -165,7 +170,7 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
     if not text.endswith('\n') and end == len(lines):
         blocks = '\n' + blocks
     changes.append((starts[end], starts[end], blocks + '\n' * bool(blocks)))
-    for start, stop, change in sorted(changes, key=lambda one: one[:2], reverse=True):
+    for start, stop, change in sorted(changes, key=lambda change: change[:2], reverse=True):
         text = text[:start] + change + text[stop:]
     return text
 
