@@ -296,5 +296,3 @@ def _draw_widths(rng: np.random.Generator) -> tuple[float, ...]:
     if rng.random() < 0.5:
         return (_draw_width(rng),) * 6
     return tuple(_draw_width(rng) for _ in range(6))
-
-

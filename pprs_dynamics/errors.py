@@ -15,7 +15,7 @@ MANY = 40
 
 
 class Missing:
-    """Stands for a value that is not there, which is not the same as None."""
+    """Stands for a value that is absent, unlike None."""
 
     def __repr__(self) -> str:
         return 'missing'

@@ -189,7 +189,7 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     forces = model_of(robot).drive_forces(motion)
     chains, body = forces.mechanism.chains, forces.mechanism.rigid_body
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
-        robot.geometry.rod_length
+        robot.geometry.rod_length  # noqa: E741
     slides, lifts, rods = (np.asarray(m)[:, None] for m in (
         robot.masses.slides, robot.masses.lifts, robot.masses.rods))
     c, s = chains.cos_u[..., None], chains.sin_u[..., None]

@@ -353,7 +353,7 @@ def test_J_u_is_that_of_constant_distances_between_the_spherical_joints(geometry
     motion = random_motion(np.random.default_rng(42), 200, geometry.elbow)
     chains, jacobians = solve(geometry, motion)
     e, n = chain_vectors(geometry)
-    k, l = np.array([0.0, 0.0, 1.0]), geometry.rod_length
+    k, l = np.array([0.0, 0.0, 1.0]), geometry.rod_length  # noqa: E741
     for sample in range(len(motion)):
         q, c, s = chains.position[sample], chains.cos_u[sample], chains.sin_u[sample]
         A = (geometry.base_radius * e + q[:3, None] * n + q[3:, None] * k

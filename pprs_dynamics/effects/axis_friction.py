@@ -1,4 +1,4 @@
-"""What a single axis has beside its inertia: friction, and a constant force."""
+"""Friction and constant force of a single axis."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def catalogue() -> dict[str, type[CatalogueEffect]]:
 
 
 class _UnusableEffectError(Exception):
-    """What is wrong with another package's effect."""
+    """Another package's effect breaks a rule of the catalogue."""
 
 
 def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[CatalogueEffect]:

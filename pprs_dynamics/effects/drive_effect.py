@@ -18,7 +18,7 @@ from pprs_dynamics.mechanism.state import DriveStates
 
 @dataclass(frozen=True)
 class DriveSamples:
-    """What one drive did: all (N,); `time` is None where unknown, `direction` is sgn."""
+    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn."""
 
     time: Array | None
     position: Array
@@ -30,14 +30,15 @@ class DriveSamples:
 
     @classmethod
     def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
-        """Return one drive's share of a state."""
+        """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
                    state.guide_load[:, drive], memory)
 
+
 @dataclass(frozen=True)
 class DriveRange:
-    """What a recording covers, from which grids of shape parameters are made.
+    """Range that a recording covers, from which grids of shape parameters are made.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ class DriveEffect(CatalogueEffect):
 
 
 class MeasurementEffect(DriveEffect):
-    """What the sensors of a drive say beside the truth. It never enters a command."""
+    """Systematic error of a drive's sensors. It never enters a command."""
 
     is_measurement = True
 
@@ -182,10 +183,10 @@ class MeasurementEffect(DriveEffect):
         return bool(np.any(unit.position_error((AXIS,))))
 
     def position_error(self, drives: Sequence[str]) -> Array:
-        """Return what must be taken off measured positions [m], (D,)."""
+        """Return the errors of measured positions [m], to be subtracted, (D,)."""
         return np.zeros(len(drives))
 
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:
-        """Return what the sensors say where the drives apply `effort` (N, D) [N]."""
+        """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         return effort

@@ -19,7 +19,7 @@ class DriveInertia(DriveEffect):
     unphysical_below: ClassVar[Mapping[str, float]] = {'mass': 0.0}
     card = Card(
         'm q_ddot',
-        'a straight line over the drive\'s own acceleration, and no part in its weight; largest '
+        "a straight line over the drive's own acceleration, and no part in its weight; largest "
         'where the drive turns back',
         'inertia of rotor, coupling, pulley and screw that the mass of the slide does not '
         'contain: J (2 pi / lead)^2 for a screw',

@@ -1,4 +1,4 @@
-"""What an effect is: a share of the drive forces, with parameters that it declares once."""
+"""Base of all effects: a share of the drive forces, with parameters declared once."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Effect(ABC):
 
 @dataclass(frozen=True)
 class Card:
-    """What a person needs to know of an effect.
+    """Description of an effect for users.
 
     Parameters
     ----------
@@ -241,7 +241,8 @@ class CatalogueEffect(Effect):
                     continue
                 raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
-            checked[name] = parameter.check(f'{prefix}.{name}', values.get(name, parameter.default))
+            value = values.get(name, parameter.default)
+            checked[name] = parameter.check(f'{prefix}.{name}', value)
         return checked
 
 

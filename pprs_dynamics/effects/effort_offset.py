@@ -23,7 +23,7 @@ class EffortOffset(DriveEffect):
         'zero of the force or current sensor, bias of the amplifier, a counterbalance or a '
         'hanging cable, a slide that is not level (then all drives show it: base_tilt)',
         'read the effort with the drive uncoupled or the amplifier disabled: what is left is the '
-        'sensor\'s; else hang the cable or counterbalance off and repeat',
+        "sensor's; else hang the cable or counterbalance off and repeat",
         'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
         'on the offset of motor currents')
 

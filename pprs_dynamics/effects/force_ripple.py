@@ -102,7 +102,7 @@ class ForceRipple(DriveEffect):
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return A cos(phi), A sin(phi), and the same of the second harmonic."""
+        """Return A cos(phi) and A sin(phi) of both harmonics."""
         A, phi = values['force'], values['phase']
         A_2, phi_2 = values['second'], values['second_phase']
         return {'sine': A * math.cos(phi), 'cosine': A * math.sin(phi),

@@ -27,7 +27,7 @@ class FrictionDrift(DriveEffect):
         'grows, where F is negative), whatever the motion',
         'grease that warms by the friction itself or after a cold start, seals that settle, a '
         'preload that changes as screw or guide expand',
-        'repeat the same motion for an hour from cold, and after a night\'s rest: the friction '
+        "repeat the same motion for an hour from cold, and after a night's rest: the friction "
         'must fade alike both times; measure the temperature of nut and guide beside it',
         'Bittencourt and Gunnarsson, Static friction in a robot joint: modeling and '
         'identification of load and temperature effects, ASME J. Dynamic Systems, Measurement, '

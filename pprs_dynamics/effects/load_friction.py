@@ -15,7 +15,7 @@ class LoadFriction(DriveEffect):
 
     name: ClassVar[str] = 'load_friction'
     is_friction: ClassVar[bool] = True
-    linear = (Parameter('coefficient', 'dmu', '1', 'friction coefficient beyond the model\'s',
+    linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
     card = Card(

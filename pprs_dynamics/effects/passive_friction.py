@@ -247,9 +247,9 @@ class PassiveFriction(Effect):
 
     def resistances(self, state: MechanismState) -> Resistances:
         """Return k_ri and k_si at the frictionless reactions, Eq. (9)."""
-        k = np.empty(state.rigid_body.force.shape)
-        evaluate(resistance_kernel, KernelParameters(self.joints),
-                 state.rigid_body.reaction_table, state.kinematics.turnover(state.reversal.rate), k)
+        k, reactions = np.empty(state.rigid_body.force.shape), state.rigid_body.reaction_table
+        evaluate(resistance_kernel, KernelParameters(self.joints), reactions,
+                 state.kinematics.turnover(state.reversal.rate), k)
         return Resistances(k[:, :3], k[:, 3:])
 
     @cached_property

@@ -41,6 +41,6 @@ class PlatformInertia(BodyEffect):
 
     def changed(self, robot: Robot) -> Robot:
         """Return the robot with the other inertia."""
-        more = (self.values[p.name] for p in self.parameters)
-        inertia = tuple(I + I_more for I, I_more in zip(robot.masses.inertia, more, strict=True))
+        inertia = tuple(moment + self.values[p.name] for moment, p in zip(
+            robot.masses.inertia, self.parameters, strict=True))
         return with_masses(robot, inertia=inertia)

@@ -45,7 +45,7 @@ class TimeDelay(MeasurementEffect):
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
         """Return delays from -30 to 30 ms in steps of 2 ms, shorter ones in fractions of it."""
         late = [*SHORT, *np.arange(STEP, LONGEST + 1e-9, STEP)]
-        return [{'delay': float(d)} for d in (*(-one for one in reversed(late)), *late)]
+        return [{'delay': float(d)} for d in (*(-delay for delay in reversed(late)), *late)]
 
     @classmethod
     def drive_memory(cls) -> Any:

@@ -1,4 +1,4 @@
-"""The few functions that equations need, alike for floats and for arrays of samples.
+"""Elementary functions for the equations, alike for floats and for arrays of samples.
 
 An equation is stated once, componentwise, and runs in three ways: on floats, on arrays with one
 element per sample, and compiled. See `evaluation`.
@@ -37,7 +37,7 @@ def everywhere(condition: Any) -> bool:
     return bool(np.all(condition))
 
 
-# What compiled code calls in their place.
+# Compiled code calls these in their place.
 def compiled_sqrt(x: Any) -> Any:
     """Return the square root, NaN below 0."""
     return math.sqrt(x)

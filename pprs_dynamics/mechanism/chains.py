@@ -14,8 +14,8 @@ R = TypeVar('R')
 def each_chain(function: Callable[[int, *Ts], R]) -> Callable[[*Ts], tuple[R, R, R]]:
     """Decorate a function of chain i, its first argument: the result gives those of all three.
 
-    In Python as compiled. Tuples stay in registers: where a loop stores the motion of the chains in
-    an array instead, the forces of a batch take 1.20 (1.18 to 1.24) times as long.
+    In Python as compiled. Tuples stay in registers: where a loop stores the motion of the chains
+    in an array instead, the forces of a batch take 1.20 (1.18 to 1.24) times as long.
     """
     @wraps(function)
     def three(*arguments: *Ts) -> tuple[R, R, R]:

@@ -95,7 +95,7 @@ def rows_of_chains(i: int, geometry: GeometryParameters, rods: Any) -> ClosureRo
 
 
 class Elimination(NamedTuple):
-    """What is left of Eq. (4) without v_x and v_y, solved.
+    """Eq. (4) after elimination of v_x and v_y, solved.
 
     v_x = h_x - `along_x` . omega, and v_y alike; `z0`, `w0` are v_z and omega for a unit b, the
     `z` and `w` those for unit b_i.
@@ -181,7 +181,7 @@ def _lift_columns(i: int, e: Elimination) -> Twist:
 def _horizontal_shares(
     i: int, geometry: GeometryParameters, rods: Any, h_x: Any, h_y: Any,
 ) -> Any:
-    """Return what v_x and v_y, put in, add to the right side of lift i."""
+    """Return the share of eliminated v_x and v_y in the right side of lift i."""
     k = geometry.chains[i]
     return rods[i].cos_u * (k.cos * h_x + k.sin * h_y)
 
@@ -191,7 +191,7 @@ def _reduced_moments(
     i: int, geometry: GeometryParameters, rods: Any, rows: ThreeRows, along_x: Vector,
     along_y: Vector,
 ) -> Vector:
-    """Return g_i: the moment of V_i when v_x and v_y are put in."""
+    """Return g_i: the moment of V_i after elimination of v_x and v_y."""
     k, c_u = geometry.chains[i], rods[i].cos_u
     return combine(1.0, rows[i].lift.moment, c_u * k.cos, along_x, c_u * k.sin, along_y)
 
@@ -200,9 +200,9 @@ def _difference(f: Any, a: Vector, g: Any, b: Vector) -> Vector:
     return Vector(f * a.x - g * b.x, f * a.y - g * b.y, f * a.z - g * b.z)
 
 
-def rod_row(chain: Any, l: Any, arm: ChainVector, s_u: Any) -> Wrench:
+def rod_row(chain: Any, length: Any, arm: ChainVector, s_u: Any) -> Wrench:
     """Return u_dot_i per twist: the rod follows its tip, u_dot_i = e_i . v_Ai / (l sin u_i)."""
-    share = 1.0 / (l * s_u)
+    share = 1.0 / (length * s_u)
     zero = 0.0 * s_u
     return unit_wrench(chain, ChainVector(share, zero, zero), arm)             # Eq. (10)
 
@@ -216,12 +216,12 @@ def platform_twist(inverse: Inverse, right: DriveValues) -> Twist:
     """Return the twist for right sides of Eq. (4), [B]^-1 times them."""
     a, b, c = right.slides
     d, e, f = right.lifts
-    one, two, three = inverse.columns.slides
-    four, five, six = inverse.columns.lifts
-    return Twist(plus(combine(a, one.v, b, two.v, c, three.v),
-                      combine(d, four.v, e, five.v, f, six.v)),
-                 plus(combine(a, one.omega, b, two.omega, c, three.omega),
-                      combine(d, four.omega, e, five.omega, f, six.omega)))
+    slide_1, slide_2, slide_3 = inverse.columns.slides
+    lift_1, lift_2, lift_3 = inverse.columns.lifts
+    return Twist(plus(combine(a, slide_1.v, b, slide_2.v, c, slide_3.v),
+                      combine(d, lift_1.v, e, lift_2.v, f, lift_3.v)),
+                 plus(combine(a, slide_1.omega, b, slide_2.omega, c, slide_3.omega),
+                      combine(d, lift_1.omega, e, lift_2.omega, f, lift_3.omega)))
 
 
 def square(twist: Twist, r: Any) -> Any:

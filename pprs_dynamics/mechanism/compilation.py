@@ -25,7 +25,7 @@ MECHANISM, EFFECTS, MODEL = (Path(__file__).parents[1] / folder
 
 
 def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
-    """Return what compiles a kernel's loop, or None without Numba or a place to keep the result.
+    """Return the compiler of a kernel's loop, or None without Numba or a place for its cache.
 
     It takes a kernel and parameters of the form that the kernel takes; the loop takes a row.
 
@@ -114,7 +114,7 @@ def _inlined(function: FunctionType) -> Any:
 
 
 def _callee(used: Any) -> Any:
-    """Return what a compiled function finds under a name: functions of this package compiled."""
+    """Return a variable for compiled code: compiled, where it is a function of this package."""
     if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
         return _compiled(REPLACED.get(used, used))
     return used

@@ -1,4 +1,4 @@
-"""One statement of the equations, three ways to run it over samples.
+"""Evaluation of the equations over samples: compiled, on floats, or on arrays.
 
 A *kernel* is a function `kernel(p, s, *tables)` that reads sample s of tables, evaluates
 equations and writes sample s of other tables; it returns whether the sample is sound. Tables are

@@ -168,7 +168,7 @@ def _newton(geometry: Geometry, q: Array, pose: Array) -> _Found:
 
 
 class Closure(NamedTuple):
-    """What Eq. (3) leaves of a chain at a pose that does not yet close it.
+    """Residuals of Eq. (3) in a chain, at a pose that does not yet close it.
 
     `slide` and `lift` are residuals [m]; the rod is given as it then is.
     """
@@ -189,7 +189,7 @@ def chain_closures(
     The rod may point out of its chain's plane. That part of its row in [B] is a multiple of the
     slide's row, which is taken off here: the rows are then those of `closure_rows`.
     """
-    k, l = geometry.chains[i], geometry.l
+    k, l = geometry.chains[i], geometry.l  # noqa: E741
     arm = chain_arm(k, R)
     A = add(in_chain(k, P), arm)
     rod = ChainVector(A.e - geometry.R, A.n - q[s, i], A.k - q[s, CHAINS + i])

@@ -123,9 +123,9 @@ def platform_rates(
     """
     still = PlatformMotion.at_rest(poses.position, poses.orientation)
     chains = chain_table(geometry, still, LEAST_SINE)
-    rates = np.empty((len(poses), 12))
-    evaluate(rates_kernel, geometry.kernel_parameters, chains,
-             inverse_table(geometry, chains, np.inf), _table(velocity), _table(acceleration), rates)
+    inverse, rates = inverse_table(geometry, chains, np.inf), np.empty((len(poses), 12))
+    evaluate(rates_kernel, geometry.kernel_parameters, chains, inverse, _table(velocity),
+             _table(acceleration), rates)
     return PlatformMotion(poses.position, poses.orientation, rates[:, 0:3], rates[:, 3:6],
                           rates[:, 6:9], rates[:, 9:12], poses.time)
 
@@ -180,7 +180,7 @@ def centripetal(
     i: int, geometry: GeometryParameters, rods: ThreeChains, X_dot: Twist,
 ) -> tuple[Any, Any]:
     """Return n_i . c_i, and d_i . c_i + l u_dot_i^2."""
-    k, l, c = geometry.chains[i], geometry.l, rods[i]
+    k, l, c = geometry.chains[i], geometry.l, rods[i]  # noqa: E741
     omega = in_chain(k, X_dot.omega)
     spin = cross(omega, c.arm)
     inward = cross(omega, spin)
@@ -189,10 +189,10 @@ def centripetal(
 
 
 def find_jumps(motion: PlatformMotion) -> np.ndarray:
-    """Return before which samples of a motion with times the pose jumps, (N,) bool.
+    """Return the samples of a motion with times before which the pose jumps, (N,) bool.
 
-    A jump is a move from one sample to the next that is not what their twists say: the solution
-    of forward kinematics has left its branch there, or the drives were moved unseen.
+    A jump is a move between samples that contradicts the twists there: the solution of forward
+    kinematics has left its branch, or the drives were moved while not recorded.
     """
     if motion.time is None:
         raise MotionError('time', 'it is absent', 'be known to find jumps', 'time')
@@ -256,7 +256,7 @@ def _follow_marks(
 
 
 def _differ(position: Array, orientation: Array, other: Array, turned: Array) -> np.ndarray:
-    """Return which poses are not the same solution; NaN is none."""
+    """Return a mask of poses that are different solutions; NaN differs from all."""
     cosine = np.abs(np.sum(orientation * turned, axis=-1))  # of half the angle between them
     same: np.ndarray = ((np.abs(position - other).max(axis=-1) < SAME_POSE)
                         & (1 - cosine < SAME_POSE ** 2))

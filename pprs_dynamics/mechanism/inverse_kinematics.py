@@ -119,7 +119,7 @@ def chain_arm(chain: Chain, R: Rotation) -> ChainVector:
 @each_chain
 def chain_motions(i: int, geometry: GeometryParameters, motion: MotionSample) -> ChainSample:
     """Return the motion of chain i that belongs to the platform's, Eq. (3) and (4)."""
-    R, l, chain = geometry.R, geometry.l, geometry.chains[i]
+    R, l, chain = geometry.R, geometry.l, geometry.chains[i]  # noqa: E741
     rho = chain_arm(chain, motion.rotation)
     omega = in_chain(chain, motion.omega)
     epsilon = in_chain(chain, motion.epsilon)
@@ -207,8 +207,8 @@ def joint_positions(geometry: Geometry, motion: PlatformMotion) -> JointPosition
     slide, lift = chains.position[:, :3], chains.position[:, 3:]
     R, zero = np.full_like(slide, geometry.base_radius), np.zeros_like(slide)
     base = geometry.frames.base
-    tip = motion.position[:, None, :] + base(chains.arm)
-    return JointPositions(base(ChainVector(R, slide, zero)), base(ChainVector(R, slide, lift)), tip)
+    return JointPositions(base(ChainVector(R, slide, zero)), base(ChainVector(R, slide, lift)),
+                          motion.position[:, None, :] + base(chains.arm))
 
 
 def solve_inverse_kinematics(

@@ -34,7 +34,7 @@ def length(v: ChainVector) -> Any:
 
 
 def turnover(u_dot: Any, omega: ChainVector, width: Any) -> Turnover:
-    """Return how friction turns over in the joints of a chain, within `width` [rad/s]."""
+    """Return the turnover of friction in the joints of a chain, within `width` [rad/s]."""
     return Turnover(sign_over_speed(abs(u_dot), width),
                     sign_over_speed(length(relative_rate(u_dot, omega)), width))
 

@@ -74,7 +74,7 @@ class GeometryParameters(NamedTuple):
     """R and l [m], the sign of sin u_i, and the three chains."""
 
     R: Any
-    l: Any
+    l: Any  # noqa: E741
     elbow: Any
     chains: tuple[Chain, Chain, Chain]
 

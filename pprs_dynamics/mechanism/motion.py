@@ -113,22 +113,22 @@ class PlatformMotion:
 
     @cached_property
     def linear_velocity(self) -> Array:
-        """v of o [m/s], (N, 3)."""
+        """Velocity v of o [m/s], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 7:10])
 
     @cached_property
     def angular_velocity(self) -> Array:
-        """omega [rad/s], (N, 3)."""
+        """Angular velocity omega [rad/s], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 10:13])
 
     @cached_property
     def linear_acceleration(self) -> Array:
-        """a_o [m/s^2], (N, 3)."""
+        """Acceleration a_o of o [m/s^2], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 13:16])
 
     @cached_property
     def angular_acceleration(self) -> Array:
-        """epsilon [rad/s^2], (N, 3)."""
+        """Angular acceleration epsilon [rad/s^2], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 16:19])
 
     def is_closed(self) -> bool:
@@ -139,7 +139,7 @@ class PlatformMotion:
         return bool(moved < 1e-3 and turned < 1e-3)
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
-        """Return the same motion with other times [s]."""
+        """Return the motion with other times [s]."""
         same = object.__new__(PlatformMotion)
         same._set(self.rows, checked_times(time, len(self)))
         return same

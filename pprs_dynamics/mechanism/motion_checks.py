@@ -59,8 +59,8 @@ def checked_times(time: ArrayLike, samples: int) -> Array:
         raise MotionError('time', f'{str(time)[:60]!r} was given', f'be ({samples},) numbers',
                           'shape') from None
     if times.shape != (samples,):
-        raise MotionError('time', f'its shape is {np.shape(time)}', f'be ({samples},), as position',
-                          'shape')
+        raise MotionError('time', f'its shape is {np.shape(time)}',
+                          f'be ({samples},), as position', 'shape')
     if samples == 1 and isfinite(times[0]):
         return times  # of a stream's message, where the rest would take longer than the model
     if not np.all(np.isfinite(times)):

@@ -123,7 +123,7 @@ def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) ->
 
 
 def _continuous(quaternion: Array) -> Array:
-    """Return the same orientations with signs such that neighbours are near each other."""
+    """Return quaternions with signs chosen such that neighbours are near each other."""
     turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
     signs = np.concatenate(([1.0], np.cumprod(np.where(turned, -1.0, 1.0))))
     continuous: Array = quaternion * signs[:, None]

@@ -42,7 +42,7 @@ from pprs_dynamics.mechanism.vectors import ChainVector, Vector, in_chain, plus,
 
 
 class StructureLoad(NamedTuple):
-    """What the drives must overcome beside bodies and gravity.
+    """Loads on the mechanism beside bodies and gravity.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def rod_reactions(
     i: int, p: RobotParameters, rods: ThreeChains, specific: Any, hinges: Any,
 ) -> Any:
     """Return W_i, from the moments about C_i of the rod and of the hinge."""
-    m_b, l, c, f = p.masses[i].rod, p.geometry.l, rods[i], specific[i]
+    m_b, l, c, f = p.masses[i].rod, p.geometry.l, rods[i], specific[i]  # noqa: E741
     W = m_b * (c.cos_u * f.k + c.sin_u * f.e) / 2.0 + m_b * l * c.u_ddot / 3.0     # Eq. (5)
     return W + hinges[i] / l
 
@@ -175,12 +175,12 @@ def less_rod_reactions(
 
 
 def chain_forces(
-    mass: ChainMasses, l: Any, g: ChainVector, c: ChainSample, f: ChainVector, H: Any, V: Any,
-    W: Any, printed: Any,
+    mass: ChainMasses, rod_length: Any, g: ChainVector, c: ChainSample, f: ChainVector, H: Any,
+    V: Any, W: Any, printed: Any,
 ) -> ChainForces:
     """Return reactions, drive forces and guide loads of a chain."""
     m_slide, m_lift, m_b = mass
-    c_u, s_u = c.cos_u, c.sin_u
+    l, c_u, s_u = rod_length, c.cos_u, c.sin_u  # noqa: E741
     # Acceleration of the rod's middle relative to C_i.
     rise = l * (c.u_ddot * c_u - c.u_dot * c.u_dot * s_u) / 2.0
     lean = l * (c.u_ddot * s_u + c.u_dot * c.u_dot * c_u) / 2.0

@@ -81,7 +81,8 @@ class Geometry:
         turned = np.subtract(self.platform_angles, self.chain_angles)
         span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
         _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
-                 f'be greater than {span:.6g} m, for the platform to stand unturned above the base')
+                 f'be greater than {span:.6g} m, for the platform to stand unturned above the '
+                 'base')
 
     @property
     def elbow_sign(self) -> float:

@@ -1,4 +1,4 @@
-"""Everything that one evaluation of the mechanism yields, shared by all effects."""
+"""Motion, Jacobians and frictionless forces of the mechanism, as effects take them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pprs_dynamics.mechanism.robot import DRIVES, Geometry, Robot
 
 
 class DriveStates(Protocol):
-    """What effects on drives look at: N samples of D drives, whatever they move."""
+    """Protocol of N samples of D drives, whatever they move, as effects on drives take them."""
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -44,7 +44,7 @@ class DriveStates(Protocol):
 
     @property
     def direction(self) -> Array:
-        """sgn of the velocities, (N, D)."""
+        """Sign of the velocities, sgn, (N, D)."""
 
     @property
     def guide_load(self) -> Array:
@@ -52,7 +52,7 @@ class DriveStates(Protocol):
 
 
 class Kinematics:
-    """What a motion does to a mechanism whatever its masses; solved where it is asked for.
+    """Kinematics of a mechanism along a motion, independent of its masses; evaluated lazily.
 
     Raises
     ------
@@ -182,11 +182,11 @@ class MechanismState:
 
     @property
     def direction(self) -> Array:
-        """sgn of the drive velocities, turning over within the reversal velocity."""
+        """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
 
     def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
-        """Return the same motion with other bodies, and with a load more.
+        """Return a state of this motion with other bodies, and with an additional load.
 
         The robot must have the geometry that the state was solved for.
         """

@@ -1,4 +1,4 @@
-"""A single axis: one prismatic drive, as a builder measures it before the robot is assembled.
+"""Model of a single axis: one prismatic drive on a test bench.
 
 F = M (q_ddot - g) + F_v q_dot + F_c sgn(q_dot) + offset + effects, positive along the drive.
 """
@@ -55,13 +55,13 @@ class AxisMotion:
                           None if self.time is None else self.time[samples])
 
     def with_time(self, time: Array) -> AxisMotion:
-        """Return the same motion at given times."""
+        """Return the motion at given times."""
         return AxisMotion(self.position, self.velocity, self.acceleration, time)
 
 
 @dataclass(frozen=True)
 class AxisState(AxisMotion):
-    """A motion, and what effects on drives look at beside it."""
+    """A motion with the quantities that effects on drives take."""
 
     reversal: Reversal = field(default_factory=Reversal)
 
@@ -72,7 +72,7 @@ class AxisState(AxisMotion):
 
     @cached_property
     def direction(self) -> Array:
-        """sgn of the velocity, turning over within the reversal velocity, (N, 1)."""
+        """Sign of the velocity, sgn, turning over within the reversal velocity, (N, 1)."""
         direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
         return direction
 

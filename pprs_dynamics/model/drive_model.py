@@ -1,4 +1,4 @@
-"""The drive forces Q^m as a sum over a list: the rigid body, the paper's friction, and effects."""
+"""Model of the 3-PPRS: drive forces Q^m of the rigid body, the paper's friction and effects."""
 
 from __future__ import annotations
 
@@ -147,8 +147,8 @@ class DriveModel(ForceModel):
         with source_of_errors(source):
             axis = next((name for name in parameters if is_axis((name,))), None)
             if axis is not None:
-                raise ModelError(axis, parameters[axis], 'not be given: this needs a 3-PPRS, and a '
-                                 'single axis is for pprs compare, diagnose, adopt and history')
+                raise ModelError(axis, parameters[axis], 'not be given: this needs a 3-PPRS, and '
+                                 'a single axis is for pprs compare, diagnose, adopt and history')
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:
@@ -286,7 +286,7 @@ def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
     """Return the width that all drives share, or one for each."""
     common: float = values['friction.reversal_velocity']
     own: tuple[float, ...] = values['friction.reversal_velocities']
-    return tuple(one or common for one in own) if any(own) else common
+    return tuple(width or common for width in own) if any(own) else common
 
 
 def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:

@@ -55,7 +55,7 @@ F = TypeVar('F', bound=Forces)
 
 
 class ModelState:
-    """What effects with memory keep between calls; made by `initial_state` of a model."""
+    """Memory of effects between calls; made by `initial_state` of a model."""
 
     def __init__(self, memories: dict[str, Any]) -> None:
         self.memories = memories
@@ -113,7 +113,7 @@ class ForceModel(ABC):
 
     @abstractmethod
     def variables(self, state: Any) -> dict[str, Array]:
-        """Return what an error may depend on beside time and the drives' own motion.
+        """Return the variables on which an error may depend beside time and the drives' motion.
 
         By name in the interface: (N, D) where every drive has its own, (N,) where all share it.
         """
@@ -137,7 +137,7 @@ class ForceModel(ABC):
         return fresh
 
     def measured(self, forces: F, state: ModelState | None = None) -> F:
-        """Return what the sensors say where the drives apply `forces`.
+        """Return the measured forces where the drives apply `forces`.
 
         Effects of measurement become parts of their own; without any, `forces` are returned.
 
@@ -165,7 +165,7 @@ class ForceModel(ABC):
 
     @property
     def position_error(self) -> Array:
-        """What must be taken off measured drive positions [m], (D,)."""
+        """Errors of measured drive positions [m], to be subtracted, (D,)."""
         errors = [effect.position_error(self.drives) for effect in self.effects
                   if isinstance(effect, MeasurementEffect)]
         total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))

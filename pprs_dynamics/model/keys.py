@@ -108,13 +108,13 @@ def _friction(joint: str, where: str, symbol: str) -> tuple[Key, ...]:
 
 
 KEYS: dict[str, Key] = {key.name: key for key in (
-    Key('equations', 'the paper\'s (7), (12), (13) corrected or to the letter',
+    Key('equations', "the paper's (7), (12), (13) corrected or to the letter",
         choices=EQUATIONS),
     Key('geometry.base_radius', 'R, radius of the base', 'm', positive=True),
     Key('geometry.platform_radius', 'r, radius of the platform', 'm', positive=True),
     Key('geometry.rod_length', 'l, length of the guiding rods', 'm', positive=True),
     Key('geometry.chain_angles', 'delta_i, chains around the base', 'rad', size=3),
-    Key('geometry.platform_angles', 'delta\'_i, joints around the platform', 'rad', size=3),
+    Key('geometry.platform_angles', "delta'_i, joints around the platform", 'rad', size=3),
     Key('geometry.elbow', 'branch of the rods', choices=ELBOWS),
     Key('masses.platform', 'M, mass of the platform', 'kg', lower=0),
     Key('masses.payload', 'm, mass of the manipulated object', 'kg', lower=0),
@@ -127,7 +127,7 @@ KEYS: dict[str, Key] = {key.name: key for key in (
     Key('friction.approach', 'how passive friction reaches the drives', choices=APPROACHES),
     Key('friction.reversal_velocity', 'width in which sgn turns over in drives', 'm/s',
         positive=True),
-    Key('friction.reversal_velocities', 'the same drive by drive; 0: friction.reversal_velocity',
+    Key('friction.reversal_velocities', 'width drive by drive; 0: friction.reversal_velocity',
         'm/s', size=6, lower=0, default=(0.0,) * 6),
     Key('friction.reversal_rate', 'width in which sgn turns over in passive joints', 'rad/s',
         positive=True),

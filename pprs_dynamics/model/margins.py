@@ -1,4 +1,4 @@
-"""How far a motion keeps from what would be refused, so that a warning can come before."""
+"""Margins of a motion to the limits, for warnings before a refusal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Margins:
     ----------
     singularity : float
         1 minus the largest of: condition number over its limit, smallest sine of a rod angle
-        over that of the rods, and, with independent chains, the same for the cosine.
+        over that of the rods, and, with independent chains, the ratio for the cosine.
     workspace : float
         Distance of a drive from an end of its stroke, over half the stroke.
     drive : str

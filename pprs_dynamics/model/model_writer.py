@@ -76,7 +76,7 @@ def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> No
 
 
 def kept_parameters(base: str | PathLike[str]) -> dict[str, Any]:
-    """Return what a model file holds and a model does not: the keys of nodes."""
+    """Return the keys of nodes in a model file, and their values."""
     parameters = read_parameters(base)
     keys = keys_of(parameters)
     return {key: value for key, value in parameters.items()
@@ -133,7 +133,7 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
 
 
 class _NotEditableError(Exception):
-    """The file's form does not let its values be replaced one by one."""
+    """Values cannot be replaced one by one in a file of this form."""
 
 
 def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:

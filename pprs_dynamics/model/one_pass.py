@@ -1,7 +1,7 @@
 """The rigid body and the paper's friction in one pass over the samples.
 
-Nothing between the motion and the forces is kept: the same equations as in `MechanismState` and
-the two effects, which store every step, in a third of the time.
+No intermediate quantity is stored. The equations are the functions that `MechanismState` and the
+two effects call, too, which store every step and take three times as long.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ class OnePass:
         self._fields = {'robot': robot, 'reversal': reversal, 'printed': printed, 'load': None}
         self._geometry = robot.geometry
         self._bounds = limits.rod_sine, limits.condition_number
-        drives = zip(active.viscous, active.coulomb, np.broadcast_to(reversal.velocity, 6).tolist(),
-                     strict=True)
+        widths = np.broadcast_to(reversal.velocity, len(active.viscous)).tolist()
+        drives = zip(active.viscous, active.coulomb, widths, strict=True)
         self.parameters = robot.kernel_parameters.extended(
             ForcesParameters, robot.geometry.platform_radius, float(printed),
             float(passive.printed), limits.rod_sine, limits.condition_number ** 2, reversal.rate,

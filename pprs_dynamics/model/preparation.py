@@ -1,4 +1,4 @@
-"""Compiles or loads what evaluations need, before anybody waits for an answer.
+"""Compilation, or loading of compiled code, before the first evaluation.
 
 `python -m pprs_dynamics.model.preparation` does it once after an installation.
 """

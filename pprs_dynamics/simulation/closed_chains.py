@@ -187,7 +187,7 @@ class ClosedChains:
 
     def place_home(self, values: Mapping[str, Any], height: float = 0.5) -> None:
         """Put the platform unturned above the base's centre."""
-        R, r, l = (values[f'geometry.{name}'] for name in
+        R, r, l = (values[f'geometry.{name}'] for name in  # noqa: E741
                    ('base_radius', 'platform_radius', 'rod_length'))
         up = 1.0 if values['geometry.elbow'] == 'up' else -1.0
         for i in range(3):

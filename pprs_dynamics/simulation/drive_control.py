@@ -1,4 +1,4 @@
-"""The drives' electronics: PD loop, feedforward, limits, and what happens without commands."""
+"""The drives' electronics: PD loop, feedforward, limits, and the timeout of commands."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ControlSettings:
 
 @dataclass(frozen=True)
 class Setpoint:
-    """What one command wants; arrays (6,) in drive order.
+    """Setpoint of one command; arrays (6,) in drive order.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Setpoint:
 
 @dataclass(frozen=True)
 class Note:
-    """Something the robot has to say: `code` is one of SATURATED, HOLD, REFUSED, STOPPED."""
+    """A message of the robot: `code` is one of SATURATED, HOLD, REFUSED, STOPPED."""
 
     time: float
     code: str
@@ -207,7 +207,7 @@ class DriveControl:
         return goal, speed
 
     def _as_late(self, speed: Array, measured: Array) -> Array:
-        """Return the wanted velocity, as late as the measured one.
+        """Return the wanted velocity, delayed like the measured one.
 
         Else the loop would take the lag of differentiation for an error: at 80 Hz and 150 N s/m
         0.3 N per m/s^2, more than a feedforward leaves to it.

@@ -1,4 +1,4 @@
-"""What the engine's mechanism does along a motion of its drives that is given.
+"""Motion of the engine's mechanism along a given motion of its drives.
 
 N samples are the first axis of every array.
 """
@@ -20,7 +20,7 @@ from pprs_dynamics.simulation.hidden_effect import PlatformMoment
 
 @dataclass(frozen=True)
 class DrivenMotion:
-    """What the engine's mechanism does along a motion of its drives.
+    """Motion of the engine's mechanism along a motion of its drives.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class DrivenMotion:
         return cls(times, q, y, y_dot, qpos, qvel, qacc, rotation, T_d, inverse, rates, axes)
 
     def platform_moment(self, sample: int) -> PlatformMoment:
-        """Return what platform and rods do at one sample."""
+        """Return the state of platform and rods at one sample."""
         qpos, qvel, rotation = self.qpos[sample], self.qvel[sample], self.rotation[sample]
         return PlatformMoment(float(self.time[sample]), qpos[9:12], rotation, qvel[9:12],
                               rotation @ qvel[12:], qpos[2:9:3])

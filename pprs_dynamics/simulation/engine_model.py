@@ -1,4 +1,4 @@
-"""The engine, and the robot's four trees in its language."""
+"""MuJoCo's model of the robot: four trees, to be closed at the spherical joints."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def describe_trees(values: Mapping[str, Any]) -> str:
     accelerations of the rods' tips, then of the platform's ends of the spherical joints. The
     hinge's angle is u_i: at 0 the rod points inwards from C_i.
     """
-    R, r, l = (values[f'geometry.{name}'] for name in
+    R, r, l = (values[f'geometry.{name}'] for name in  # noqa: E741
                ('base_radius', 'platform_radius', 'rod_length'))
     # Off centre, so that the engine prepares for any mass matrix and not for a diagonal one.
     body = '<inertial pos="0.1 0.2 0.3" quat="1 0.1 0.2 0.3" mass="1" diaginertia="3 4 5"/>'

@@ -1,4 +1,4 @@
-"""What a hidden effect is: physics in the simulated robot of which the model knows nothing.
+"""Base of hidden effects: physics in the simulated robot that the model lacks.
 
 Each is known by its name in the interface where the catalogue has one, but has a form of its
 own, so that a diagnosis is not tested against itself. Signs are the interface's: positive is
@@ -76,7 +76,7 @@ class Range:
 
 @dataclass(slots=True)
 class DriveMoment:
-    """What the drives do at one moment, in SI units; arrays (6,), or at many moments (N, 6)."""
+    """State of the drives at one moment, in SI units; arrays (6,), or at many moments (N, 6)."""
 
     time: float | Array
     position: Array
@@ -84,13 +84,13 @@ class DriveMoment:
     guide_load: Array
 
     def at(self, velocity: Array) -> DriveMoment:
-        """Return the same moment at other velocities."""
+        """Return the state with other velocities."""
         return DriveMoment(self.time, self.position, velocity, self.guide_load)
 
 
 @dataclass(frozen=True)
 class PlatformMoment:
-    """What platform and rods do at one moment, in `base`.
+    """State of platform and rods at one moment, in `base`.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class HiddenEffect(ABC):
 
     @property
     def drives(self) -> tuple[str, ...] | None:
-        """Drives on which it sits; None for passive joints, platform and structure."""
+        """Drives on which it acts; None for passive joints, platform and structure."""
         return None
 
     def truth(self) -> dict[str, Any]:
@@ -152,7 +152,7 @@ class HiddenEffect(ABC):
 
 
 class DriveBound(HiddenEffect):
-    """An effect that sits on one drive, some or all.
+    """An effect that acts in one drive, some or all.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ class DriveBound(HiddenEffect):
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Drives on which it sits."""
+        """Drives on which it acts."""
         return tuple(drive for drive in DRIVES if drive in self.parameters)
 
 
@@ -204,7 +204,7 @@ class DriveForce(DriveBound):
 
     @abstractmethod
     def force(self, moment: DriveMoment) -> Array:
-        """Return what the drives must apply more [N], (6,)."""
+        """Return the additional drive forces [N], (6,)."""
 
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Advance memory by a time step; nothing to do without one."""
@@ -233,7 +233,7 @@ class StructureForce(HiddenEffect):
 
 
 class BodyChange(HiddenEffect):
-    """Bodies or gravity that are not what the model says."""
+    """A difference of bodies or gravity from the model."""
 
     @abstractmethod
     def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
@@ -245,7 +245,7 @@ class BodyChange(HiddenEffect):
 
 
 class SensorEffect(DriveBound):
-    """What a sensor says, beside the truth; see `sensors.Sensors`."""
+    """A systematic error of a sensor; see `sensors.Sensors`."""
 
 
 def require_parameters(effect: type[HiddenEffect], given: Mapping[str, float]) -> None:

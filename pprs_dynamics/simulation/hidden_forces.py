@@ -86,7 +86,7 @@ class LocalBump(DriveForce):
 
 
 class Vibration(DriveForce):
-    """A machine nearby: a force of one frequency, whatever the robot does. Not in the catalogue."""
+    """A force of one frequency, from a machine nearby. Not in the catalogue."""
 
     name: ClassVar[str] = 'vibration'
     form: ClassVar[str] = 'A sin(2 pi f t + phi)'

@@ -62,7 +62,7 @@ LONGEST_MOVE = 0.1
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """How the mechanism is simulated.
+    """Settings of the simulation.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class PlantSettings:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the mechanism really does at one moment, everything in `base`.
+    """True state of the mechanism at one moment, everything in `base`.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class Plant:
         return ''
 
     def observe(self, effort: Array) -> Truth:
-        """Return what the mechanism does now, when the drives apply efforts (6,) [N]."""
+        """Return the true state now, when the drives apply efforts (6,) [N]."""
         chains, y = self.chains, self.velocity
         gap = chains.close()
         pose = chains.qpos[9:16].copy()

@@ -70,7 +70,7 @@ class SimulatedRobot:
 
     @property
     def notes(self) -> list[Note]:
-        """What the robot has had to say."""
+        """Messages of the robot so far."""
         return self.control.notes
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
@@ -94,11 +94,11 @@ class SimulatedRobot:
             self.time, setpoint, following, self.steps_per_tick * self.plant.settings.step)
 
     def tick(self) -> Measurement:
-        """Return what the sensors say now, and advance to the next tick."""
+        """Return the readings now, and advance to the next tick."""
         return self.tick_with_truth(want_truth=False)[0]
 
     def tick_with_truth(self, want_truth: bool = True) -> tuple[Measurement, Truth | None]:
-        """As `tick`, and what really happens now."""
+        """Return the readings and the true state now, and advance to the next tick."""
         now, step, plant = self.time, self.plant.settings.step, self.plant
         measurement, truth = None, None
         for k in range(self.steps_per_tick):

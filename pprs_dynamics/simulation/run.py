@@ -1,4 +1,4 @@
-"""From a reference to a recording of the simulated robot, without ROS."""
+"""Runs of the simulated robot along a reference, without ROS."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class HasValues(Protocol):
 
 @dataclass(frozen=True, init=False)
 class DriveReference:
-    """What the drives are told at every tick.
+    """Setpoints of the drives at every tick.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class DriveReference:
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """A recording, and what really happened.
+    """A recording, and the true motion and forces.
 
     Parameters
     ----------
