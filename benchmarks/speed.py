@@ -166,8 +166,8 @@ def start() -> None:
     for name, code in (('python alone', 'pass'), ('import numpy', 'import numpy'),
                        ('import pprs_dynamics', 'import pprs_dynamics'),
                        ('first evaluation, caches warm', evaluation),
-                       ('the same, not compiled', f'import os; os.environ[{PLAIN!r}] = "1"; '
-                        + evaluation)):
+                       ('first evaluation, not compiled',
+                        f'import os; os.environ[{PLAIN!r}] = "1"; {evaluation}')):
         elapsed, used = np.inf, np.inf
         for _ in range(5):
             begin, before = time.perf_counter(), _processor_of_children()
@@ -205,6 +205,7 @@ for _name, _kind in (('add', 'additions'), ('sub', 'additions'), ('mul', 'multip
 
 
 class _CountedTable(dict[Any, Any]):
+
     def __missing__(self, key: Any) -> _Counted:
         return _Counted(0.0)
 

@@ -48,7 +48,7 @@ every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
 
 @pytest.fixture(params=ELBOWS)
 def geometry(request):
-    """A geometry in which no two chains are equal."""
+    """Return a geometry in which no two chains are equal."""
     return random_robot(np.random.default_rng(21), request.param).geometry
 
 
@@ -134,7 +134,7 @@ def test_one_seed_serves_all_samples(geometry):
 # Other solutions -----------------------------------------------------------------------------
 
 def assert_right_or_refused(geometry, q, seed, true_position):
-    """A seed in another assembly mode must end at the true pose, or in ConvergenceError."""
+    """Assert that a seed in another assembly mode ends at the true pose, or in ConvergenceError."""
     try:
         found = solve_forward_kinematics(geometry, q, seed)
     except ConvergenceError:

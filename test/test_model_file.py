@@ -51,8 +51,8 @@ def test_every_key_of_the_file_is_declared_and_every_declared_key_stands_in_the_
 
 
 def test_the_package_finds_its_own_model_from_any_folder(tmp_path: Path) -> None:
-    code = ("from pprs_dynamics import DriveModel; "
-            "print(DriveModel.load('config/paper.yaml').robot.masses.total)")
+    code = ('from pprs_dynamics import DriveModel; '
+            'print(DriveModel.load("config/paper.yaml").robot.masses.total)')
     found = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, capture_output=True,
                            text=True, check=True)
     assert found.stdout.strip() == '2.0'

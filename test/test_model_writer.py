@@ -141,11 +141,11 @@ def test_keys_of_nodes_and_other_nodes_blocks_stay(tmp_path: Path) -> None:
 @pytest.mark.parametrize('form', ['dots', 'flow', 'block_lists', 'no_newline'])
 def test_files_of_every_form_come_out_right(tmp_path: Path, form: str) -> None:
     base, values = tmp_path / 'base.yaml', default_parameters()
+    flat = ', '.join(f'{key}: {value}' for key, value in values.items())
     text = {
         'dots': '/**:\n  ros__parameters:\n' + ''.join(
             f'    {key}: {value}\n' for key, value in values.items()),
-        'flow': '{/**: {ros__parameters: {' + ', '.join(
-            f'{key}: {value}' for key, value in values.items()) + '}}, '
+        'flow': f'{{/**: {{ros__parameters: {{{flat}}}}}, '
                 'monitor: {ros__parameters: {window: 0.2}}}\n',
         'block_lists': PAPER.read_text().replace(
             'slides: [0.5, 0.5, 0.5] ', 'slides:\n        - 0.5\n        - 0.5\n        - 0.5 '),

@@ -298,8 +298,9 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
 
 def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np.ndarray) -> None:
     """Coulomb friction on a drive: a freer form of it is no rival, another effect is one."""
-    robot = DriveModel.from_parameters({**model.values, 'effects.active': ['coulomb_friction'],
-                         'effects.coulomb_friction.lift_1.force': 0.6})
+    robot = DriveModel.from_parameters({
+        **model.values, 'effects.active': ['coulomb_friction'],
+        'effects.coulomb_friction.lift_1.force': 0.6})
     time = np.arange(0.0, DURATION, 0.004)
     path = FAMILY.path(parameters)
     old = recorded(robot, path.motion(time), 1, 0.1)

@@ -128,6 +128,7 @@ def test_platform_rates_are_differences_of_forward_kinematics(elbow):
         return home * (derivative == 0) + size * frequency ** derivative * np.sin(angle)
 
     class Path:
+
         def motion(self, time):
             found = solve_forward_kinematics(geometry, drives(time))
             return PlatformMotion.at_rest(found.position, found.orientation)

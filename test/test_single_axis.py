@@ -68,7 +68,7 @@ def pprs(*arguments: str | Path, cwd: Path | None = None) -> subprocess.Complete
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a model file and two recordings of an axis with a hidden spring."""
+    """Return a folder with a model file and two recordings of an axis with a hidden spring."""
     folder = tmp_path_factory.mktemp('axis')
     lines = [f'    {key}: {value!r}' for key, value in VALUES.items()]
     (folder / 'axis.yaml').write_text('\n'.join(['/**:', '  ros__parameters:', *lines, '']))

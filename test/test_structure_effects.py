@@ -56,7 +56,7 @@ def test_every_effect_is_tested() -> None:
 
 @pytest.fixture(params=ELBOWS)
 def case(request):
-    """A robot of unequal chains, a random motion and the state of the mechanism."""
+    """Return a robot of unequal chains, a random motion and the state of the mechanism."""
     rng = np.random.default_rng([5, ELBOWS.index(request.param)])
     robot = random_robot(rng, request.param, (1.0, -2.0, -9.0))
     motion = random_motion(rng, 40, request.param)
