@@ -203,20 +203,13 @@ def newton_kernel(p: GeometryParameters, s: Any, q: Any, pose: Any, found: Any) 
     P = vector(pose, s, 0)
     x, y, z, w = pose[s, 3], pose[s, 4], pose[s, 5], pose[s, 6]
     # Heights far from 0 carry their own rounding.
-    farthest = abs(q[s, 0])
-    for drive in range(1, 2 * CHAINS):
-        farthest = larger(farthest, abs(q[s, drive]))
-    tolerance = RESIDUAL_TOLERANCE * (p.l + farthest)
+    tolerance = RESIDUAL_TOLERANCE * (p.l + _largest(_farthest_positions(q, s)))
     steps, determinant, upright, arrived = 0.0 * x, 0.0 * x, 0.0 * x, x > 2.0
     for k in range(MAXIMUM_STEPS + 1):
         rods = chain_closures(p, P, rotation(x, y, z, w), q, s)
-        error, lowest = 0.0 * x, -p.elbow * rods[0].sin_u
-        for i in range(CHAINS):
-            error = larger(larger(abs(rods[i].slide), abs(rods[i].lift)), error)
-            lowest = larger(lowest, -p.elbow * rods[i].sin_u)
         # The least of the rods' sines, where positive is as the elbow says.
-        upright = -lowest
-        arrived = error <= tolerance
+        upright = -_largest(_downward_sines(p, rods))
+        arrived = _largest(_residuals(rods)) <= tolerance
         # The last step moves nothing that the determinant could tell.
         if k > 0 and everywhere(arrived):
             break
@@ -236,6 +229,25 @@ def newton_kernel(p: GeometryParameters, s: Any, q: Any, pose: Any, found: Any) 
     found[s, 0], found[s, 1] = 1.0 * arrived, determinant
     found[s, 2], found[s, 3] = upright, steps
     return True
+
+
+@each_chain
+def _farthest_positions(i: int, q: Any, s: Any) -> Any:
+    return larger(abs(q[s, i]), abs(q[s, CHAINS + i]))
+
+
+@each_chain
+def _residuals(i: int, rods: Any) -> Any:
+    return larger(abs(rods[i].slide), abs(rods[i].lift))
+
+
+@each_chain
+def _downward_sines(i: int, geometry: GeometryParameters, rods: Any) -> Any:
+    return -geometry.elbow * rods[i].sin_u
+
+
+def _largest(values: Any) -> Any:
+    return larger(larger(values[0], values[1]), values[2])
 
 
 def turned_quaternion(half: Vector, x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any]:

@@ -123,9 +123,10 @@ def platform_rates(
     """
     still = PlatformMotion.at_rest(poses.position, poses.orientation)
     chains = chain_table(geometry, still, LEAST_SINE)
-    inverse, rates = inverse_table(geometry, chains, np.inf), np.empty((len(poses), 12))
-    evaluate(rates_kernel, geometry.kernel_parameters, chains, inverse, _table(velocity),
-             _table(acceleration), rates)
+    rates = np.empty((len(poses), 12))
+    evaluate(rates_kernel, geometry.kernel_parameters, chains,
+             inverse_table(geometry, chains, np.inf), _table(velocity), _table(acceleration),
+             rates)
     return PlatformMotion(poses.position, poses.orientation, rates[:, 0:3], rates[:, 3:6],
                           rates[:, 6:9], rates[:, 9:12], poses.time)
 
@@ -142,9 +143,9 @@ def rates_kernel(
     B_inverse = read_inverse(inverse, s)
     X_dot = platform_twist(B_inverse, DriveValues(
         _slide_rates(q_dot, s), _lift_rates(q_dot, s, rods)))  # Eq. (4)
+    inward = centripetal_terms(p, rods, X_dot)
     X_ddot = platform_twist(B_inverse, DriveValues(
-        _slide_accelerations(p, rods, X_dot, q_ddot, s),
-        _lift_accelerations(p, rods, X_dot, q_ddot, s)))
+        _slide_accelerations(q_ddot, s, inward), _lift_accelerations(q_ddot, s, rods, inward)))
     rates[s, 0], rates[s, 1], rates[s, 2] = X_dot.v
     rates[s, 3], rates[s, 4], rates[s, 5] = X_dot.omega
     rates[s, 6], rates[s, 7], rates[s, 8] = X_ddot.v
@@ -163,20 +164,17 @@ def _lift_rates(i: int, rates: Any, s: Any, rods: ThreeChains) -> Any:
 
 
 @each_chain
-def _slide_accelerations(
-    i: int, geometry: GeometryParameters, rods: ThreeChains, X_dot: Twist, q_ddot: Any, s: Any,
-) -> Any:
-    return q_ddot[s, i] - centripetal(i, geometry, rods, X_dot)[0]
+def _slide_accelerations(i: int, q_ddot: Any, s: Any, inward: Any) -> Any:
+    return q_ddot[s, i] - inward[i][0]
 
 
 @each_chain
-def _lift_accelerations(
-    i: int, geometry: GeometryParameters, rods: ThreeChains, X_dot: Twist, q_ddot: Any, s: Any,
-) -> Any:
-    return rods[i].sin_u * q_ddot[s, 3 + i] - centripetal(i, geometry, rods, X_dot)[1]
+def _lift_accelerations(i: int, q_ddot: Any, s: Any, rods: ThreeChains, inward: Any) -> Any:
+    return rods[i].sin_u * q_ddot[s, 3 + i] - inward[i][1]
 
 
-def centripetal(
+@each_chain
+def centripetal_terms(
     i: int, geometry: GeometryParameters, rods: ThreeChains, X_dot: Twist,
 ) -> tuple[Any, Any]:
     """Return n_i . c_i, and d_i . c_i + l u_dot_i^2."""
