@@ -31,7 +31,7 @@ from pprs_dynamics.measurement.treatment import Treatment, block_length
 from pprs_dynamics.mechanism import forward_motion
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.mechanism.forward_motion import (
-    find_jumps,
+    find_pose_jumps,
     follow_branch,
     platform_rates,
     solve_forward_motion,
@@ -191,7 +191,7 @@ def test_drives_that_cannot_close_are_named_with_sample_and_time():
 
 def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
     motion = motion_from_poses(Excitation(3.0), np.arange(0.2, 2.5, STEP))
-    assert not find_jumps(motion).any()
+    assert not find_pose_jumps(motion).any()
     moved = motion.position.copy()
     moved[400:] += [0, 1e-3, 0]
     turned = (Rotation.from_rotvec([0, 0, 0.01]) * Rotation.from_quat(
@@ -200,7 +200,7 @@ def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
         moved, np.concatenate((motion.orientation[:700], turned)), motion.linear_velocity,
         motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration,
         motion.time)
-    assert np.flatnonzero(find_jumps(jumping)).tolist() == [400, 700]
+    assert np.flatnonzero(find_pose_jumps(jumping)).tolist() == [400, 700]
 
 
 def test_a_jump_between_two_chunks_is_told(monkeypatch):

@@ -2,7 +2,7 @@
 
 Six drive positions belong to several poses. The solver therefore follows the branch: it moves
 from a known pose to the wanted drive positions in steps, and accepts only poses whose det [B]
-has the sign that it has at the home pose, and whose rods lean the way that the elbow says. These
+has the sign that it has at the home pose, and whose rods lean as `geometry.elbow` demands. These
 two conditions alone do not single out one pose: others that meet them are turned by more than
 150 degrees against it, and are found only from a seed that lies there.
 """
@@ -207,7 +207,7 @@ def newton_kernel(p: GeometryParameters, s: Any, q: Any, pose: Any, found: Any) 
     steps, determinant, upright, arrived = 0.0 * x, 0.0 * x, 0.0 * x, x > 2.0
     for k in range(MAXIMUM_STEPS + 1):
         rods = chain_closures(p, P, rotation(x, y, z, w), q, s)
-        # The least of the rods' sines, where positive is as the elbow says.
+        # The smallest sine of the rods, positive where all lean as `geometry.elbow` demands.
         upright = -_largest(_downward_sines(p, rods))
         arrived = _largest(_residuals(rods)) <= tolerance
         # The last step moves nothing that the determinant could tell.

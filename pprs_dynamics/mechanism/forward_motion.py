@@ -186,7 +186,7 @@ def centripetal_terms(
     return inward.n, c.sin_u * inward.k - c.cos_u * inward.e + l * u_dot * u_dot
 
 
-def find_jumps(motion: PlatformMotion) -> np.ndarray:
+def find_pose_jumps(motion: PlatformMotion) -> np.ndarray:
     """Return the samples of a motion with times before which the pose jumps, (N,) bool.
 
     A jump is a move between samples that contradicts the twists there: the solution of forward

@@ -53,7 +53,7 @@ def spline_derivatives(
     """
     knots, places, turns = checked_poses(time, position, orientation)
     try:
-        # Absurd poses overflow, and are told by what is not finite.
+        # Poses too far apart overflow; the result is then not finite.
         with np.errstate(all='ignore'):
             rows = spline_rows(knots, places, turns, knots)
         return rows[:, 7:13], rows[:, 13:]

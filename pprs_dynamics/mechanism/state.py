@@ -51,7 +51,7 @@ class DriveStates(Protocol):
         """[N], (N, D)."""
 
 
-class Kinematics:
+class MechanismKinematics:
     """Kinematics of a mechanism along a motion, independent of its masses; evaluated lazily.
 
     Raises
@@ -120,14 +120,14 @@ class MechanismState:
 
     robot: Robot
     motion: PlatformMotion
-    kinematics: Kinematics
+    kinematics: MechanismKinematics
     reversal: Reversal
     printed: bool = False
     load: StructureLoad | None = None
 
     @classmethod
     def unsolved(
-        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: Kinematics,
+        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: MechanismKinematics,
     ) -> MechanismState:
         """Return the state of other fields and these; in a fifth of the constructor's time."""
         state = object.__new__(cls)
@@ -208,7 +208,7 @@ def solve_mechanism(
     WorkspaceError, SingularityError
         See `solve_inverse_kinematics` and `inverse_table`.
     """
-    kinematics = Kinematics(robot.geometry, motion, minimum_sine, condition_limit)
+    kinematics = MechanismKinematics(robot.geometry, motion, minimum_sine, condition_limit)
     state = MechanismState(robot, motion, kinematics, reversal or Reversal(), printed)
     _ = kinematics.inverse_table
     return state

@@ -180,7 +180,7 @@ class DriveModel(ForceModel):
             For a pose nearer to a singularity than `limits.rod_sine` or
             `limits.condition_number` allow.
         """
-        # Absurd numbers overflow; what comes out is checked by whoever uses it.
+        # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             return solve_mechanism(
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',

@@ -187,6 +187,11 @@ NODE_KEYS = frozenset({
 NODE_PREFIXES = ('qos_overrides.',)
 
 
+def as_list(value: Any) -> Any:
+    """Return a tuple as the list that a file holds for it, and any other value as it is."""
+    return list(value) if isinstance(value, tuple) else value
+
+
 def set_number(values: dict[str, Any], key: str, element: int | None, number: float) -> None:
     """Put a number into a model's values, as one element where the key holds several."""
     values[key] = number if element is None else tuple(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.model.keys import as_list
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -98,10 +99,10 @@ class Step:
         for entry in fields(self):
             value = getattr(self, entry.name)
             if entry.name == PREVIOUS:
-                flat.update((f'{prefix}.{PREVIOUS}.{key}', _listed(old))
+                flat.update((f'{prefix}.{PREVIOUS}.{key}', as_list(old))
                             for key, old in value.items())
             elif value != ():
-                flat[f'{prefix}.{entry.name}'] = _listed(value)
+                flat[f'{prefix}.{entry.name}'] = as_list(value)
         return flat
 
 
@@ -139,7 +140,7 @@ def step_name(number: int) -> str:
 def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -> dict[str, Any]:
     """Return the values `after` with a step that leads to them from the values `before`."""
     changed = {key for key in {*before, *after}
-               if not key.startswith(f'{BLOCK}.') and _listed(before.get(key, MISSING)) != _listed(
+               if not key.startswith(f'{BLOCK}.') and as_list(before.get(key, MISSING)) != as_list(
                    after.get(key, MISSING))}
     gone = changed - after.keys()
     if gone:
@@ -217,7 +218,3 @@ def _checked(key: str, value: Any, kind: str) -> Any:
     if not right:
         raise ModelError(key, value, f'be {rules[element]}')
     return float(value) if element == 'float' else value
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, (tuple, list)) else value

@@ -27,7 +27,7 @@ from pprs_dynamics.effects.catalogue import find_effect
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.atomic_file import write_text
-from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, keys_of
+from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, as_list, keys_of
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.parameter_file import other_nodes, parse_parameters, read_parameters
 
@@ -120,7 +120,7 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
     old = parse_parameters(text)
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()
-              if key in old or key not in keys or _listed(value) != _listed(keys[key].default)}
+              if key in old or key not in keys or as_list(value) != as_list(keys[key].default)}
     try:
         edited = _edited(text, old, wanted)
         if _same(parse_parameters(edited), wanted):
@@ -149,7 +149,7 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
         starts.append(starts[-1] + len(line))
     new = {}
     for key, value in wanted.items():
-        if key.split('.')[0] in WRITTEN or _listed(old.get(key)) == _listed(value):
+        if key.split('.')[0] in WRITTEN or as_list(old.get(key)) == as_list(value):
             continue
         node = places.get(key)
         if node is None:
@@ -302,8 +302,4 @@ def _verified(text: str, values: Mapping[str, Any]) -> str:
 
 
 def _same(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
-    return {k: _listed(v) for k, v in found.items()} == {k: _listed(v) for k, v in wanted.items()}
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
+    return {k: as_list(v) for k, v in found.items()} == {k: as_list(v) for k, v in wanted.items()}

@@ -41,7 +41,7 @@ from pprs_dynamics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.rigid_body import ThreeForces, body_forces
 from pprs_dynamics.mechanism.robot import Robot
-from pprs_dynamics.mechanism.state import Kinematics, MechanismState
+from pprs_dynamics.mechanism.state import MechanismKinematics, MechanismState
 from pprs_dynamics.mechanism.vectors import Vector
 from pprs_dynamics.model.force_model import total_force
 from pprs_dynamics.model.limits import Limits
@@ -112,7 +112,7 @@ class OnePass:
 
         For up to `SHORT` samples (7, N, 6): position, velocity and acceleration of the drives
         follow [m, m/s, m/s^2]. None where a sample may be out of reach or too near a singularity:
-        whoever asks must look closely then.
+        the caller must check every sample then.
         """
         rows = motion.rows
         samples = len(rows)
@@ -122,7 +122,7 @@ class OnePass:
 
     def mechanism(self, motion: PlatformMotion, table: Array) -> MechanismState:
         """Return the state of the mechanism, not yet solved, for a motion and its forces."""
-        kinematics = Kinematics(self._geometry, motion, *self._bounds)
+        kinematics = MechanismKinematics(self._geometry, motion, *self._bounds)
         if len(table) > FORCES:
             kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
         return MechanismState.unsolved(self._fields, motion, kinematics)

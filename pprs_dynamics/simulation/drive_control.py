@@ -257,6 +257,6 @@ class DriveControl:
         return ''
 
     def _note(self, now: float, code: str, message: str) -> None:
-        # The same complaint in a row is told once.
+        # A message that repeats the last one is not given again.
         if not self.notes or (self.notes[-1].code, self.notes[-1].message) != (code, message):
             self.notes.append(Note(now, code, message))

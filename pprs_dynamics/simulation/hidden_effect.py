@@ -57,7 +57,7 @@ class Range:
     neutral: float = 0.0
 
     def draw(self, rng: np.random.Generator, scale: float, drive: str = '') -> float:
-        """Return a random value, for a drive where it sits on one."""
+        """Return a random value, by drive where the effect acts in drives."""
         low, high = self.low, self.high
         if self.lifts is not None and drive.startswith('lift'):
             low, high = self.lifts
@@ -163,7 +163,7 @@ class DriveBound(HiddenEffect):
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         for drive, parameters in drives.items():
             if drive not in DRIVES:
-                raise HiddenEffectError(f'{self.name} sits on a drive, not on {drive!r}')
+                raise HiddenEffectError(f'{self.name} acts in a drive, not in {drive!r}')
             require_parameters(type(self), parameters)
         self.parameters = {drive: dict(parameters) for drive, parameters in drives.items()}
         # One array per parameter, neutral where a drive has not got the effect.
