@@ -135,5 +135,6 @@ def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np
         for start in range(segment.start, segment.stop, CHUNK):
             first = max(start - 1, segment.start)  # the step from the last chunk counts too
             rows = slice(first, min(start + CHUNK, segment.stop))
-            jumps.append(first + np.flatnonzero(find_pose_jumps(motion[rows].with_time(time[rows]))))
+            jump = find_pose_jumps(motion[rows].with_time(time[rows]))
+            jumps.append(first + np.flatnonzero(jump))
     return np.concatenate(jumps)
