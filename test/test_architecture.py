@@ -34,6 +34,24 @@ MAY_USE = {
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))
 
+# The header that ament_copyright asks of every file.
+LICENCE = """\
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+
 
 def imports(file: Path) -> set[str]:
     names = set()
@@ -136,9 +154,16 @@ def test_each_catalogue_effect_has_a_file_of_its_name_and_the_list_is_sorted() -
             assert parameter.lower < parameter.upper
 
 
+@pytest.mark.parametrize('folder', ['mechanism', 'effects', 'model', 'simulation'])
+def test_every_file_begins_with_the_licence(folder: str) -> None:
+    assert [file.name for file in sorted((PACKAGE / folder).glob('*.py'))
+            if not file.read_text(encoding='utf-8').startswith(LICENCE)] == []
+
+
 def test_modules_are_short() -> None:
-    lengths = {str(file.relative_to(PACKAGE)): len(file.read_text().splitlines())
-               for file in files()}
+    # The licence's text is not counted.
+    lengths = {str(file.relative_to(PACKAGE)):
+               len(file.read_text().removeprefix(LICENCE).splitlines()) for file in files()}
     assert {name: length for name, length in lengths.items() if length > 350} == {}
 
 
