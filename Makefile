@@ -36,8 +36,8 @@ demo-feedforward: $(VENV)/.demo
 
 # Nodes run in real time: alone, after everything else has used both cores.
 test: $(VENV)/.test lint
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not nodes'
-	$(BIN)/python -m pytest -m nodes
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'not nodes'
+	$(BIN)/python -m pytest test -m nodes
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

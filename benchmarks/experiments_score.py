@@ -109,6 +109,7 @@ class HiddenRobot:
 
 
 class _Values:
+
     def __init__(self, values: dict[str, Any]) -> None:
         self.values = values
 

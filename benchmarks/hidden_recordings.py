@@ -24,7 +24,8 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.treatment import Treatment, block_length
 from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
-from pprs_dynamics.model.model_file import build_model, default_parameters
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
@@ -295,5 +296,3 @@ def _draw_widths(rng: np.random.Generator) -> tuple[float, ...]:
     if rng.random() < 0.5:
         return (_draw_width(rng),) * 6
     return tuple(_draw_width(rng) for _ in range(6))
-
-

@@ -24,7 +24,8 @@ from stream import feedforward, served
 from trajectory_damage import valid_motion
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.model.model_file import build_model, default_parameters
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.nodes.conversions import write_trajectory
 
 EQUAL = 1e-9

@@ -95,8 +95,8 @@ client waited for a processor. The tests contain short forms of the last four.
 
 
 def _latency(found: dict[str, Any]) -> str:
-    return ('\n'.join(latency.rows(found)) + '\n\nThe echo node is what rclpy\'s tutorials show: '
-            'message objects, rclpy\'s executor, six zeros. Both ran at the same time, measured in '
+    return ('\n'.join(latency.rows(found)) + "\n\nThe echo node is what rclpy's tutorials show: "
+            "message objects, rclpy's executor, six zeros. Both ran at the same time, measured in "
             'turns by one client of one thread.\n')
 
 

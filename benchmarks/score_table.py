@@ -132,7 +132,7 @@ def make_table(outcomes: Sequence[Outcome]) -> str:
     line('not in the catalogue, SNR ≥ 1: unknown, right variable', '≥ 90 %',
          _of(told, 'unknown'), 'good')
     line('the same: unknown', '', _of(told, 'unknown'), 'unknown')
-    line('error after / best fit of the catalogue\'s form at most 1.02, SNR ≥ 1', '',
+    line("error after / best fit of the catalogue's form at most 1.02, SNR ≥ 1", '',
          [o for o in strong if 'over_best' in o['judged']],
          lambda o: o['judged']['over_best'] <= 1.02)
     for noise in sorted({_case(o)['noise'] for o in _of(told, 'slow')}):
@@ -159,9 +159,9 @@ def share(hits: int, count: int) -> str:
 
 def _ratios(strong: Sequence[Outcome]) -> list[str]:
     lines = []
-    for key, text, goal in (('over_best', 'error after / best fit of the catalogue\'s form, '
+    for key, text, goal in (('over_best', "error after / best fit of the catalogue's form, "
                              'SNR ≥ 1: median, 95th percentile', '≤ 1.02'),
-                            ('over_floor', 'error after / noise floor, catalogue\'s form: median, '
+                            ('over_floor', "error after / noise floor, catalogue's form: median, "
                              '95th percentile', '≤ 1.05')):
         values = [o['judged'][key] for o in strong if key in o['judged']]
         if values:
@@ -169,7 +169,7 @@ def _ratios(strong: Sequence[Outcome]) -> list[str]:
                          f'{np.percentile(values, 95):.3f} |')
     covered = [flag for o in strong for flag in o['judged'].get('covered', ())]
     if covered:
-        lines.append('| 95 % intervals that contain the truth, catalogue\'s form | 90-98 % | '
+        lines.append("| 95 % intervals that contain the truth, catalogue's form | 90-98 % | "
                      f'{share(sum(covered), len(covered))} |')
     return lines
 
@@ -236,7 +236,7 @@ def catalogue_parameters(true: Mapping[str, Any]) -> dict[str, float]:
     """Return the true parameters of an effect of `SAME_FORM` as the catalogue calls them."""
     parameters = true['parameters']
     if true['name'] == 'platform_inertia':
-        I, c, s = parameters['inertia'], np.cos(parameters['angle']), np.sin(parameters['angle'])
+        I, c, s = parameters['inertia'], np.cos(parameters['angle']), np.sin(parameters['angle'])  # noqa: E741
         return {'xx': I * s * s, 'yy': I * c * c, 'zz': I, 'xy': -I * c * s}
     if true['drives'] is None:
         return dict(parameters)

@@ -1,5 +1,7 @@
 """A feedforward node under a steady stream: its memory, and whether anything is lost.
 
+Usage:
+
     python benchmarks/soak.py [MINUTES] [RATE]
 """
 

@@ -166,8 +166,8 @@ def start() -> None:
     for name, code in (('python alone', 'pass'), ('import numpy', 'import numpy'),
                        ('import pprs_dynamics', 'import pprs_dynamics'),
                        ('first evaluation, caches warm', evaluation),
-                       ('the same, not compiled', f'import os; os.environ[{PLAIN!r}] = "1"; '
-                        + evaluation)):
+                       ('first evaluation, not compiled',
+                        f'import os; os.environ[{PLAIN!r}] = "1"; {evaluation}')):
         elapsed, used = np.inf, np.inf
         for _ in range(5):
             begin, before = time.perf_counter(), _processor_of_children()
@@ -205,8 +205,17 @@ for _name, _kind in (('add', 'additions'), ('sub', 'additions'), ('mul', 'multip
 
 
 class _CountedTable(dict[Any, Any]):
+
     def __missing__(self, key: Any) -> _Counted:
         return _Counted(0.0)
+
+
+def _counted(named: Any) -> Any:
+    """Return parameters with counting floats."""
+    if not isinstance(named, tuple):
+        return _Counted(named)
+    elements = [_counted(element) for element in named]
+    return type(named)(*elements) if hasattr(named, '_fields') else tuple(elements)
 
 
 def operations(model: DriveModel, motion: PlatformMotion) -> None:
@@ -215,7 +224,7 @@ def operations(model: DriveModel, motion: PlatformMotion) -> None:
     one_pass = model._one_pass
     assert one_pass is not None
     table = _CountedTable({(0, k): _Counted(x) for k, x in enumerate(motion.rows[0].tolist())})
-    forces_kernel([_Counted(x) for x in one_pass.numbers.tolist()], 0, table, _CountedTable())
+    forces_kernel(_counted(one_pass.parameters.named), 0, table, _CountedTable())
     counts = dict(_Counted.counts)
     print(f'\none sample: {sum(counts.values())} operations ({counts}), 18 roots, 12 tanh')
 

@@ -49,7 +49,7 @@ class Peer:
         w1, w2, w3 = omega.tolist()
         a1, a2, a3 = a.tolist()
         e1, e2, e3 = epsilon.tolist()
-        l, sqrt, atan2 = self.l, math.sqrt, math.atan2
+        l, sqrt, atan2 = self.l, math.sqrt, math.atan2  # noqa: E741
         q, q_dot, q_ddot, slides, lifts, rods = [], [], [], [], [], []
         for c, s, px, py in self.chains:
             r1, r2, r3 = R11 * px + R12 * py, R21 * px + R22 * py, R31 * px + R32 * py
@@ -86,7 +86,7 @@ class Peer:
 
     def kinematics(self, motion: PlatformMotion) -> tuple[np.ndarray, ...]:
         """Return chain coordinates and rates (N, 3, 3), and rows of the drives and rods."""
-        c, s, l = self.cos, self.sin, self.l
+        c, s, l = self.cos, self.sin, self.l  # noqa: E741
         rotation = motion.rotation
         rho = rotation[..., :2] @ np.stack((self.x, self.y))  # (N, 3 components, 3 chains)
         r1, r2, r3 = rho[:, 0], rho[:, 1], rho[:, 2]

@@ -25,7 +25,7 @@ from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.model_file import find_file
+from pprs_dynamics.model.parameter_file import find_file
 from pprs_dynamics.nodes.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects

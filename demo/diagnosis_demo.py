@@ -115,8 +115,8 @@ def main() -> int:
     sentence = reveal(story, diagnosis, added)
     picture = draw(story, added, sentence)
     story.say(f'\nPicture: [b]{picture}[/]   pages: [b]{story.file("before.html")}[/], '
-              f'[b]{story.file("why.html")}[/]' + (f', [b]{story.file("after.html")}[/]'
-                                                  if added else ''))
+              f'[b]{story.file("why.html")}[/]'
+              + (f', [b]{story.file("after.html")}[/]' if added else ''))
     story.say(f'[dim]{time.monotonic() - began:.0f} s; the same again with --seed {seed}[/]')
     return 0
 

@@ -39,7 +39,7 @@ def main() -> int:
     with holder, tempfile.TemporaryDirectory() as folder:
         log = Path(folder)
         console.print('Starting [b]feedforward[/] and [b]play_trajectory[/] as two processes; '
-                      f'the paper\'s helical path at {RATE:g} Hz goes in ...')
+                      f"the paper's helical path at {RATE:g} Hz goes in ...")
         with node_process([executable('feedforward')], domain, log / 'feedforward.log'):
             time_s, total, parts = _listen(domain, log, console)
         if len(time_s) < MESSAGES:
@@ -51,7 +51,7 @@ def main() -> int:
     console.print(f'{len(time_s)} messages in, {len(total)} commands out, all finite: '
                   f'{bool(np.isfinite(total).all())}')
     picture = draw_forces(output / 'drive_forces.png', time_s, total, parts,
-                          'Drive forces on the paper\'s helical path, as published by feedforward')
+                          "Drive forces on the paper's helical path, as published by feedforward")
     curves = output / 'drive_forces.csv'
     np.savetxt(curves, np.column_stack((time_s, total)), delimiter=',', fmt='%.9g', comments='',
                header=','.join(('time', *(f'{drive}/effort' for drive in DRIVES))))

@@ -156,7 +156,7 @@ def document(story: Story) -> str:
     lines += ['', f'Verdict on the published model: {story.diagnosis.verdict}; '
               f'{", ".join(one.name for one in story.diagnosis.effects) or "no effect"}.', '',
               '## Error along the loop', '',
-              'By the authors\' recipe, and as `pprs compare` tells it.', '',
+              "By the authors' recipe, and as `pprs compare` tells it.", '',
               '| model | identification | pulses | `compare`, identification | `compare`, pulses |',
               '|---|---|---|---|---|']
     rows: list[tuple[str, ForceModel]] = [

@@ -1,14 +1,35 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Errors of the package: one root, each composing its sentence from what it keeps."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import Any
 
 from pprs_dynamics.plain_text import displayed
 
+# Names that are all listed where one is unknown: the drives' are. Of more, one like it is.
+FEW = 6
+# Names that are all listed where none is like the unknown one: the effects' are, not all keys'.
+MANY = 40
+
 
 class Missing:
-    """Stands for a value that is not there, which is not the same as None."""
+    """Stands for a value that is absent, unlike None."""
 
     def __repr__(self) -> str:
         return 'missing'
@@ -31,16 +52,56 @@ class ModelError(PprsError, ValueError):
     value : object
         What was found there; MISSING where nothing was.
     rule : str
-        What is required, completing "it must ...".
+        What is required, completing "must ...".
     source : str, optional
         Where the value came from, e.g. a file name.
     """
 
     def __init__(self, key: str, value: Any, rule: str, source: str = '') -> None:
         self.key, self.value, self.rule, self.source = key, value, rule, source
-        place = f'{source}: ' if source else ''
-        found = 'is missing' if value is MISSING else f'is {_shorten(value)}'
-        super().__init__(f'{place}{key} {found}, but it must {rule}')
+        super().__init__(key, value, rule, source)
+
+    @property
+    def sentence(self) -> str:
+        """The error without its source."""
+        found = 'is missing' if self.value is MISSING else f'is {_shorten(self.value)}'
+        return f'{self.key} {found}, must {self.rule}'
+
+    def __str__(self) -> str:
+        return f'{self.source}: {self.sentence}' if self.source else self.sentence
+
+
+class UnknownNameError(ModelError):
+    """A key, an effect or a drive that does not exist.
+
+    Parameters
+    ----------
+    kind, name : str
+        What was named, and how, e.g. ``key``, ``masses.paylod``.
+    known : sequence of str
+        Names that exist, of which one or all are suggested.
+    place : str, optional
+        The key under which the name stands, where it is not a key itself.
+    """
+
+    def __init__(
+        self, kind: str, name: str, known: Iterable[str], place: str = '', source: str = '',
+    ) -> None:
+        super().__init__(place or name, name, f'be a known {kind}', source)
+        self.kind, self.known = kind, tuple(known)
+        self.args = (kind, name, self.known, place, source)
+        self.place = place
+
+    @property
+    def sentence(self) -> str:
+        """The error without its source."""
+        close = difflib.get_close_matches(self.value, self.known, 1)
+        if close and len(self.known) > FEW:
+            hint = f' (did you mean {close[0]}?)'
+        else:
+            hint = f' (known: {", ".join(self.known)})' if len(self.known) <= MANY else ''
+        place = f'{self.place}: ' if self.place else ''
+        return f'{place}unknown {self.kind} {self.value}{hint}'
 
 
 class UnreadableFileError(PprsError, OSError):
@@ -71,7 +132,7 @@ class MotionError(PprsError, ValueError):
 
     def __init__(self, quantity: str, found: str, rule: str, kind: str) -> None:
         self.quantity, self.found, self.rule, self.kind = quantity, found, rule, kind
-        super().__init__(f'{quantity}: {found}, but it must {rule}')
+        super().__init__(f'{quantity}: {found}, must {rule}')
 
 
 class WorkspaceError(PprsError, ValueError):

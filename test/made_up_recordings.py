@@ -46,7 +46,7 @@ def kinds(recording: Recording) -> set[str]:
 
 
 def the(recording: Recording, kind: str) -> Finding:
-    """The only finding, which is of this kind."""
+    """Return the only finding, which must be of a kind."""
     assert kinds(recording) == {kind}
     (finding,) = recording.findings
     return finding
@@ -64,7 +64,7 @@ def write_plain_bag(
     path: Path, messages: dict[str, list[Any]], storage: StoragePlugin = StoragePlugin.MCAP,
     received: Callable[[int], int] = lambda k: k * STEP_NS, msgtype: str = STATE,
 ) -> Path:
-    """What a recorder of ROS would write: messages, or their bytes, by topic."""
+    """Write what a recorder of ROS would: messages, or their bytes, by topic."""
     with Writer(path, version=9, storage_plugin=storage) as writer:
         for topic, states in messages.items():
             connection = writer.add_connection(topic, msgtype, typestore=STORE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -103,9 +104,8 @@ def robot_keys(robot: Robot) -> dict[str, Any]:
     """Return the keys of a model file that describe `robot`."""
     keys: dict[str, Any] = {'gravity': robot.gravity}
     for group in ('geometry', 'masses'):
-        fields = vars(getattr(robot, group))
-        keys.update({f'{group}.{name}': value for name, value in fields.items()
-                     if name != 'frames'})
+        part = getattr(robot, group)
+        keys.update({f'{group}.{field.name}': getattr(part, field.name) for field in fields(part)})
     return keys
 
 

@@ -31,8 +31,9 @@ from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.model.ledger import read_steps
-from pprs_dynamics.model.model_file import build_model, default_parameters, read_parameters
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.model.parameter_file import default_parameters, read_parameters
 from pprs_dynamics.residuals.measuring import measure_residuals
 
 BENCHMARKS = Path(__file__).parents[1] / 'benchmarks'
@@ -347,11 +348,13 @@ def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch)
         left = tuple(one for one in effects if one.name not in model)
         return SimpleNamespace(effects=left, indistinguishable=(), depends_on=())
 
-    def answer(model: tuple[str, ...], request: EffectRequest, *_: object, **__: object) -> SimpleNamespace:
+    def answer(model: tuple[str, ...], request: EffectRequest, *_: object,
+               **__: object) -> SimpleNamespace:
         name = request.effect.name
         asked.append(name)
         good = name != 'force_ripple'
-        return SimpleNamespace(request=request, effect=name, adopted=good, reason='it does not fall', rivals=(),
+        return SimpleNamespace(request=request, effect=name, adopted=good,
+                               reason='it does not fall', rivals=(),
                                after=(*model, name) if good else model)
 
     for name, fake in (('diagnose', found), ('adopt', answer), ('original', lambda model: model),

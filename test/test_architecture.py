@@ -42,6 +42,24 @@ MAY_USE = {
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))
 
+# The header that ament_copyright asks of every file.
+LICENCE = """\
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+
 
 def imports(file: Path) -> set[str]:
     names = set()
@@ -53,6 +71,27 @@ def imports(file: Path) -> set[str]:
     return names
 
 
+def imported_files(file: Path) -> set[Path]:
+    """Return the files of the package that a file imports anywhere, in functions too."""
+    names = imports(file)
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {f'{node.module}.{alias.name}' for alias in node.names}
+    paths = (PACKAGE.parent.joinpath(*name.split('.')).with_suffix('.py') for name in names)
+    return {path for path in paths if path.is_file() and PACKAGE in path.parents}
+
+
+def circles(graph: dict[Path, set[Path]]) -> set[Path]:
+    """Return the files of a graph of imports that import each other, over however many files."""
+    left = {file: set(used) for file, used in graph.items()}
+    # Files are taken away that import none of the rest, then those that none of the rest imports.
+    for _ in range(2):
+        while free := {file for file, used in left.items() if not used & left.keys()}:
+            left = {file: used for file, used in left.items() if file not in free}
+        left = {file: {other for other in left if file in left[other]} for file in left}
+    return set(left)
+
+
 def files() -> list[Path]:
     return sorted(file for file in PACKAGE.rglob('*.py') if file.parent != PACKAGE)
 
@@ -62,12 +101,27 @@ def test_arrows_point_one_way(file: Path) -> None:
     folder = file.relative_to(PACKAGE).parts[0]
     used = imports(file)
     own = {name.split('.')[1] for name in used if name.startswith('pprs_dynamics.')}
-    assert own - {'parallel', 'arrays', 'errors', 'plain_text', 'threads', folder} <= MAY_USE[folder]
+    assert own - {'arrays', 'errors', 'parallel', 'plain_text', 'threads', folder} <= MAY_USE[folder]
     libraries = {name.split('.')[0] for name in used}
     if folder != 'nodes':
         assert not libraries & ROS
     if folder not in ('report', 'commands'):
         assert not libraries & PLOTTING
+
+
+def test_no_file_imports_one_that_imports_it() -> None:
+    found = circles({file: imported_files(file) for file in files()})
+    assert {str(file.relative_to(PACKAGE)) for file in found} == set()
+
+
+def test_a_circle_that_a_local_import_hides_is_found(tmp_path: Path) -> None:
+    a, b, c, d = (tmp_path / name for name in 'abcd')
+    assert circles({a: {b}, b: {c}, c: set()}) == set()
+    assert circles({a: {b}, b: {c}, c: {b, d}, d: set()}) == {b, c}
+    line = PACKAGE / 'mechanism' / 'motion.py'
+    hidden = tmp_path / 'hidden.py'
+    hidden.write_text('def f():\n    from pprs_dynamics.mechanism import motion\n')
+    assert imported_files(hidden) == {line}
 
 
 @pytest.mark.parametrize('file', sorted((PACKAGE / 'nodes').glob('*.py')), ids=lambda f: f.name)
@@ -108,9 +162,16 @@ def test_each_catalogue_effect_has_a_file_of_its_name_and_the_list_is_sorted() -
             assert parameter.lower < parameter.upper
 
 
+@pytest.mark.parametrize('folder', ['mechanism', 'effects', 'model', 'simulation'])
+def test_every_file_begins_with_the_licence(folder: str) -> None:
+    assert [file.name for file in sorted((PACKAGE / folder).glob('*.py'))
+            if not file.read_text(encoding='utf-8').startswith(LICENCE)] == []
+
+
 def test_modules_are_short() -> None:
-    lengths = {str(file.relative_to(PACKAGE)): len(file.read_text().splitlines())
-               for file in files()}
+    # The licence's text is not counted.
+    lengths = {str(file.relative_to(PACKAGE)):
+               len(file.read_text().removeprefix(LICENCE).splitlines()) for file in files()}
     assert {name: length for name, length in lengths.items() if length > 350} == {}
 
 

@@ -14,7 +14,7 @@ from ros_processes import executable
 
 from pprs_dynamics.commands.output import write_text
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.model.model_file import default_parameters
+from pprs_dynamics.model.parameter_file import default_parameters
 
 
 def pprs(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

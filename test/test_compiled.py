@@ -238,7 +238,7 @@ def test_a_motion_does_not_change_with_the_arrays_that_it_was_made_of():
 def test_without_a_place_to_keep_compiled_code_nothing_is_compiled(monkeypatch):
     pytest.importorskip('numba')
 
-    def refuse(kernel):
+    def refuse(kernel, named):
         raise RuntimeError('cannot cache function: no locator available')
 
     monkeypatch.setattr(compilation, '_compiled_loop', refuse)

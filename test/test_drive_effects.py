@@ -203,8 +203,8 @@ def test_friction_takes_power_from_the_motion_and_below_its_limit_gives_it(effec
 def test_force_is_the_sum_of_coefficients_times_columns(effect):
     axes = excitation()
     values = random_values(effect, np.random.default_rng(63))
-    columns = effect.columns(DriveSamples.of(axes, 0), **{p.name: values[p.name]
-                                                         for p in effect.shape})
+    shape = {p.name: values[p.name] for p in effect.shape}
+    columns = effect.columns(DriveSamples.of(axes, 0), **shape)
     coefficients = effect.to_coefficients(values)
     assert list(coefficients) == [c.name for c in effect.coefficients]
     expected = sum(coefficients[c.name] * column

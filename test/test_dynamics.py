@@ -51,7 +51,7 @@ every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
 
 @pytest.fixture(params=ELBOWS)
 def robot(request):
-    """A robot in which no two chains are equal, under oblique gravity."""
+    """Return a robot in which no two chains are equal, under oblique gravity."""
     return random_robot(np.random.default_rng(51), request.param, OBLIQUE)
 
 
@@ -189,7 +189,7 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     forces = model_of(robot).drive_forces(motion)
     chains, body = forces.mechanism.chains, forces.mechanism.rigid_body
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
-        robot.geometry.rod_length
+        robot.geometry.rod_length  # noqa: E741
     slides, lifts, rods = (np.asarray(m)[:, None] for m in (
         robot.masses.slides, robot.masses.lifts, robot.masses.rods))
     c, s = chains.cos_u[..., None], chains.sin_u[..., None]
@@ -511,7 +511,7 @@ HYSTERESIS = effect_keys('hysteresis', ('slide_1', 'lift_2'), {'force': 0.8, 'di
 
 @pytest.fixture
 def remembering():
-    """A model with hysteresis, and a motion with reversals."""
+    """Return a model with hysteresis, and a motion with reversals."""
     return (paper_model({**OPEN_LIMITS, **HYSTERESIS}), smooth_motion(np.linspace(0, 4, 800)))
 
 

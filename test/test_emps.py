@@ -29,7 +29,7 @@ MODEL = DOCS.parent / 'config' / 'single_axis.yaml'
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with both runs as CSV, written by the script."""
+    """Return a folder with both runs as CSV, written by the script."""
     folder = tmp_path_factory.mktemp('emps')
     subprocess.run([sys.executable, DOCS / 'emps.py', str(DATA), folder], check=True, timeout=60)
     return folder

@@ -252,8 +252,6 @@ def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
             lambda: node.bench.status[-1]['model']['sha256'] != before)
 
 
-
-
 def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
     messages = pytest.importorskip('diagnostic_msgs.msg')
     with feedforward_bench() as node:

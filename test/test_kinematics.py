@@ -31,8 +31,10 @@ from pprs_dynamics.errors import (
     WorkspaceError,
 )
 from pprs_dynamics.mechanism.forward_kinematics import home_pose, solve_forward_kinematics
-from pprs_dynamics.mechanism.inverse_kinematics import solve_inverse_kinematics
-from pprs_dynamics.mechanism.jacobians import compute_jacobians, condition_number
+from pprs_dynamics.mechanism.inverse_kinematics import chain_table, solve_inverse_kinematics
+from pprs_dynamics.mechanism.jacobians import condition_number, inverse_table
+from pprs_dynamics.mechanism.robot import Robot
+from pprs_dynamics.mechanism.state import solve_mechanism
 
 POSES = 4000
 # Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
@@ -46,7 +48,7 @@ every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
 
 @pytest.fixture(params=ELBOWS)
 def geometry(request):
-    """A geometry in which no two chains are equal."""
+    """Return a geometry in which no two chains are equal."""
     return random_robot(np.random.default_rng(21), request.param).geometry
 
 
@@ -61,8 +63,8 @@ DIFFERENCE_TOLERANCE = 1e-9
 
 def solve(geometry, motion):
     """Return chains and Jacobians of a motion."""
-    chains = solve_inverse_kinematics(geometry, motion)
-    return chains, compute_jacobians(geometry, chains)
+    state = solve_mechanism(Robot(geometry, paper_model().robot.masses), motion)
+    return state.chains, state.jacobians
 
 
 def home_determinant(geometry):
@@ -132,7 +134,7 @@ def test_one_seed_serves_all_samples(geometry):
 # Other solutions -----------------------------------------------------------------------------
 
 def assert_right_or_refused(geometry, q, seed, true_position):
-    """A seed in another assembly mode must end at the true pose, or in ConvergenceError."""
+    """Assert that a seed in another assembly mode ends at the true pose, or in ConvergenceError."""
     try:
         found = solve_forward_kinematics(geometry, q, seed)
     except ConvergenceError:
@@ -351,7 +353,7 @@ def test_J_u_is_that_of_constant_distances_between_the_spherical_joints(geometry
     motion = random_motion(np.random.default_rng(42), 200, geometry.elbow)
     chains, jacobians = solve(geometry, motion)
     e, n = chain_vectors(geometry)
-    k, l = np.array([0.0, 0.0, 1.0]), geometry.rod_length
+    k, l = np.array([0.0, 0.0, 1.0]), geometry.rod_length  # noqa: E741
     for sample in range(len(motion)):
         q, c, s = chains.position[sample], chains.cos_u[sample], chains.sin_u[sample]
         A = (geometry.base_radius * e + q[:3, None] * n + q[3:, None] * k
@@ -435,8 +437,8 @@ def test_condition_limit_is_where_it_says(elbow):
 
 def test_exactly_singular_B_raises_even_without_a_limit():
     geometry = paper_geometry()
-    chains = solve_inverse_kinematics(geometry, PlatformMotion.at_rest(home_position()))
+    chains = chain_table(geometry, PlatformMotion.at_rest(home_position()), 1e-6)
     # Joints of the platform on top of each other: no moment about any axis through them.
-    collapsed = replace(chains, arm=type(chains.arm)(*(0 * part for part in chains.arm)))
+    chains[:, :9] = 0.0
     with pytest.raises(SingularityError, match=r'det \[B\]'):
-        compute_jacobians(geometry, collapsed)
+        inverse_table(geometry, chains, np.inf)

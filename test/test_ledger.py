@@ -19,8 +19,9 @@ from pprs_dynamics.model.ledger import (
     with_step,
     without_last_step,
 )
-from pprs_dynamics.model.model_file import build_model, default_parameters, read_parameters
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.model.parameter_file import default_parameters, read_parameters
 
 STEP = Step(
     effect='coulomb_friction', error_before=0.2, error_after=0.1, held_out_before=0.21,
@@ -87,7 +88,7 @@ DAMAGE = {
     'history.step_01.error_before': ('a lot', 'be a number'),
     'history.step_01.forced': (0.5, 'be true or false'),
     'history.step_01.recordings': ('a.csv', 'be a list'),
-    'history.step_01.weather': ('fine', 'no such key of a step'),
+    'history.step_01.weather': ('fine', 'unknown key history.step_01.weather'),
     'history.first.effect': ('x', 'stand under history.step_01'),
     'history.step_04.effect': ('x', 'be there before history.step_04'),
 }

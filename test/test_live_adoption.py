@@ -28,8 +28,8 @@ from pprs_dynamics.adoption.adopt import adopt
 from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.model_file import read_parameters
 from pprs_dynamics.model.model_writer import write_model
+from pprs_dynamics.model.parameter_file import read_parameters
 from pprs_dynamics.nodes import conversions
 
 pytestmark = pytest.mark.nodes

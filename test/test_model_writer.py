@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,9 @@ from rclpy.node import Node
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.model.atomic_file import write_text
-from pprs_dynamics.model.model_file import build_model, default_parameters, read_parameters
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import edit_model, format_model, write_model
+from pprs_dynamics.model.parameter_file import default_parameters, parse_parameters, read_parameters
 
 PAPER = Path(__file__).parents[1] / 'config' / 'paper.yaml'
 # Numbers whose shortest text is a trap: whole, tiny, huge, not representable, negative zero.
@@ -94,6 +97,30 @@ def test_an_edited_file_differs_in_what_changed_and_nothing_else() -> None:
                       default_parameters()) == text
 
 
+FORMS: dict[str, Callable[[str], str]] = {
+    'four spaces': lambda text: re.sub(r'^ +', lambda m: 2 * m.group(), text, flags=re.M),
+    'spaces in brackets': lambda text: text.replace('[0.5, 0.5, 0.5]', '[ 0.5, 0.5, 0.5 ]'),
+    'values in a column': lambda text: re.sub(
+        r'(base_radius|platform_radius|rod_length): ', lambda m: f'{m[1]}:'.ljust(18), text),
+    'list over lines': lambda text: text.replace('[0.0, 2.0943951023931953, ',
+                                                 '[0.0, 2.0943951023931953,\n        ', 1),
+    'null': lambda text: text + '    file: ~\n',
+    'exponent': lambda text: text.replace('reversal_velocity: 0.001', 'reversal_velocity: .1E-2'),
+    'start of document': lambda text: '---\n' + text,
+    'anchor': lambda text: text.replace('lifts: [', 'lifts: &same ['),
+    'quotes': lambda text: text.replace('whole_mechanism ', "'whole_mechanism' ")}
+
+
+@pytest.mark.parametrize('form', FORMS)
+def test_an_edit_changes_one_line_of_a_file_of_any_form(form: str) -> None:
+    text = FORMS[form](PAPER.read_text())
+    values = parse_parameters(text)
+    edited = edit_model(text, {**values, 'masses.payload': 1.23456})
+    lines, new = text.splitlines(), edited.splitlines()
+    changed = [k for k, (old, line) in enumerate(zip(lines, new, strict=True)) if old != line]
+    assert [lines[k].split(':')[0].strip() for k in changed] == ['payload']
+
+
 def test_a_file_written_anew_names_every_key_with_its_unit() -> None:
     text = format_model(build_model(default_parameters()).values)
     assert '  # l, length of the guiding rods [m]' in text
@@ -114,11 +141,11 @@ def test_keys_of_nodes_and_other_nodes_blocks_stay(tmp_path: Path) -> None:
 @pytest.mark.parametrize('form', ['dots', 'flow', 'block_lists', 'no_newline'])
 def test_files_of_every_form_come_out_right(tmp_path: Path, form: str) -> None:
     base, values = tmp_path / 'base.yaml', default_parameters()
+    flat = ', '.join(f'{key}: {value}' for key, value in values.items())
     text = {
         'dots': '/**:\n  ros__parameters:\n' + ''.join(
             f'    {key}: {value}\n' for key, value in values.items()),
-        'flow': '{/**: {ros__parameters: {' + ', '.join(
-            f'{key}: {value}' for key, value in values.items()) + '}}, '
+        'flow': f'{{/**: {{ros__parameters: {{{flat}}}}}, '
                 'monitor: {ros__parameters: {window: 0.2}}}\n',
         'block_lists': PAPER.read_text().replace(
             'slides: [0.5, 0.5, 0.5] ', 'slides:\n        - 0.5\n        - 0.5\n        - 0.5 '),

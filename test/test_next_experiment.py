@@ -30,7 +30,7 @@ from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.model_file import build_robot, default_parameters
+from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.regression.base_columns import (
     KnownNumber,
     PresentCoefficient,
@@ -54,7 +54,7 @@ TOLERANT = {'tolerances.masses.payload': 0.05, 'tolerances.friction.drives.coulo
 
 @pytest.fixture(scope='module')
 def model() -> DriveModel:
-    return build_robot({**default_parameters(), **TOLERANT})
+    return DriveModel.from_parameters({**default_parameters(), **TOLERANT})
 
 
 @pytest.fixture(scope='module')
@@ -117,7 +117,7 @@ EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_
 @pytest.fixture(scope='module')
 def design(model: DriveModel, parameters: np.ndarray) -> Design:
     """Columns on a recording of a robot that has effects already."""
-    model = build_robot({**model.values, **EFFECTS})
+    model = DriveModel.from_parameters({**model.values, **EFFECTS})
     motion = FAMILY.path(parameters).motion(np.arange(0.0, DURATION, 0.002))
     return Design.of(model, [recorded(model, motion, 0, 0.0)])
 
@@ -334,8 +334,9 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
 
 def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np.ndarray) -> None:
     """Coulomb friction on a drive: a freer form of it is no rival, another effect is one."""
-    robot = build_robot({**model.values, 'effects.active': ['coulomb_friction'],
-                         'effects.coulomb_friction.lift_1.force': 0.6})
+    robot = DriveModel.from_parameters({
+        **model.values, 'effects.active': ['coulomb_friction'],
+        'effects.coulomb_friction.lift_1.force': 0.6})
     time = np.arange(0.0, DURATION, 0.004)
     path = FAMILY.path(parameters)
     old = recorded(robot, path.motion(time), 1, 0.1)

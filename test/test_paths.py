@@ -124,7 +124,7 @@ def test_samples_at_the_wanted_rate_stay_and_others_are_splined() -> None:
 @pytest.mark.parametrize(('change', 'message'), [
     ({'position': [[0, 0, np.nan]]}, 'position: sample 0 is .*must be finite'),
     ({'orientation': [[0, 0, 0, 1.01]]}, 'orientation: the quaternion of sample 0 has length 1.01'),
-    ({'orientation': [[0, 0, 0, 0]]}, 'length 0, but it must be 1 within 0.001'),
+    ({'orientation': [[0, 0, 0, 0]]}, 'length 0, must be 1 within 0.001'),
     ({'linear_velocity': [[0, 0]]}, r'linear_velocity: its shape is \(1, 2\)'),
     ({'angular_velocity': np.zeros((2, 3))}, 'angular_velocity: it has 2 samples.*have 1'),
     ({'time': [np.inf]}, 'time: sample 0 is not finite'),

@@ -31,7 +31,7 @@ every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
 @pytest.fixture(scope='module', params=[
     (elbow, gravity) for elbow in ELBOWS for gravity in GRAVITIES], ids='-'.join)
 def states(request):
-    """A robot of unequal chains, its model, and random states with the model's answer."""
+    """Return a robot of unequal chains, its model, and random states with the model's answer."""
     elbow, gravity = request.param
     # One seed per case, so that a case run alone sees the states that it sees in the suite.
     rng = np.random.default_rng([ELBOWS.index(elbow), list(GRAVITIES).index(gravity)])
@@ -42,7 +42,7 @@ def states(request):
 
 @pytest.fixture(scope='module')
 def answers(states):
-    """What each engine says about `states`, worked out once."""
+    """Return the answer of each engine for `states`, worked out once."""
     robot, motion, _ = states
     return {engine: engine(robot).solve(motion, C_REVOLUTE, C_SPHERICAL)
             for engine in ENGINES.values()}

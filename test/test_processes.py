@@ -97,7 +97,7 @@ def test_poses_without_twists_get_those_of_a_spline_through_them(tmp_path: Path)
 
 
 MISTAKES = {
-    'feedforward masses.payload:=-1.0': 'masses.payload is -1.0, but it must be a number, at least',
+    'feedforward masses.payload:=-1.0': 'masses.payload is -1.0, must be at least',
     'feedforward masses.paylod:=1.0': 'did you mean masses.payload',
     'feedforward max_age:=-1.0': 'max_age is -1.0',
     'play_trajectory rate:=0.0': 'rate is 0.0',
@@ -106,10 +106,10 @@ MISTAKES = {
     'play_trajectory file:=5': 'file is 5',
     'play_trajectory repeat:=0': 'repeat is 0',
     'play_trajectory ratee:=5.0': 'ratee is 5.0',
-    'feedforward geometry.base_radius:=0.2': 'equations is missing, but it must',
+    'feedforward geometry.base_radius:=0.2': 'equations is missing, must',
     'feedforward timeout_action:=brake': "timeout_action is 'brake'",
     'feedforward effort_limits:=[1.0,2.0]': 'effort_limits is [1.0, 2.0]',
-    'feedforward feedforward_scale:=2.0': 'feedforward_scale is 2.0, but it must be a number',
+    'feedforward feedforward_scale:=2.0': 'feedforward_scale is 2.0, must be',
     'play_trajectory points:=0': 'points is 0',
 }
 

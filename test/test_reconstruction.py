@@ -27,11 +27,11 @@ from pprs_dynamics.measurement.live_reconstruction import LiveReconstruction
 from pprs_dynamics.measurement.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.sampling_grid import find_grid
-from pprs_dynamics.measurement.treatment import LiveTreatment, Treatment, block_length
+from pprs_dynamics.measurement.treatment import Treatment, block_length
 from pprs_dynamics.mechanism import forward_motion
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.mechanism.forward_motion import (
-    find_jumps,
+    find_pose_jumps,
     follow_branch,
     platform_rates,
     solve_forward_motion,
@@ -128,6 +128,7 @@ def test_platform_rates_are_differences_of_forward_kinematics(elbow):
         return home * (derivative == 0) + size * frequency ** derivative * np.sin(angle)
 
     class Path:
+
         def motion(self, time):
             found = solve_forward_kinematics(geometry, drives(time))
             return PlatformMotion.at_rest(found.position, found.orientation)
@@ -190,7 +191,7 @@ def test_drives_that_cannot_close_are_named_with_sample_and_time():
 
 def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
     motion = motion_from_poses(Excitation(3.0), np.arange(0.2, 2.5, STEP))
-    assert not find_jumps(motion).any()
+    assert not find_pose_jumps(motion).any()
     moved = motion.position.copy()
     moved[400:] += [0, 1e-3, 0]
     turned = (Rotation.from_rotvec([0, 0, 0.01]) * Rotation.from_quat(
@@ -199,7 +200,7 @@ def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
         moved, np.concatenate((motion.orientation[:700], turned)), motion.linear_velocity,
         motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration,
         motion.time)
-    assert np.flatnonzero(find_jumps(jumping)).tolist() == [400, 700]
+    assert np.flatnonzero(find_pose_jumps(jumping)).tolist() == [400, 700]
 
 
 def test_a_jump_between_two_chunks_is_told(monkeypatch):
@@ -438,7 +439,7 @@ def test_a_single_axis_is_smoothed_but_has_no_platform():
     found = smooth_drives(recording)
     assert rms(found.velocity - real.drives.velocity[found.index, :1]) < 1e-5
     assert any('velocities of axis' in note for note in found.notes)
-    with pytest.raises(MotionError, match='they are axis, but it must be slide_1'):
+    with pytest.raises(MotionError, match='they are axis, must be slide_1'):
         reconstruct(MODEL, recording)
 
 
@@ -567,20 +568,22 @@ def test_velocities_are_judged_drive_by_drive_and_a_missing_one_is_not_used():
 # Live ----------------------------------------------------------------------------------------
 
 def play(recording, polynomial, block):
-    """Return live samples, and the blocks of effort and velocity."""
-    live, treatment = LiveReconstruction(polynomial), LiveTreatment(block)
-    samples, blocks = [], []
+    """Return live samples, and the blocks of effort and velocity in each stretch."""
+    live = LiveReconstruction(polynomial)
+    samples, stretches = [], []
     for time, q, F in zip(recording.time, recording.position, recording.effort, strict=True):
         sample = live.push(time, q, F)
         if sample is None:
             continue
         if sample.is_start:
-            treatment.reset()
+            stretches.append([])
         samples.append(sample)
-        mean = treatment.push(np.concatenate((sample.effort, sample.velocity)))
-        if mean is not None:
-            blocks.append(mean)
-    return live, samples, np.array(blocks)
+        stretches[-1].append(np.concatenate((sample.effort, sample.velocity)))
+    blocks = []
+    for stretch in stretches:
+        whole = len(stretch) // block * block
+        blocks.append(Treatment(np.arange(0, whole, block), whole)(np.array(stretch[:whole])))
+    return live, samples, np.concatenate(blocks)
 
 
 def test_live_and_offline_agree_to_rounding_across_a_gap():

@@ -29,7 +29,8 @@ from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.model_file import build_model, default_parameters
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.report.diagnosis_tables import diagnosis_view

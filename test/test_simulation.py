@@ -193,7 +193,7 @@ def test_loads_with_friction_in_them_differ_by_millinewtons_of_effort() -> None:
 
 @pytest.fixture(scope='module')
 def needed() -> dict[str, np.ndarray]:
-    """Forces that the model says the reference needs, by parts."""
+    """Return the forces that the model says the reference needs, by parts."""
     reference = wave(1.2)
     acceleration = -(2 * np.pi * WAVE_RATES) ** 2 * (
         reference.position - HOME + 0.02 * np.sin(WAVE_PHASES))

@@ -15,8 +15,8 @@ from ros_processes import executable
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
-from pprs_dynamics.model.model_file import default_parameters
 from pprs_dynamics.model.model_writer import format_model
+from pprs_dynamics.model.parameter_file import default_parameters
 
 RATE, DURATION = 200.0, 8.0
 # A drive force that the model lacks, so that commands have something to say.

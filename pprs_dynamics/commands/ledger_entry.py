@@ -15,8 +15,9 @@ from pprs_dynamics.measurement.fingerprint import fingerprint
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import NOT_KNOWN, Step, with_step
-from pprs_dynamics.model.model_file import build_model, find_file
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import refuse_same_file
+from pprs_dynamics.model.parameter_file import find_file
 from pprs_dynamics.residuals.paired_errors import rms_by_drive
 
 

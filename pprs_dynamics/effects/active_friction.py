@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Friction in the six drives: Eq. (1), (2), (15) and (16) of the paper."""
 
 from __future__ import annotations
@@ -11,7 +25,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Effect
 from pprs_dynamics.mechanism.state import MechanismState
 
-Six = tuple[float, float, float, float, float, float]
+SixFloats = tuple[float, float, float, float, float, float]
 
 
 def drive_friction(c: Any, mu: Any, q_dot: Any, load: Any, sgn: Any) -> Any:
@@ -32,8 +46,8 @@ class ActiveFriction(Effect):
     """
 
     name: ClassVar[str] = 'active_friction'
-    viscous: Six
-    coulomb: Six
+    viscous: SixFloats
+    coulomb: SixFloats
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^m, (N, 6) [N]."""

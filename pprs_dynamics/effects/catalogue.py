@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The effects that a model file may add, by name: the package's own and those of other packages.
 
 Another package offers an effect through the entry point group `pprs_dynamics.effects`:
@@ -105,7 +119,7 @@ def catalogue() -> dict[str, type[CatalogueEffect]]:
 
 
 class _UnusableEffectError(Exception):
-    """What is wrong with another package's effect."""
+    """Another package's effect breaks a rule of the catalogue."""
 
 
 def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[CatalogueEffect]:

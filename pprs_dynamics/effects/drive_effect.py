@@ -1,24 +1,38 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Effects that act in single drives, each with its own parameters."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import CatalogueEffect, names
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import ModelError, UnknownNameError
 from pprs_dynamics.mechanism.robot import AXIS, DRIVES
 from pprs_dynamics.mechanism.state import DriveStates
 
 
 @dataclass(frozen=True)
 class DriveSamples:
-    """What one drive did: all (N,); `time` is None where unknown, `direction` is sgn."""
+    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn."""
 
     time: Array | None
     position: Array
@@ -30,19 +44,15 @@ class DriveSamples:
 
     @classmethod
     def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
-        """Return one drive's share of a state."""
+        """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
                    state.guide_load[:, drive], memory)
 
-    def with_memory(self, memory: Any) -> DriveSamples:
-        """Return the same with a memory."""
-        return replace(self, memory=memory)
-
 
 @dataclass(frozen=True)
 class DriveRange:
-    """What a recording covers, from which grids of shape parameters are made.
+    """Range that a recording covers, from which grids of shape parameters are made.
 
     Parameters
     ----------
@@ -140,8 +150,7 @@ class DriveEffect(CatalogueEffect):
                              f'{{{names(cls.parameters)}}}')
         for drive in values:
             if drive not in (*DRIVES, AXIS):
-                raise ModelError(f'{prefix}.{drive}', values[drive],
-                                 f'sit on one of the drives {", ".join(DRIVES)}')
+                raise UnknownNameError('drive', drive, DRIVES, prefix)
         return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
                     for drive, block in values.items()})
 
@@ -151,7 +160,7 @@ class DriveEffect(CatalogueEffect):
 
 
 class MeasurementEffect(DriveEffect):
-    """What the sensors of a drive say beside the truth. It never enters a command."""
+    """Systematic error of a drive's sensors. It never enters a command."""
 
     is_measurement = True
 
@@ -188,10 +197,10 @@ class MeasurementEffect(DriveEffect):
         return bool(np.any(unit.position_error((AXIS,))))
 
     def position_error(self, drives: Sequence[str]) -> Array:
-        """Return what must be taken off measured positions [m], (D,)."""
+        """Return the errors of measured positions [m], to be subtracted, (D,)."""
         return np.zeros(len(drives))
 
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:
-        """Return what the sensors say where the drives apply `effort` (N, D) [N]."""
+        """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         return effort

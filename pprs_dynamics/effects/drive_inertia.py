@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Mass that only the drive feels: m q_ddot, with the rotation of its motor and screw."""
 
 from __future__ import annotations
@@ -19,7 +33,7 @@ class DriveInertia(DriveEffect):
     unphysical_below: ClassVar[Mapping[str, float]] = {'mass': 0.0}
     card = Card(
         'm q_ddot',
-        'a straight line over the drive\'s own acceleration, and no part in its weight; largest '
+        "a straight line over the drive's own acceleration, and no part in its weight; largest "
         'where the drive turns back',
         'inertia of rotor, coupling, pulley and screw that the mass of the slide does not '
         'contain: J (2 pi / lead)^2 for a screw',

@@ -1,4 +1,18 @@
-"""What an effect is: a share of the drive forces, with parameters that it declares once."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Base of all effects: a share of the drive forces, with parameters declared once."""
 
 from __future__ import annotations
 
@@ -9,7 +23,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.mechanism.state import MechanismState
 
 
@@ -60,11 +74,11 @@ class Parameter:
     def check(self, key: str, value: Any) -> float:
         """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ModelError(key, value, 'be a number')
+            raise ModelError(key, value, f'be a number ({self.description} [{self.unit}])')
         # Bounds are finite, so that what lies within is, too.
         if not self.lower <= value <= self.upper:
-            raise ModelError(key, value, f'lie in [{self.lower:g}, {self.upper:g}] '
-                             f'{self.unit} ({self.description})')
+            raise ModelError(key, value, f'be between {self.lower:g} and {self.upper:g} '
+                             f'({self.description} [{self.unit}])')
         return float(value)
 
 
@@ -118,7 +132,7 @@ class Effect(ABC):
 
 @dataclass(frozen=True)
 class Card:
-    """What a person needs to know of an effect.
+    """Description of an effect for users.
 
     Parameters
     ----------
@@ -232,8 +246,8 @@ class CatalogueEffect(Effect):
         known = {parameter.name: parameter for parameter in cls.parameters}
         for name in values:
             if name not in known:
-                raise ModelError(f'{prefix}.{name}', values[name],
-                                 f'not be there: {cls.name} has {names(cls.parameters)}')
+                raise UnknownNameError('key', f'{prefix}.{name}',
+                                       [f'{prefix}.{parameter}' for parameter in known])
         checked = {}
         for name, parameter in known.items():
             if name not in values and parameter.default is None:
@@ -241,7 +255,8 @@ class CatalogueEffect(Effect):
                     continue
                 raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
-            checked[name] = parameter.check(f'{prefix}.{name}', values.get(name, parameter.default))
+            value = values.get(name, parameter.default)
+            checked[name] = parameter.check(f'{prefix}.{name}', value)
         return checked
 
 

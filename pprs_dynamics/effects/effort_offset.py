@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A constant force on a drive, whatever it does: F_0."""
 
 from __future__ import annotations
@@ -23,7 +37,7 @@ class EffortOffset(DriveEffect):
         'zero of the force or current sensor, bias of the amplifier, a counterbalance or a '
         'hanging cable, a slide that is not level (then all drives show it: base_tilt)',
         'read the effort with the drive uncoupled or the amplifier disabled: what is left is the '
-        'sensor\'s; else hang the cable or counterbalance off and repeat',
+        "sensor's; else hang the cable or counterbalance off and repeat",
         'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
         'on the offset of motor currents')
 

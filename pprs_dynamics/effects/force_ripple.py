@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Force that repeats with position: A sin(2 pi q / p + phi), and its second harmonic.
 
 Linear in the amplitudes of sine and cosine, A cos(phi) and A sin(phi). q is the drive's position
@@ -102,7 +116,7 @@ class ForceRipple(DriveEffect):
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return A cos(phi), A sin(phi), and the same of the second harmonic."""
+        """Return A cos(phi) and A sin(phi) of both harmonics."""
         A, phi = values['force'], values['phase']
         A_2, phi_2 = values['second'], values['second_phase']
         return {'sine': A * math.cos(phi), 'cosine': A * math.sin(phi),

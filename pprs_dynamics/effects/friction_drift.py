@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Dry friction that fades as the drive warms up: F exp(-t / tau) sgn(q_dot), t from the start."""
 
 from __future__ import annotations
@@ -27,7 +41,7 @@ class FrictionDrift(DriveEffect):
         'grows, where F is negative), whatever the motion',
         'grease that warms by the friction itself or after a cold start, seals that settle, a '
         'preload that changes as screw or guide expand',
-        'repeat the same motion for an hour from cold, and after a night\'s rest: the friction '
+        "repeat the same motion for an hour from cold, and after a night's rest: the friction "
         'must fade alike both times; measure the temperature of nut and guide beside it',
         'Bittencourt and Gunnarsson, Static friction in a robot joint: modeling and '
         'identification of load and temperature effects, ASME J. Dynamic Systems, Measurement, '

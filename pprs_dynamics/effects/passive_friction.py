@@ -1,4 +1,18 @@
-"""Friction in the passive joints: Eq. (9), and its way to the drives by Eq. (12) or (13)."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Friction in the passive joints, Eq. (9), and its drive forces, Eq. (12) or (13)."""
 
 from __future__ import annotations
 
@@ -13,11 +27,19 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Effect
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.mechanism.arithmetic import sqrt
-from pprs_dynamics.mechanism.closure import Inverse, Six, Wrench, power, read_inverse, rod_row
+from pprs_dynamics.mechanism.chains import CHAINS, each_chain
+from pprs_dynamics.mechanism.closure import (
+    DriveValues,
+    Inverse,
+    Wrench,
+    power,
+    read_inverse,
+    rod_row,
+)
 from pprs_dynamics.mechanism.evaluation import evaluate
-from pprs_dynamics.mechanism.inverse_kinematics import ChainSample, read_chain
+from pprs_dynamics.mechanism.inverse_kinematics import ThreeChains, read_chains
 from pprs_dynamics.mechanism.joint_rates import Turnover, length, relative_rate
-from pprs_dynamics.mechanism.numbers import Chain, chain
+from pprs_dynamics.mechanism.kernel_parameters import GeometryParameters, KernelParameters
 from pprs_dynamics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.mechanism.state import MechanismState
 from pprs_dynamics.mechanism.vectors import in_base, plus, times
@@ -50,7 +72,7 @@ class Resistances(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """c, mu and d of C_i and of A_i, for kernels."""
+    """Parameters of `resistance_kernel`: c, mu and d of C_i and of A_i."""
 
     c_r: Any
     mu_r: Any
@@ -60,6 +82,13 @@ class Joints(NamedTuple):
     d_s: Any
 
 
+class JointResistance(NamedTuple):
+    """k_ri and k_si of one chain at one sample [N m s/rad]."""
+
+    revolute: Any
+    spherical: Any
+
+
 def resistance(viscous: float, dry: Array | float, speed: Array, reversal_rate: float) -> Array:
     """Return k = c + M sgn(s)/s [N m s/rad] for dry friction M [N m]: the moment is -k s."""
     k: Array = resist(viscous, dry, sign_over_speed(speed, reversal_rate))
@@ -67,7 +96,7 @@ def resistance(viscous: float, dry: Array | float, speed: Array, reversal_rate: 
 
 
 def resist(c: Any, dry: Any, turnover: Any) -> Any:
-    """Return the same from sgn(s)/s."""
+    """Return k = c + M sgn(s)/s for dry friction M, from the turnover sgn(s)/s."""
     return c + dry * turnover                                                  # Eq. (2), (9)
 
 
@@ -78,12 +107,12 @@ def dry_moment(mu: Any, d: Any, load: Any) -> Any:
 
 def joint_resistances(
     joints: Joints, H: Any, V: Any, W: Any, V_star: Any, W_star: Any, turnover: Turnover,
-) -> tuple[Any, Any]:
+) -> JointResistance:
     """Return k_ri and k_si of a chain under its reactions."""
     revolute = dry_moment(joints.mu_r, joints.d_r, sqrt(V_star * V_star + W_star * W_star))
     spherical = dry_moment(joints.mu_s, joints.d_s, sqrt(H * H + V * V + W * W))
-    return (resist(joints.c_r, revolute, turnover.revolute),
-            resist(joints.c_s, spherical, turnover.spherical))
+    return JointResistance(resist(joints.c_r, revolute, turnover.revolute),
+                           resist(joints.c_s, spherical, turnover.spherical))
 
 
 def spherical_speed(state: MechanismState) -> Array:
@@ -92,10 +121,11 @@ def spherical_speed(state: MechanismState) -> Array:
     return speed
 
 
-def chain_resistance(
-    k: Chain, l: Any, c: ChainSample, k_r: Any, k_s: Any, printed: Any,
+@each_chain
+def chain_resistances(
+    i: int, geometry: GeometryParameters, rods: ThreeChains, k: Any, printed: Any,
 ) -> Wrench:
-    """Return the wrench on the platform that overcomes the friction in a chain's joints.
+    """Return the wrench on the platform that overcomes the friction in the joints of chain i.
 
     What acts about u_i is brought there by the rod's row, which gives [J_u] with [J].
 
@@ -104,93 +134,111 @@ def chain_resistance(
     The corrected form is exact: k_si acts on u_dot_i n_i - omega of its own chain. The printed
     form gives the same total power and another share per drive.
     """
+    c, chain = rods[i], geometry.chains[i]
+    k_r, k_s = k[i]
     about_u = (k_r + k_s) * c.u_dot - (1.0 + printed) * k_s * c.omega.n        # Eq. (12)
     against = relative_rate((1.0 - printed) * c.u_dot, c.omega)
-    about_platform = times(-k_s, in_base(k, against))                          # Eq. (12)
-    rod = rod_row(k, l, c.arm, c.sin_u)
+    about_platform = times(-k_s, in_base(chain, against))                      # Eq. (12)
+    rod = rod_row(chain, geometry.l, c.arm, c.sin_u)
     return Wrench(times(about_u, rod.force), plus(times(about_u, rod.moment), about_platform))
 
 
-def drive_forces_of(
-    inverse: Inverse, s1: Any, s2: Any, s3: Any, a: Wrench, b: Wrench, c: Wrench,
-) -> Six:
-    """Return the drive forces [J]^T w that put three wrenches on the platform; s is sin u."""
+def friction_forces(
+    geometry: GeometryParameters, rods: ThreeChains, inverse: Inverse, k: Any, printed: Any,
+) -> DriveValues:
+    """Return the drive forces that overcome resistances k_ri, k_si of the chains: [J]^T w."""
+    a, b, c = chain_resistances(geometry, rods, k, printed)
     w = Wrench(plus(a.force, plus(b.force, c.force)), plus(a.moment, plus(b.moment, c.moment)))
-    return Six(
-        power(w, inverse.slide_1), power(w, inverse.slide_2), power(w, inverse.slide_3),
-        s1 * power(w, inverse.lift_1), s2 * power(w, inverse.lift_2),
-        s3 * power(w, inverse.lift_3))                                         # Eq. (11)
+    return DriveValues(_slide_forces(w, inverse),
+                       _lift_forces(w, inverse, rods))
 
 
-def overcome(state: MechanismState, resistances: Resistances, printed: bool = False) -> Array:
+@each_chain
+def _slide_forces(i: int, w: Wrench, inverse: Inverse) -> Any:
+    return power(w, inverse.columns.slides[i])                                 # Eq. (11)
+
+
+@each_chain
+def _lift_forces(i: int, w: Wrench, inverse: Inverse, rods: ThreeChains) -> Any:
+    return rods[i].sin_u * power(w, inverse.columns.lifts[i])                  # Eq. (11)
+
+
+def resistance_forces(
+    state: MechanismState, resistances: Resistances, printed: bool = False,
+) -> Array:
     """Return the drive forces that overcome resistances in the joints, (N, 6) [N].
 
     By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
     """
     k = np.concatenate(resistances, axis=1)
     force, kinematics = np.empty(k.shape), state.kinematics
-    evaluate(overcome_kernel, np.append(state.robot.geometry.numbers, float(printed)),
-             kinematics.chain_table, kinematics.inverse_table, k, force)
+    parameters = state.robot.geometry.kernel_parameters.extended(TransferParameters, printed)
+    evaluate(transfer_kernel, parameters, kinematics.chain_table, kinematics.inverse_table, k,
+             force)
     return force
 
 
-def overcome_kernel(
-    p: Any, s: Any, chains: Any, inverse: Any, resistances: Any, force: Any,
+class TransferParameters(NamedTuple):
+    """Parameters of `transfer_kernel`: `printed` is 1 for Eq. (12) to the letter, else 0."""
+
+    geometry: GeometryParameters
+    printed: Any
+
+
+def transfer_kernel(
+    p: TransferParameters, s: Any, chains: Any, inverse: Any, resistances: Any, force: Any,
 ) -> Any:
-    """Fill a table of forces from one of k_r, k_s; p is the geometry, then `printed`."""
-    l, printed = p[1], p[24]
-    one, two, three = read_chain(chains, s, 0), read_chain(chains, s, 1), read_chain(chains, s, 2)
-    write_six(force, s, drive_forces_of(
-        read_inverse(inverse, s), one.sin_u, two.sin_u, three.sin_u,
-        chain_resistance(chain(p, 0), l, one, resistances[s, 0], resistances[s, 3], printed),
-        chain_resistance(chain(p, 1), l, two, resistances[s, 1], resistances[s, 4], printed),
-        chain_resistance(chain(p, 2), l, three, resistances[s, 2], resistances[s, 5], printed)))
+    """Fill a table of forces from one of k_r, k_s."""
+    _write_forces(force, s, friction_forces(
+        p.geometry, read_chains(chains, s), read_inverse(inverse, s),
+        _read_resistances(resistances, s), p.printed))
     return True
 
 
-def resistance_kernel(p: Any, s: Any, reactions: Any, turnover: Any, resistances: Any) -> Any:
-    """Fill a table of k_r, k_s; p holds the numbers of `Joints`."""
-    joints = joints_of(p, 0)
-    for i in range(3):
-        resistances[s, i], resistances[s, 3 + i] = _resistances_at(
-            joints, reactions, turnover, s, i)
+@each_chain
+def _read_resistances(i: int, resistances: Any, s: Any) -> JointResistance:
+    return JointResistance(resistances[s, i], resistances[s, CHAINS + i])
+
+
+def resistance_kernel(p: Joints, s: Any, reactions: Any, turnover: Any, resistances: Any) -> Any:
+    """Fill a table of k_r, k_s."""
+    k = _resistances_at(p, reactions, turnover, s)
+    for i in range(CHAINS):
+        resistances[s, i], resistances[s, CHAINS + i] = k[i].revolute, k[i].spherical
     return True
+
+
+class PassiveParameters(NamedTuple):
+    """Parameters of `passive_kernel`, see those of the two kernels that it joins."""
+
+    geometry: GeometryParameters
+    printed: Any
+    joints: Joints
 
 
 def passive_kernel(
-    p: Any, s: Any, chains: Any, inverse: Any, reactions: Any, turnover: Any, force: Any,
+    p: PassiveParameters, s: Any, chains: Any, inverse: Any, reactions: Any, turnover: Any,
+    force: Any,
 ) -> Any:
-    """Do what `resistance_kernel` and `overcome_kernel` do; p is as for both, joints last."""
-    l, printed, joints = p[1], p[24], joints_of(p, 25)
-    one, two, three = read_chain(chains, s, 0), read_chain(chains, s, 1), read_chain(chains, s, 2)
-    k_r1, k_s1 = _resistances_at(joints, reactions, turnover, s, 0)
-    k_r2, k_s2 = _resistances_at(joints, reactions, turnover, s, 1)
-    k_r3, k_s3 = _resistances_at(joints, reactions, turnover, s, 2)
-    write_six(force, s, drive_forces_of(
-        read_inverse(inverse, s), one.sin_u, two.sin_u, three.sin_u,
-        chain_resistance(chain(p, 0), l, one, k_r1, k_s1, printed),
-        chain_resistance(chain(p, 1), l, two, k_r2, k_s2, printed),
-        chain_resistance(chain(p, 2), l, three, k_r3, k_s3, printed)))
+    """Fill a table of forces: `resistance_kernel`, then `transfer_kernel`."""
+    _write_forces(force, s, friction_forces(
+        p.geometry, read_chains(chains, s), read_inverse(inverse, s),
+        _resistances_at(p.joints, reactions, turnover, s), p.printed))
     return True
 
 
+@each_chain
 def _resistances_at(
-    joints: Joints, reactions: Any, turnover: Any, s: Any, i: int,
-) -> tuple[Any, Any]:
+    i: int, joints: Joints, reactions: Any, turnover: Any, s: Any,
+) -> JointResistance:
     return joint_resistances(
         joints, reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i], reactions[s, 12 + i],
-        reactions[s, 15 + i], Turnover(turnover[s, i], turnover[s, 3 + i]))
+        reactions[s, 15 + i], Turnover(turnover[s, i], turnover[s, CHAINS + i]))
 
 
-def joints_of(p: Any, k: int) -> Joints:
-    """Return the joints' numbers in a row from element k on."""
-    return Joints(p[k], p[k + 1], p[k + 2], p[k + 3], p[k + 4], p[k + 5])
-
-
-def write_six(force: Any, s: Any, six: Six) -> None:
-    """Write the drive forces of sample s to a table."""
-    force[s, 0], force[s, 1], force[s, 2] = six.slide_1, six.slide_2, six.slide_3
-    force[s, 3], force[s, 4], force[s, 5] = six.lift_1, six.lift_2, six.lift_3
+def _write_forces(force: Any, s: Any, forces: DriveValues) -> None:
+    for i in range(CHAINS):
+        force[s, i], force[s, CHAINS + i] = forces.slides[i], forces.lifts[i]
 
 
 @dataclass(frozen=True)
@@ -213,16 +261,16 @@ class PassiveFriction(Effect):
 
     def resistances(self, state: MechanismState) -> Resistances:
         """Return k_ri and k_si at the frictionless reactions, Eq. (9)."""
-        k = np.empty(state.rigid_body.force.shape)
-        evaluate(resistance_kernel, self.numbers, state.rigid_body.reaction_table,
+        k, reactions = np.empty(state.rigid_body.force.shape), state.rigid_body.reaction_table
+        evaluate(resistance_kernel, KernelParameters(self.joints), reactions,
                  state.kinematics.turnover(state.reversal.rate), k)
         return Resistances(k[:, :3], k[:, 3:])
 
     @cached_property
-    def numbers(self) -> Array:
-        """What kernels take, see `Joints`."""
-        return np.array([value for joint in (self.revolute, self.spherical)
-                         for value in (joint.viscous, joint.coulomb, joint.diameter)])
+    def joints(self) -> Joints:
+        """The coefficients as kernels take them."""
+        return Joints(*(value for joint in (self.revolute, self.spherical)
+                        for value in (joint.viscous, joint.coulomb, joint.diameter)))
 
     @abstractmethod
     def force(self, state: MechanismState, memory: Any = None) -> Array:
@@ -239,10 +287,10 @@ class WholeMechanismFriction(PassiveFriction):
         """Return Delta Q^p, (N, 6) [N], by virtual power."""
         kinematics, reactions = state.kinematics, state.rigid_body.reaction_table
         force = np.empty((len(reactions), 6))
-        evaluate(passive_kernel, np.concatenate((
-            state.robot.geometry.numbers, [self.printed], self.numbers)),
-            kinematics.chain_table, kinematics.inverse_table, reactions,
-            kinematics.turnover(state.reversal.rate), force)
+        parameters = state.robot.geometry.kernel_parameters.extended(
+            PassiveParameters, self.printed, self.joints)
+        evaluate(passive_kernel, parameters, kinematics.chain_table, kinematics.inverse_table,
+                 reactions, kinematics.turnover(state.reversal.rate), force)
         return force
 
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """More moments of inertia of platform and payload than the model says.
 
 References
@@ -41,6 +55,6 @@ class PlatformInertia(BodyEffect):
 
     def changed(self, robot: Robot) -> Robot:
         """Return the robot with the other inertia."""
-        more = (self.values[p.name] for p in self.parameters)
-        inertia = tuple(I + I_more for I, I_more in zip(robot.masses.inertia, more, strict=True))
+        inertia = tuple(moment + self.values[p.name] for moment, p in zip(
+            robot.masses.inertia, self.parameters, strict=True))
         return with_masses(robot, inertia=inertia)

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Friction in the revolute joints C_i beyond the model's, alike in all three chains.
 
 References
@@ -15,8 +29,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import Card, Parameter
 from pprs_dynamics.effects.passive_friction import (
     Resistances,
-    overcome,
     resistance,
+    resistance_forces,
 )
 from pprs_dynamics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.mechanism.state import MechanismState
@@ -50,4 +64,4 @@ class RevoluteFriction(PassiveJointEffect):
         """Return the effect's drive forces [N], (N, 6)."""
         speed = np.abs(state.chains.u_dot)
         k = resistance(self.values['viscous'], self.values['torque'], speed, state.reversal.rate)
-        return overcome(state, Resistances(k, np.zeros_like(k)))
+        return resistance_forces(state, Resistances(k, np.zeros_like(k)))

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Effects on the platform, in the rods and in the passive joints: one set of parameters each."""
 
 from __future__ import annotations
@@ -42,7 +56,7 @@ class StructureEffect(CatalogueEffect):
 
 
 class BodyEffect(StructureEffect):
-    """An effect that changes what moves or is carried: masses, gravity, forces on the bodies.
+    """An effect on the rigid body: masses, gravity, forces on the bodies.
 
     It changes the loads of the guides and joints, too, and with them the friction that follows
     loads: the model applies it before it evaluates friction.
@@ -53,7 +67,7 @@ class BodyEffect(StructureEffect):
         return robot
 
     def load(self, state: MechanismState) -> StructureLoad | None:
-        """Return what the drives must overcome beside bodies and gravity; by default nothing."""
+        """Return a load beside bodies and gravity; None, the default, for none."""
         return None
 
     def apply(self, state: MechanismState) -> MechanismState:
@@ -61,7 +75,7 @@ class BodyEffect(StructureEffect):
         return state.loaded(self.changed(state.robot), self.load(state))
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return what the effect adds to the rigid body's drive forces [N], (N, 6)."""
+        """Return the change of the rigid body's drive forces [N], (N, 6)."""
         added: Array = self.apply(state).rigid_body.force - state.rigid_body.force
         return added
 

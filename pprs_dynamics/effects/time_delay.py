@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Effort that is measured late, or early: F(t - d).
 
 References
@@ -45,7 +59,7 @@ class TimeDelay(MeasurementEffect):
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
         """Return delays from -30 to 30 ms in steps of 2 ms, shorter ones in fractions of it."""
         late = [*SHORT, *np.arange(STEP, LONGEST + 1e-9, STEP)]
-        return [{'delay': float(d)} for d in (*(-one for one in reversed(late)), *late)]
+        return [{'delay': float(d)} for d in (*(-delay for delay in reversed(late)), *late)]
 
     @classmethod
     def drive_memory(cls) -> Any:

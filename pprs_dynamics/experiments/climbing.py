@@ -1,4 +1,4 @@
-"""A few steps upknown within limits, by scipy's sequential quadratic programming.
+"""A few steps uphill within limits, by scipy's sequential quadratic programming.
 
 The criterion is dear and, since drives turn over in a millimetre per second, rough: slopes are
 differences over wide steps, and each round stays near where they were taken.

@@ -17,7 +17,6 @@ from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.treatment import BLOCK_DURATION
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.model_file import build_robot
 from pprs_dynamics.regression.base_columns import (
     BaseColumn,
     KnownNumber,
@@ -60,8 +59,9 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
         Standard deviation of means of the effort over 0.01 s [N], where nothing is recorded.
     """
     if not known_numbers(model):
-        model = build_robot({**model.values, **{f'tolerances.{key}': TOLERANCE for key in NUMBERS
-                                                if np.any(model.values[key])}})
+        tolerances = {f'tolerances.{key}': TOLERANCE for key in NUMBERS
+                      if np.any(model.values[key])}
+        model = DriveModel.from_parameters({**model.values, **tolerances})
     present = {effect.name for effect in model.effects}
     terms = []
     for name, effect in catalogue().items():

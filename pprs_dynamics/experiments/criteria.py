@@ -160,7 +160,7 @@ class Precision:
 
     def own(self, gram: Array) -> Array:
         """Return the information that others leave, per scale, (k, k)."""
-        I, R = list(self.index), list(self.others)
+        I, R = list(self.index), list(self.others)  # noqa: E741
         S = gram[np.ix_(I, I)]
         if R:
             cross = gram[np.ix_(R, I)]

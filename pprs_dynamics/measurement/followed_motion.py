@@ -11,7 +11,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ConvergenceError
 from pprs_dynamics.measurement.drive_motion import DriveMotion
 from pprs_dynamics.measurement.samples import Progress
-from pprs_dynamics.mechanism.forward_motion import find_jumps, solve_forward_motion
+from pprs_dynamics.mechanism.forward_motion import find_pose_jumps, solve_forward_motion
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import AXIS, DRIVES, Geometry
 from pprs_dynamics.model.axis_model import AxisModel, AxisMotion
@@ -135,5 +135,6 @@ def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np
         for start in range(segment.start, segment.stop, CHUNK):
             first = max(start - 1, segment.start)  # the step from the last chunk counts too
             rows = slice(first, min(start + CHUNK, segment.stop))
-            jumps.append(first + np.flatnonzero(find_jumps(motion[rows].with_time(time[rows]))))
+            jump = find_pose_jumps(motion[rows].with_time(time[rows]))
+            jumps.append(first + np.flatnonzero(jump))
     return np.concatenate(jumps)

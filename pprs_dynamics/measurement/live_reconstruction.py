@@ -40,8 +40,7 @@ class LiveReconstruction:
     """A window that follows the samples; its answers come `polynomial.half` samples late.
 
     Answers equal those of `reconstruct` with the same window for samples at equal steps. The
-    platform's motion then follows by `solve_forward_motion`, seeded with the last pose; means of
-    blocks by `LiveTreatment`, for effort and model alike.
+    platform's motion then follows by `solve_forward_motion`, seeded with the last pose.
 
     Parameters
     ----------

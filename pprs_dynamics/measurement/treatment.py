@@ -55,30 +55,3 @@ class Treatment:
         end = self.starts[last] if last < len(self) else self.samples
         start = self.starts[first]
         return Treatment(self.starts[first:last] - start, int(end - start))
-
-
-class LiveTreatment:
-    """The same means, sample by sample.
-
-    Parameters
-    ----------
-    block : int
-        Samples per block.
-    """
-
-    def __init__(self, block: int) -> None:
-        self.block = block
-        self._values: list[Array] = []
-
-    def push(self, values: Array) -> Array | None:
-        """Take the values of one sample, and return their mean where a block ends."""
-        self._values.append(np.array(values, dtype=float))
-        if len(self._values) < self.block:
-            return None
-        mean: Array = np.sum(self._values, axis=0) / self.block
-        self._values.clear()
-        return mean
-
-    def reset(self) -> None:
-        """Forget an unfinished block: a stretch has ended."""
-        self._values.clear()

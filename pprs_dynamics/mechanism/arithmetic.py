@@ -1,4 +1,18 @@
-"""The few functions that equations need, alike for floats and for arrays of samples.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Elementary functions for the equations, alike for floats and for arrays of samples.
 
 An equation is stated once, componentwise, and runs in three ways: on floats, on arrays with one
 element per sample, and compiled. See `evaluation`.
@@ -37,7 +51,7 @@ def everywhere(condition: Any) -> bool:
     return bool(np.all(condition))
 
 
-# What compiled code calls in their place.
+# Compiled code calls these in their place.
 def compiled_sqrt(x: Any) -> Any:
     """Return the square root, NaN below 0."""
     return math.sqrt(x)

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """[B]^-1 of Eq. (4) in closed form, from what the six rows of [B] have in common.
 
 Row i of the slides says n_i . v + m_i . omega = q_dot_i, with m_i = rho_i x n_i. The n_i are
@@ -16,8 +30,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pprs_dynamics.mechanism.inverse_kinematics import read_chain, rod_direction
-from pprs_dynamics.mechanism.numbers import Chain, chain
+from pprs_dynamics.mechanism.chains import CHAINS, each_chain
+from pprs_dynamics.mechanism.inverse_kinematics import read_chains, rod_direction
+from pprs_dynamics.mechanism.kernel_parameters import GeometryParameters
 from pprs_dynamics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -47,34 +62,31 @@ class Twist(NamedTuple):
     omega: Vector
 
 
-class Inverse(NamedTuple):
-    """[B]^-1 by its columns: twists by unit right sides of Eq. (4), slides then lifts."""
+class DriveValues(NamedTuple):
+    """One number, or one twist, for each drive: of the three slides and of the three lifts."""
 
-    slide_1: Twist
-    slide_2: Twist
-    slide_3: Twist
-    lift_1: Twist
-    lift_2: Twist
-    lift_3: Twist
+    slides: tuple[Any, Any, Any]
+    lifts: tuple[Any, Any, Any]
+
+
+class Inverse(NamedTuple):
+    """[B]^-1 by its columns, and a constant times det [B].
+
+    Column j is the twist for a unit right side j of Eq. (4).
+    """
+
+    columns: DriveValues
     determinant: Any
 
 
-class Six(NamedTuple):
-    """One number for each drive."""
-
-    slide_1: Any
-    slide_2: Any
-    slide_3: Any
-    lift_1: Any
-    lift_2: Any
-    lift_3: Any
-
-
-class Rows(NamedTuple):
+class ClosureRows(NamedTuple):
     """Rows of [B] that belong to one chain: unit reactions H_i and V_i on the platform."""
 
     slide: Wrench
     lift: Wrench
+
+
+ThreeRows = tuple[ClosureRows, ClosureRows, ClosureRows]
 
 
 def unit_wrench(chain: Any, direction: ChainVector, arm: ChainVector) -> Wrench:
@@ -82,119 +94,129 @@ def unit_wrench(chain: Any, direction: ChainVector, arm: ChainVector) -> Wrench:
     return Wrench(in_base(chain, direction), in_base(chain, cross(arm, direction)))
 
 
-def closure_rows(chain: Any, arm: ChainVector, c_u: Any, s_u: Any) -> Rows:
+def closure_rows(chain: Any, arm: ChainVector, c_u: Any, s_u: Any) -> ClosureRows:
     """Return the rows of [B] of a chain."""
     zero = 0.0 * c_u
     axis = ChainVector(zero, zero + 1.0, zero)
-    return Rows(unit_wrench(chain, axis, arm),                                 # Eq. (4)
-                unit_wrench(chain, rod_direction(c_u, s_u), arm))              # Eq. (4)
+    return ClosureRows(unit_wrench(chain, axis, arm),                          # Eq. (4)
+                       unit_wrench(chain, rod_direction(c_u, s_u), arm))       # Eq. (4)
+
+
+@each_chain
+def rows_of_chains(i: int, geometry: GeometryParameters, rods: Any) -> ClosureRows:
+    """Return the rows of [B] of chain i from its `arm`, `cos_u` and `sin_u`."""
+    return closure_rows(geometry.chains[i], rods[i].arm, rods[i].cos_u, rods[i].sin_u)
 
 
 class Elimination(NamedTuple):
-    """What is left of Eq. (4) without v_x and v_y, solved.
+    """Eq. (4) after elimination of v_x and v_y, solved.
 
-    v_x = h_x - `along_x` . omega, and v_y alike; `z0`, `w0` are v_z and omega for a unit b, `z1`
-    to `w3` those for unit b_i.
+    v_x = h_x - `along_x` . omega, and v_y alike; `z0`, `w0` are v_z and omega for a unit b, the
+    `z` and `w` those for unit b_i.
     """
 
     along_x: Vector
     along_y: Vector
     z0: Any
     w0: Vector
-    z1: Any
-    w1: Vector
-    z2: Any
-    w2: Vector
-    z3: Any
-    w3: Vector
+    z: tuple[Any, Any, Any]
+    w: tuple[Vector, Vector, Vector]
     determinant: Any
 
 
-def eliminate(
-    p: Any, rows_1: Rows, rows_2: Rows, rows_3: Rows, one: Any, two: Any, three: Any,
-) -> Elimination:
+def eliminate(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> Elimination:
     """Solve Eq. (4) for unit right sides; infinite or NaN where the determinant is 0.
 
     Parameters
     ----------
-    p : row of numbers of the geometry
-    rows_1, rows_2, rows_3 : Rows
-    one, two, three : ChainSample or alike
+    geometry : GeometryParameters
+    rows : three ClosureRows
+    rods : three ChainSample or alike
         Of which `cos_u` and `sin_u` are taken.
     """
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
-    m1, m2, m3 = rows_1.slide.moment, rows_2.slide.moment, rows_3.slide.moment
+    k1, k2, k3 = geometry.chains
+    m1, m2, m3 = rows[0].slide.moment, rows[1].slide.moment, rows[2].slide.moment
     along_x = combine(k1.left_x, m1, k2.left_x, m2, k3.left_x, m3)
     along_y = combine(k1.left_y, m1, k2.left_y, m2, k3.left_y, m3)
     m = combine(k1.balance, m1, k2.balance, m2, k3.balance, m3)
-    g1 = _reduced(k1, one.cos_u, rows_1.lift.moment, along_x, along_y)
-    g2 = _reduced(k2, two.cos_u, rows_2.lift.moment, along_x, along_y)
-    g3 = _reduced(k3, three.cos_u, rows_3.lift.moment, along_x, along_y)
-    s1, s2, s3 = one.sin_u, two.sin_u, three.sin_u
+    g1, g2, g3 = _reduced_moments(geometry, rods, rows, along_x, along_y)
+    s1, s2, s3 = rods[0].sin_u, rods[1].sin_u, rods[2].sin_u
     g23, g31, g12 = product(g2, g3), product(g3, g1), product(g1, g2)
     G = combine(s1, g23, s2, g31, s3, g12)
     determinant = dot(m, G)
     share = 1.0 / determinant
     return Elimination(
         along_x, along_y, -share * dot(g1, g23), times(share, G),
-        share * dot(m, g23), product(m, _difference(share * s2, g3, share * s3, g2)),
-        share * dot(m, g31), product(m, _difference(share * s3, g1, share * s1, g3)),
-        share * dot(m, g12), product(m, _difference(share * s1, g2, share * s2, g1)),
+        (share * dot(m, g23), share * dot(m, g31), share * dot(m, g12)),
+        (product(m, _difference(share * s2, g3, share * s3, g2)),
+         product(m, _difference(share * s3, g1, share * s1, g3)),
+         product(m, _difference(share * s1, g2, share * s2, g1))),
         determinant)
 
 
-def solve_closure(p: Any, e: Elimination, one: Any, two: Any, three: Any, right: Six) -> Twist:
+def solve_closure(
+    geometry: GeometryParameters, e: Elimination, rods: Any, right: DriveValues,
+) -> Twist:
     """Return the twist for right sides of Eq. (4)."""
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
-    a, b, c = right.slide_1, right.slide_2, right.slide_3
+    k1, k2, k3 = geometry.chains
+    a, b, c = right.slides
     h_x = k1.left_x * a + k2.left_x * b + k3.left_x * c
     h_y = k1.left_y * a + k2.left_y * b + k3.left_y * c
     f0 = k1.balance * a + k2.balance * b + k3.balance * c
-    return _twist(e, h_x, h_y, f0, right.lift_1 + one.cos_u * (k1.cos * h_x + k1.sin * h_y),
-                  right.lift_2 + two.cos_u * (k2.cos * h_x + k2.sin * h_y),
-                  right.lift_3 + three.cos_u * (k3.cos * h_x + k3.sin * h_y))
+    f1, f2, f3 = _horizontal_shares(geometry, rods, h_x, h_y)
+    return _twist(e, h_x, h_y, f0, right.lifts[0] + f1, right.lifts[1] + f2, right.lifts[2] + f3)
 
 
 def _twist(e: Elimination, h_x: Any, h_y: Any, f0: Any, f1: Any, f2: Any, f3: Any) -> Twist:
-    omega = plus(times(f0, e.w0), combine(f1, e.w1, f2, e.w2, f3, e.w3))
+    omega = plus(times(f0, e.w0), combine(f1, e.w[0], f2, e.w[1], f3, e.w[2]))
     return Twist(Vector(h_x - dot(e.along_x, omega), h_y - dot(e.along_y, omega),
-                        f0 * e.z0 + f1 * e.z1 + f2 * e.z2 + f3 * e.z3), omega)
+                        f0 * e.z0 + f1 * e.z[0] + f2 * e.z[1] + f3 * e.z[2]), omega)
 
 
-def invert(p: Any, e: Elimination, one: Any, two: Any, three: Any) -> Inverse:
+def invert(geometry: GeometryParameters, e: Elimination, rods: Any) -> Inverse:
     """Return [B]^-1 and the determinant."""
-    return Inverse(
-        _slide_column(p, e, one, two, three, chain(p, 0)),
-        _slide_column(p, e, one, two, three, chain(p, 1)),
-        _slide_column(p, e, one, two, three, chain(p, 2)),
-        _lift_column(e, e.z1, e.w1), _lift_column(e, e.z2, e.w2), _lift_column(e, e.z3, e.w3),
-        e.determinant)
+    return Inverse(DriveValues(_slide_columns(geometry, e, rods),
+                               _lift_columns(e)), e.determinant)
 
 
-def _slide_column(p: Any, e: Elimination, one: Any, two: Any, three: Any, k: Chain) -> Twist:
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
-    return _twist(e, k.left_x, k.left_y, k.balance,
-                  one.cos_u * (k1.cos * k.left_x + k1.sin * k.left_y),
-                  two.cos_u * (k2.cos * k.left_x + k2.sin * k.left_y),
-                  three.cos_u * (k3.cos * k.left_x + k3.sin * k.left_y))
+@each_chain
+def _slide_columns(i: int, geometry: GeometryParameters, e: Elimination, rods: Any) -> Twist:
+    k = geometry.chains[i]
+    f1, f2, f3 = _horizontal_shares(geometry, rods, k.left_x, k.left_y)
+    return _twist(e, k.left_x, k.left_y, k.balance, f1, f2, f3)
 
 
-def _lift_column(e: Elimination, v_z: Any, omega: Vector) -> Twist:
-    return Twist(Vector(-dot(e.along_x, omega), -dot(e.along_y, omega), v_z), omega)
+@each_chain
+def _lift_columns(i: int, e: Elimination) -> Twist:
+    return Twist(Vector(-dot(e.along_x, e.w[i]), -dot(e.along_y, e.w[i]), e.z[i]), e.w[i])
 
 
-def _reduced(k: Chain, c_u: Any, moment: Vector, along_x: Vector, along_y: Vector) -> Vector:
-    """Return g_i: the moment of V_i when v_x and v_y are put in."""
-    return combine(1.0, moment, c_u * k.cos, along_x, c_u * k.sin, along_y)
+@each_chain
+def _horizontal_shares(
+    i: int, geometry: GeometryParameters, rods: Any, h_x: Any, h_y: Any,
+) -> Any:
+    """Return the share of eliminated v_x and v_y in the right side of lift i."""
+    k = geometry.chains[i]
+    return rods[i].cos_u * (k.cos * h_x + k.sin * h_y)
+
+
+@each_chain
+def _reduced_moments(
+    i: int, geometry: GeometryParameters, rods: Any, rows: ThreeRows, along_x: Vector,
+    along_y: Vector,
+) -> Vector:
+    """Return g_i: the moment of V_i after elimination of v_x and v_y."""
+    k, c_u = geometry.chains[i], rods[i].cos_u
+    return combine(1.0, rows[i].lift.moment, c_u * k.cos, along_x, c_u * k.sin, along_y)
 
 
 def _difference(f: Any, a: Vector, g: Any, b: Vector) -> Vector:
     return Vector(f * a.x - g * b.x, f * a.y - g * b.y, f * a.z - g * b.z)
 
 
-def rod_row(chain: Any, l: Any, arm: ChainVector, s_u: Any) -> Wrench:
+def rod_row(chain: Any, length: Any, arm: ChainVector, s_u: Any) -> Wrench:
     """Return u_dot_i per twist: the rod follows its tip, u_dot_i = e_i . v_Ai / (l sin u_i)."""
-    share = 1.0 / (l * s_u)
+    share = 1.0 / (length * s_u)
     zero = 0.0 * s_u
     return unit_wrench(chain, ChainVector(share, zero, zero), arm)             # Eq. (10)
 
@@ -204,14 +226,16 @@ def power(wrench: Wrench, twist: Twist) -> Any:
     return dot(wrench.force, twist.v) + dot(wrench.moment, twist.omega)
 
 
-def answer(inverse: Inverse, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> Twist:
-    """Return the twist that right sides of Eq. (4) give, slides then lifts."""
-    one, two, three = inverse.slide_1, inverse.slide_2, inverse.slide_3
-    four, five, six = inverse.lift_1, inverse.lift_2, inverse.lift_3
-    return Twist(plus(combine(a, one.v, b, two.v, c, three.v),
-                      combine(d, four.v, e, five.v, f, six.v)),
-                 plus(combine(a, one.omega, b, two.omega, c, three.omega),
-                      combine(d, four.omega, e, five.omega, f, six.omega)))
+def platform_twist(inverse: Inverse, right: DriveValues) -> Twist:
+    """Return the twist for right sides of Eq. (4), [B]^-1 times them."""
+    a, b, c = right.slides
+    d, e, f = right.lifts
+    slide_1, slide_2, slide_3 = inverse.columns.slides
+    lift_1, lift_2, lift_3 = inverse.columns.lifts
+    return Twist(plus(combine(a, slide_1.v, b, slide_2.v, c, slide_3.v),
+                      combine(d, lift_1.v, e, lift_2.v, f, lift_3.v)),
+                 plus(combine(a, slide_1.omega, b, slide_2.omega, c, slide_3.omega),
+                      combine(d, lift_1.omega, e, lift_2.omega, f, lift_3.omega)))
 
 
 def square(twist: Twist, r: Any) -> Any:
@@ -219,18 +243,14 @@ def square(twist: Twist, r: Any) -> Any:
     return dot(twist.v, twist.v) + r * r * dot(twist.omega, twist.omega)
 
 
-def condition_bound(
-    inverse: Inverse, rows_1: Rows, rows_2: Rows, rows_3: Rows, s1: Any, s2: Any, s3: Any, r: Any,
-) -> Any:
+def condition_bound(inverse: Inverse, rows: ThreeRows, rods: Any, r: Any) -> Any:
     """Return the square of the Frobenius condition number of [J], rotations times r."""
-    a1, a2, a3 = s1 * s1, s2 * s2, s3 * s3
-    J = (square(inverse.slide_1, r) + square(inverse.slide_2, r) + square(inverse.slide_3, r)
-         + a1 * square(inverse.lift_1, r) + a2 * square(inverse.lift_2, r)
-         + a3 * square(inverse.lift_3, r))
     n = 1.0 / r
-    J_inverse = (_size(rows_1.slide, n) + _size(rows_2.slide, n) + _size(rows_3.slide, n)
-                 + _size(rows_1.lift, n) / a1 + _size(rows_2.lift, n) / a2
-                 + _size(rows_3.lift, n) / a3)
+    J, J_inverse = 0.0 * n, 0.0 * n
+    for i in range(CHAINS):
+        sine = rods[i].sin_u * rods[i].sin_u
+        J = J + square(inverse.columns.slides[i], r) + sine * square(inverse.columns.lifts[i], r)
+        J_inverse = J_inverse + _size(rows[i].slide, n) + _size(rows[i].lift, n) / sine
     return J * J_inverse
 
 
@@ -239,43 +259,46 @@ def _size(wrench: Wrench, n: Any) -> Any:
     return 1.0 + n * n * dot(wrench.moment, wrench.moment)
 
 
-def write_twist(table: Any, s: Any, j: int, twist: Twist) -> None:
-    """Write column j of [B]^-1 at sample s."""
+def write_inverse(table: Any, s: Any, inverse: Inverse) -> None:
+    """Write [B]^-1 at sample s to a table, row after row."""
+    for i in range(CHAINS):
+        _write_column(table, s, i, inverse.columns.slides[i])
+        _write_column(table, s, CHAINS + i, inverse.columns.lifts[i])
+
+
+def _write_column(table: Any, s: Any, j: int, twist: Twist) -> None:
     v, omega = twist.v, twist.omega
     table[s, j], table[s, 6 + j], table[s, 12 + j] = v.x, v.y, v.z
     table[s, 18 + j], table[s, 24 + j], table[s, 30 + j] = omega.x, omega.y, omega.z
 
 
-def read_twist(table: Any, s: Any, j: int) -> Twist:
-    """Return column j of [B]^-1 at sample s."""
+def read_inverse(table: Any, s: Any) -> Inverse:
+    """Return [B]^-1 at sample s of a table, without its determinant."""
+    return Inverse(DriveValues(_read_columns(0, table, s),
+                               _read_columns(CHAINS, table, s)), 0.0)
+
+
+@each_chain
+def _read_columns(i: int, first: int, table: Any, s: Any) -> Twist:
+    j = first + i
     return Twist(Vector(table[s, j], table[s, 6 + j], table[s, 12 + j]),
                  Vector(table[s, 18 + j], table[s, 24 + j], table[s, 30 + j]))
 
 
-def read_inverse(table: Any, s: Any) -> Inverse:
-    """Return [B]^-1 at sample s of a table, without its determinant."""
-    return Inverse(read_twist(table, s, 0), read_twist(table, s, 1), read_twist(table, s, 2),
-                   read_twist(table, s, 3), read_twist(table, s, 4), read_twist(table, s, 5), 0.0)
+class InverseParameters(NamedTuple):
+    """Parameters of `inverse_kernel`: the bound is the square of the condition number allowed."""
+
+    geometry: GeometryParameters
+    bound: Any
+    platform_radius: Any
 
 
-def inverse_kernel(p: Any, s: Any, chains: Any, inverse: Any, bound: Any) -> Any:
-    """Fill tables of [B]^-1 and of `condition_bound` from one of chains.
-
-    p is the geometry, then the square of the largest allowed condition number.
-    """
-    one, two, three = read_chain(chains, s, 0), read_chain(chains, s, 1), read_chain(chains, s, 2)
-    rows_1 = closure_rows(chain(p, 0), one.arm, one.cos_u, one.sin_u)
-    rows_2 = closure_rows(chain(p, 1), two.arm, two.cos_u, two.sin_u)
-    rows_3 = closure_rows(chain(p, 2), three.arm, three.cos_u, three.sin_u)
-    eliminated = eliminate(p, rows_1, rows_2, rows_3, one, two, three)
-    B_inverse = invert(p, eliminated, one, two, three)
-    write_twist(inverse, s, 0, B_inverse.slide_1)
-    write_twist(inverse, s, 1, B_inverse.slide_2)
-    write_twist(inverse, s, 2, B_inverse.slide_3)
-    write_twist(inverse, s, 3, B_inverse.lift_1)
-    write_twist(inverse, s, 4, B_inverse.lift_2)
-    write_twist(inverse, s, 5, B_inverse.lift_3)
-    found = condition_bound(B_inverse, rows_1, rows_2, rows_3, one.sin_u, two.sin_u, three.sin_u,
-                            p[25])
+def inverse_kernel(p: InverseParameters, s: Any, chains: Any, inverse: Any, bound: Any) -> Any:
+    """Fill tables of [B]^-1 and of `condition_bound` from one of chains."""
+    rods = read_chains(chains, s)
+    rows = rows_of_chains(p.geometry, rods)
+    B_inverse = invert(p.geometry, eliminate(p.geometry, rows, rods), rods)
+    write_inverse(inverse, s, B_inverse)
+    found = condition_bound(B_inverse, rows, rods, p.platform_radius)
     bound[s, 0] = found
-    return (found <= p[24]) & (B_inverse.determinant != 0.0)
+    return (found <= p.bound) & (B_inverse.determinant != 0.0)

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Kernels compiled by Numba, kept on disk; imported only where something is evaluated."""
 
 from __future__ import annotations
@@ -6,8 +20,9 @@ import dis
 import hashlib
 from collections.abc import Callable
 from functools import cache
+from itertools import count
 from pathlib import Path
-from types import CodeType, FunctionType
+from types import CellType, CodeType, FunctionType
 from typing import Any
 
 from pprs_dynamics.mechanism import arithmetic
@@ -23,8 +38,10 @@ MECHANISM, EFFECTS, MODEL = (Path(__file__).parents[1] / folder
                              for folder in ('mechanism', 'effects', 'model'))
 
 
-def compiler() -> Callable[[Any], Callable[..., int]] | None:
-    """Return what compiles a kernel's loop, or None without Numba or a place to keep the result.
+def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
+    """Return the compiler of a kernel's loop, or None without Numba or a place for its cache.
+
+    It takes a kernel and parameters of the form that the kernel takes; the loop takes a row.
 
     Compiling takes seconds, which pays only where it happens once: in the package's own
     __pycache__ or the user's cache directory; NUMBA_CACHE_DIR names another one.
@@ -34,28 +51,30 @@ def compiler() -> Callable[[Any], Callable[..., int]] | None:
     except ImportError:
         return None
     try:
-        _compiled_loop(_nothing)
+        _compiled_loop(_nothing, ())
     except RuntimeError:  # no locator available: nowhere to write
         return None
     return _compiled_loop
 
 
-def _nothing(numbers: Any, s: Any) -> bool:
+def _nothing(p: Any, s: Any) -> bool:
     return True
 
 
-def _template(numbers: Any, *tables: Any) -> int:
+def _template(row: Any, *tables: Any) -> int:
+    p = read(row)  # type: ignore[name-defined]  # noqa: F821
     first = -1
     for s in range(len(tables[0])):
-        if not kernel(numbers, s, *tables) and first < 0:  # type: ignore[name-defined]  # noqa: F821
+        if not kernel(p, s, *tables) and first < 0:  # type: ignore[name-defined]  # noqa: F821
             first = s
     return first
 
 
-def _compiled_loop(kernel: Any) -> Callable[..., int]:
+def _compiled_loop(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
     import numba
 
-    loop = FunctionType(_template.__code__, {**_template.__globals__, 'kernel': _compiled(kernel)},
+    own = {'kernel': _compiled(kernel), 'read': _inlined(_reader(named))}
+    loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
                         f'{kernel.__name__}_loop')
     # Numba looks only at the file of the loop when it decides whether what it kept is up to
     # date; the name tells it of all other files.
@@ -66,22 +85,53 @@ def _compiled_loop(kernel: Any) -> Callable[..., int]:
     return compiled
 
 
+def _reader(named: tuple[Any, ...]) -> Any:
+    """Return a function that makes named tuples of this form from a row of their numbers."""
+    namespace: dict[str, Any] = {}
+    index = count()
+
+    def expression(value: Any) -> str:
+        if not isinstance(value, tuple):
+            return f'row[{next(index)}]'
+        elements = ''.join(f'{expression(element)}, ' for element in value)
+        if type(value) is tuple:
+            return f'({elements})'
+        namespace[type(value).__name__] = type(value)
+        return f'{type(value).__name__}({elements})'
+
+    # Written out: Numba makes named tuples only where all their elements are.
+    exec(f'def read(row):\n    return {expression(named)}', namespace)
+    return namespace['read']
+
+
 @cache
 def _compiled(function: FunctionType) -> Any:
     """Return a function of this package, and all that it calls, for Numba."""
+    namespace = dict(function.__globals__)
+    for name in _names(function.__code__) & namespace.keys():
+        namespace[name] = _callee(namespace[name])
+    cells = tuple(CellType(_callee(cell.cell_contents)) for cell in function.__closure__ or ())
+    clone = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__,
+                         cells)
+    clone.__module__ = function.__module__
+    return _inlined(clone)
+
+
+def _inlined(function: FunctionType) -> Any:
+    """Return a function that Numba inlines where it is called."""
     import numba
 
-    namespace = dict(function.__globals__)
-    for name in _names(function.__code__):
-        used = namespace.get(name)
-        if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
-            namespace[name] = _compiled(REPLACED.get(used, used))
-    clone = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
-    clone.__module__ = function.__module__
-    # Inlined all of them, or their many results are copied through memory: four times slower.
-    # Nobody calls them from Python, and wrappers for that would take half of the compiling.
+    # Else their many results are copied through memory: four times slower. Nobody calls them from
+    # Python, and wrappers for that would take half of the compiling.
     return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
-                      no_cfunc_wrapper=True)(clone)
+                      no_cfunc_wrapper=True)(function)
+
+
+def _callee(used: Any) -> Any:
+    """Return a variable for compiled code: compiled, where it is a function of this package."""
+    if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
+        return _compiled(REPLACED.get(used, used))
+    return used
 
 
 def _names(code: CodeType) -> set[str]:

@@ -1,22 +1,36 @@
-"""One statement of the equations, three ways to run it over samples.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-A *kernel* is a function `kernel(numbers, s, *tables)` that reads sample s of tables, evaluates
+"""Evaluation of the equations over samples: compiled, on floats, or on arrays.
+
+A *kernel* is a function `kernel(p, s, *tables)` that reads sample s of tables, evaluates
 equations and writes sample s of other tables; it returns whether the sample is sound. Tables are
-(N, k) float64, `numbers` is one row. With Numba a kernel is compiled, and called for every s in
-turn. Without, s is one sample of memoryviews, whose elements are Python's floats and faster than
-NumPy's; or, of many samples, a slice, so that the same lines work on arrays.
+(N, k) float64, `p` is a named tuple of parameters. With Numba a kernel is compiled, and called
+for every s in turn. Without, s is one sample of memoryviews, whose elements are Python's floats
+and faster than NumPy's; or, of many samples, a slice, so that the same lines work on arrays.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.mechanism.kernel_parameters import KernelParameters
 
 Kernel = Callable[..., Any]
 
@@ -25,48 +39,49 @@ BLOCK = 2048  # samples: about 100 intermediate arrays then stay in a core's cac
 FEW = 8  # samples, up to which floats are faster than arrays
 
 _loops: dict[Kernel, Callable[..., int]] = {}
-_compile: Callable[[Kernel], Callable[..., int]] | None = None
+_compile: Callable[[Kernel, tuple[Any, ...]], Callable[..., int]] | None = None
 _decided = False
 
 
-def evaluate(kernel: Kernel, numbers: Array, *tables: Array) -> int:
+def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
     """Run a kernel over all samples; return the first that is not sound, or -1.
 
     Parameters
     ----------
     kernel : function
-    numbers : (K,) array
+    parameters : KernelParameters
+        Of the same form in every call with this kernel.
     tables : arrays
         C-contiguous; the first is (N, k), N samples.
     """
-    try:
-        loop = _loops[kernel]
-    except KeyError:
-        loop = _loops[kernel] = _loop(kernel)
-    return loop(numbers, *tables)
+    loop = _loops.get(kernel)
+    if loop is None:
+        if not is_compiled():
+            return evaluate_plainly(kernel, parameters, *tables)
+        assert _compile is not None
+        loop = _loops[kernel] = _compile(kernel, parameters.named)
+    return loop(parameters.row, *tables)
 
 
-def evaluate_if_ready(kernel: Kernel, numbers: Array, *tables: Array) -> int:
-    """Do the same, but compiled only where something else has been compiled before."""
+def evaluate_if_ready(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
+    """Run a kernel as `evaluate` does, compiled only where something has been compiled before."""
     loop = _loops.get(kernel)
     if loop is not None:
-        return loop(numbers, *tables)
-    if _decided:
-        return evaluate(kernel, numbers, *tables)
-    return evaluate_plainly(kernel, numbers, *tables)
+        return loop(parameters.row, *tables)
+    return (evaluate if _decided else evaluate_plainly)(kernel, parameters, *tables)
 
 
-def evaluate_plainly(kernel: Kernel, numbers: Array, *tables: Array) -> int:
-    """Do the same without compiling, whether or not Numba is there."""
-    samples = len(tables[0])
+def evaluate_plainly(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
+    """Run a kernel as `evaluate` does, never compiled."""
+    samples, p = len(tables[0]), parameters.named
     if samples <= FEW:
         try:
-            return _on_floats(kernel, samples, numbers, tables)
+            return _on_floats(kernel, samples, p, tables)
         except (ZeroDivisionError, OverflowError, ValueError):
             pass  # arrays answer with infinities instead
     with np.errstate(all='ignore'):
         for start in range(0, samples, BLOCK):
-            sound = kernel(numbers, slice(start, start + BLOCK), *tables)
+            sound = kernel(p, slice(start, start + BLOCK), *tables)
             if not np.all(sound):
                 return start + int(np.argmin(sound)) if np.ndim(sound) else start
     return -1
@@ -85,17 +100,11 @@ def is_compiled() -> bool:
     return _compile is not None
 
 
-def _on_floats(kernel: Kernel, samples: int, numbers: Array, tables: tuple[Array, ...]) -> int:
-    views, row = [table.data for table in tables], numbers.tolist()
+def _on_floats(
+    kernel: Kernel, samples: int, p: tuple[Any, ...], tables: tuple[Array, ...],
+) -> int:
+    views = [table.data for table in tables]
     for s in range(samples):
-        if not kernel(row, s, *views):
+        if not kernel(p, s, *views):
             return s
     return -1
-
-
-def _loop(kernel: Kernel) -> Callable[..., int]:
-    if is_compiled():
-        assert _compile is not None
-        return _compile(kernel)
-
-    return partial(evaluate_plainly, kernel)

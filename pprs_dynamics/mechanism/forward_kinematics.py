@@ -1,8 +1,22 @@
-"""From measured drive positions to the pose of the platform: Newton-Raphson on Eq. (3).
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Forward kinematics: the platform's pose from drive positions, by Newton-Raphson on Eq. (3).
 
 Six drive positions belong to several poses. The solver therefore follows the branch: it moves
 from a known pose to the wanted drive positions in steps, and accepts only poses whose det [B]
-has the sign that it has at the home pose, and whose rods lean the way that the elbow says. These
+has the sign that it has at the home pose, and whose rods lean as `geometry.elbow` demands. These
 two conditions alone do not single out one pose: others that meet them are turned by more than
 150 degrees against it, and are found only from a seed that lies there.
 """
@@ -18,13 +32,15 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError
 from pprs_dynamics.mechanism.arithmetic import everywhere, larger, sqrt
-from pprs_dynamics.mechanism.closure import Six, closure_rows, eliminate, solve_closure
+from pprs_dynamics.mechanism.chains import CHAINS, each_chain
+from pprs_dynamics.mechanism.closure import DriveValues, eliminate, rows_of_chains, solve_closure
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import chain_arm, solve_inverse_kinematics
-from pprs_dynamics.mechanism.motion import PlatformMotion, checked_matrix
-from pprs_dynamics.mechanism.numbers import Chain, Lengths, chain, lengths
+from pprs_dynamics.mechanism.kernel_parameters import GeometryParameters
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.motion_checks import checked_matrix
+from pprs_dynamics.mechanism.motion_sample import Rotation, rotation, vector
 from pprs_dynamics.mechanism.robot import Geometry
-from pprs_dynamics.mechanism.sample import Rotation, rotation, vector
 from pprs_dynamics.mechanism.vectors import ChainVector, Vector, add, dot, in_chain, plus, times
 
 RESIDUAL_TOLERANCE = 1e-13  # of the lengths involved; a few rounding errors of the closure
@@ -161,12 +177,12 @@ class _Found(NamedTuple):
 def _newton(geometry: Geometry, q: Array, pose: Array) -> _Found:
     """Improve poses in place."""
     found = np.empty((len(q), 4))
-    evaluate(newton_kernel, geometry.numbers, np.ascontiguousarray(q), pose, found)
+    evaluate(newton_kernel, geometry.kernel_parameters, np.ascontiguousarray(q), pose, found)
     return _Found(found[:, 0] > 0, found[:, 1], found[:, 2] > 0, found[:, 3].astype(int))
 
 
 class Closure(NamedTuple):
-    """What Eq. (3) leaves of a chain at a pose that does not yet close it.
+    """Residuals of Eq. (3) in a chain, at a pose that does not yet close it.
 
     `slide` and `lift` are residuals [m]; the rod is given as it then is.
     """
@@ -178,53 +194,46 @@ class Closure(NamedTuple):
     lift: Any
 
 
-def chain_closure(size: Lengths, k: Chain, P: Vector, R: Rotation, q: Any, h: Any) -> Closure:
-    """Return the residuals of Eq. (3) for a slide at q and a lift at h.
+@each_chain
+def chain_closures(
+    i: int, geometry: GeometryParameters, P: Vector, R: Rotation, q: Any, s: Any,
+) -> Closure:
+    """Return the residuals of Eq. (3) in chain i for the drive positions of sample s.
 
     The rod may point out of its chain's plane. That part of its row in [B] is a multiple of the
     slide's row, which is taken off here: the rows are then those of `closure_rows`.
     """
+    k, l = geometry.chains[i], geometry.l  # noqa: E741
     arm = chain_arm(k, R)
     A = add(in_chain(k, P), arm)
-    rod = ChainVector(A.e - size.R, A.n - q, A.k - h)
+    rod = ChainVector(A.e - geometry.R, A.n - q[s, i], A.k - q[s, CHAINS + i])
     # The squared rod equation is divided by 2 l, so that both halves are in metres.
-    length = (rod.e * rod.e + rod.n * rod.n + rod.k * rod.k - size.l * size.l) / (2.0 * size.l)
-    return Closure(arm, -rod.e / size.l, rod.k / size.l,
-                   rod.n, length - rod.n * rod.n / size.l)                     # Eq. (3)
+    length = (rod.e * rod.e + rod.n * rod.n + rod.k * rod.k - l * l) / (2.0 * l)
+    return Closure(arm, -rod.e / l, rod.k / l, rod.n, length - rod.n * rod.n / l)  # Eq. (3)
 
 
-def newton_kernel(p: Any, s: Any, q: Any, pose: Any, found: Any) -> Any:
-    """Improve a table of poses until they belong to drive positions; p is the geometry."""
-    size = lengths(p)
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
+def newton_kernel(p: GeometryParameters, s: Any, q: Any, pose: Any, found: Any) -> Any:
+    """Improve a table of poses until they belong to drive positions."""
     P = vector(pose, s, 0)
     x, y, z, w = pose[s, 3], pose[s, 4], pose[s, 5], pose[s, 6]
     # Heights far from 0 carry their own rounding.
-    tolerance = RESIDUAL_TOLERANCE * (size.l + _largest(
-        q[s, 0], q[s, 1], q[s, 2], q[s, 3], q[s, 4], q[s, 5]))
+    tolerance = RESIDUAL_TOLERANCE * (p.l + _largest(_farthest_positions(q, s)))
     steps, determinant, upright, arrived = 0.0 * x, 0.0 * x, 0.0 * x, x > 2.0
     for k in range(MAXIMUM_STEPS + 1):
-        R = rotation(x, y, z, w)
-        one = chain_closure(size, k1, P, R, q[s, 0], q[s, 3])
-        two = chain_closure(size, k2, P, R, q[s, 1], q[s, 4])
-        three = chain_closure(size, k3, P, R, q[s, 2], q[s, 5])
-        # The least of the rods' sines, where positive is as the elbow says.
-        upright = -larger(larger(-size.elbow * one.sin_u, -size.elbow * two.sin_u),
-                          -size.elbow * three.sin_u)
-        arrived = _largest(one.slide, two.slide, three.slide,
-                           one.lift, two.lift, three.lift) <= tolerance
+        rods = chain_closures(p, P, rotation(x, y, z, w), q, s)
+        # The smallest sine of the rods, positive where all lean as `geometry.elbow` demands.
+        upright = -_largest(_downward_sines(p, rods))
+        arrived = _largest(_residuals(rods)) <= tolerance
         # The last step moves nothing that the determinant could tell.
         if k > 0 and everywhere(arrived):
             break
-        eliminated = eliminate(
-            p, closure_rows(k1, one.arm, one.cos_u, one.sin_u),
-            closure_rows(k2, two.arm, two.cos_u, two.sin_u),
-            closure_rows(k3, three.arm, three.cos_u, three.sin_u), one, two, three)
+        eliminated = eliminate(p, rows_of_chains(p, rods), rods)
         determinant = eliminated.determinant
-        v, omega = solve_closure(p, eliminated, one, two, three, Six(
-            -one.slide, -two.slide, -three.slide, -one.lift, -two.lift, -three.lift))
+        v, omega = solve_closure(p, eliminated, rods, DriveValues(
+            (-rods[0].slide, -rods[1].slide, -rods[2].slide),
+            (-rods[0].lift, -rods[1].lift, -rods[2].lift)))
         # A Newton step longer than the mechanism leaves the branch: shorten it.
-        reach = larger(sqrt(dot(v, v)) / size.l, sqrt(dot(omega, omega)))
+        reach = larger(sqrt(dot(v, v)) / p.l, sqrt(dot(omega, omega)))
         share = (1.0 - 1.0 * arrived) * 0.5 / larger(reach, 0.5)
         steps = steps + (1.0 - 1.0 * arrived)
         P = plus(P, times(share, v))
@@ -234,6 +243,25 @@ def newton_kernel(p: Any, s: Any, q: Any, pose: Any, found: Any) -> Any:
     found[s, 0], found[s, 1] = 1.0 * arrived, determinant
     found[s, 2], found[s, 3] = upright, steps
     return True
+
+
+@each_chain
+def _farthest_positions(i: int, q: Any, s: Any) -> Any:
+    return larger(abs(q[s, i]), abs(q[s, CHAINS + i]))
+
+
+@each_chain
+def _residuals(i: int, rods: Any) -> Any:
+    return larger(abs(rods[i].slide), abs(rods[i].lift))
+
+
+@each_chain
+def _downward_sines(i: int, geometry: GeometryParameters, rods: Any) -> Any:
+    return -geometry.elbow * rods[i].sin_u
+
+
+def _largest(values: Any) -> Any:
+    return larger(larger(values[0], values[1]), values[2])
 
 
 def turned_quaternion(half: Vector, x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any]:
@@ -247,12 +275,6 @@ def turned_quaternion(half: Vector, x: Any, y: Any, z: Any, w: Any) -> tuple[Any
     W = w - half.x * x - half.y * y - half.z * z
     scale = 1.0 / sqrt(X * X + Y * Y + Z * Z + W * W)
     return scale * X, scale * Y, scale * Z, scale * W
-
-
-def _largest(a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> Any:
-    """Return the largest absolute value."""
-    return larger(larger(larger(abs(a), abs(b)), larger(abs(c), abs(d))),
-                  larger(abs(e), abs(f)))
 
 
 def _drive_positions(geometry: Geometry, pose: PlatformMotion) -> Array:

@@ -1,4 +1,18 @@
-"""From the motion of the six drives to the motion of the platform: pose, twist, acceleration.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Forward motion: the platform's pose, twist and acceleration from the motion of the drives.
 
 Positions by forward kinematics. Rates from Eq. (4), A q_dot = B X_dot, and from its derivative
 
@@ -20,13 +34,14 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.mechanism.closure import Twist, answer, read_inverse
+from pprs_dynamics.mechanism.chains import each_chain
+from pprs_dynamics.mechanism.closure import DriveValues, Twist, platform_twist, read_inverse
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.mechanism.inverse_kinematics import ChainSample, chain_table, read_chain
+from pprs_dynamics.mechanism.inverse_kinematics import ThreeChains, chain_table, read_chains
 from pprs_dynamics.mechanism.jacobians import inverse_table
+from pprs_dynamics.mechanism.kernel_parameters import GeometryParameters
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.numbers import Chain, chain
 from pprs_dynamics.mechanism.robot import Geometry
 from pprs_dynamics.mechanism.vectors import add, cross, in_chain
 
@@ -123,8 +138,9 @@ def platform_rates(
     still = PlatformMotion.at_rest(poses.position, poses.orientation)
     chains = chain_table(geometry, still, LEAST_SINE)
     rates = np.empty((len(poses), 12))
-    evaluate(rates_kernel, geometry.numbers, chains,
-             inverse_table(geometry, chains, np.inf), _table(velocity), _table(acceleration), rates)
+    evaluate(rates_kernel, geometry.kernel_parameters, chains,
+             inverse_table(geometry, chains, np.inf), _table(velocity), _table(acceleration),
+             rates)
     return PlatformMotion(poses.position, poses.orientation, rates[:, 0:3], rates[:, 3:6],
                           rates[:, 6:9], rates[:, 9:12], poses.time)
 
@@ -134,22 +150,16 @@ def _table(values: ArrayLike) -> Array:
 
 
 def rates_kernel(
-    p: Any, s: Any, chains: Any, inverse: Any, q_dot: Any, q_ddot: Any, rates: Any,
+    p: GeometryParameters, s: Any, chains: Any, inverse: Any, q_dot: Any, q_ddot: Any, rates: Any,
 ) -> Any:
-    """Fill a table of v, omega, a_o and epsilon from drives' rates; p is the geometry."""
-    l = p[1]
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
-    one, two, three = read_chain(chains, s, 0), read_chain(chains, s, 1), read_chain(chains, s, 2)
-    s1, s2, s3 = one.sin_u, two.sin_u, three.sin_u
+    """Fill a table of v, omega, a_o and epsilon from drives' rates."""
+    rods = read_chains(chains, s)
     B_inverse = read_inverse(inverse, s)
-    X_dot = answer(B_inverse, q_dot[s, 0], q_dot[s, 1], q_dot[s, 2],
-                   s1 * q_dot[s, 3], s2 * q_dot[s, 4], s3 * q_dot[s, 5])       # Eq. (4)
-    slide_1, lift_1 = centripetal(k1, l, one, X_dot)
-    slide_2, lift_2 = centripetal(k2, l, two, X_dot)
-    slide_3, lift_3 = centripetal(k3, l, three, X_dot)
-    X_ddot = answer(B_inverse, q_ddot[s, 0] - slide_1, q_ddot[s, 1] - slide_2,
-                    q_ddot[s, 2] - slide_3, s1 * q_ddot[s, 3] - lift_1,
-                    s2 * q_ddot[s, 4] - lift_2, s3 * q_ddot[s, 5] - lift_3)
+    X_dot = platform_twist(B_inverse, DriveValues(
+        _slide_rates(q_dot, s), _lift_rates(q_dot, s, rods)))  # Eq. (4)
+    inward = centripetal_terms(p, rods, X_dot)
+    X_ddot = platform_twist(B_inverse, DriveValues(
+        _slide_accelerations(q_ddot, s, inward), _lift_accelerations(q_ddot, s, rods, inward)))
     rates[s, 0], rates[s, 1], rates[s, 2] = X_dot.v
     rates[s, 3], rates[s, 4], rates[s, 5] = X_dot.omega
     rates[s, 6], rates[s, 7], rates[s, 8] = X_ddot.v
@@ -157,8 +167,32 @@ def rates_kernel(
     return True
 
 
-def centripetal(k: Chain, l: Any, c: ChainSample, X_dot: Twist) -> tuple[Any, Any]:
+@each_chain
+def _slide_rates(i: int, rates: Any, s: Any) -> Any:
+    return rates[s, i]
+
+
+@each_chain
+def _lift_rates(i: int, rates: Any, s: Any, rods: ThreeChains) -> Any:
+    return rods[i].sin_u * rates[s, 3 + i]
+
+
+@each_chain
+def _slide_accelerations(i: int, q_ddot: Any, s: Any, inward: Any) -> Any:
+    return q_ddot[s, i] - inward[i][0]
+
+
+@each_chain
+def _lift_accelerations(i: int, q_ddot: Any, s: Any, rods: ThreeChains, inward: Any) -> Any:
+    return rods[i].sin_u * q_ddot[s, 3 + i] - inward[i][1]
+
+
+@each_chain
+def centripetal_terms(
+    i: int, geometry: GeometryParameters, rods: ThreeChains, X_dot: Twist,
+) -> tuple[Any, Any]:
     """Return n_i . c_i, and d_i . c_i + l u_dot_i^2."""
+    k, l, c = geometry.chains[i], geometry.l, rods[i]  # noqa: E741
     omega = in_chain(k, X_dot.omega)
     spin = cross(omega, c.arm)
     inward = cross(omega, spin)
@@ -166,20 +200,20 @@ def centripetal(k: Chain, l: Any, c: ChainSample, X_dot: Twist) -> tuple[Any, An
     return inward.n, c.sin_u * inward.k - c.cos_u * inward.e + l * u_dot * u_dot
 
 
-def find_jumps(motion: PlatformMotion) -> np.ndarray:
-    """Return before which samples of a motion with times the pose jumps, (N,) bool.
+def find_pose_jumps(motion: PlatformMotion) -> np.ndarray:
+    """Return the samples of a motion with times before which the pose jumps, (N,) bool.
 
-    A jump is a move from one sample to the next that is not what their twists say: the solution
-    of forward kinematics has left its branch there, or the drives were moved unseen.
+    A jump is a move between samples that contradicts the twists there: the solution of forward
+    kinematics has left its branch, or the drives were moved while not recorded.
     """
     if motion.time is None:
         raise MotionError('time', 'it is absent', 'be known to find jumps', 'time')
     jumps = np.zeros(len(motion), dtype=bool)
     step = np.diff(motion.time)[:, None]
     v, omega = motion.linear_velocity, motion.angular_velocity
-    told, turning = (v[1:] + v[:-1]) / 2 * step, (omega[1:] + omega[:-1]) / 2 * step
-    error = np.linalg.norm(np.diff(motion.position, axis=0) - told, axis=1)
-    scale = np.linalg.norm(told, axis=1)
+    moved, turning = (v[1:] + v[:-1]) / 2 * step, (omega[1:] + omega[:-1]) / 2 * step
+    error = np.linalg.norm(np.diff(motion.position, axis=0) - moved, axis=1)
+    scale = np.linalg.norm(moved, axis=1)
     cosine = np.abs(np.sum(motion.orientation[1:] * motion.orientation[:-1], axis=1))
     turned = 2 * np.arccos(np.minimum(cosine, 1.0))
     excess = np.abs(turned - np.linalg.norm(turning, axis=1))
@@ -234,7 +268,7 @@ def _follow_marks(
 
 
 def _differ(position: Array, orientation: Array, other: Array, turned: Array) -> np.ndarray:
-    """Return which poses are not the same solution; NaN is none."""
+    """Return a mask of poses that are different solutions; NaN differs from all."""
     cosine = np.abs(np.sum(orientation * turned, axis=-1))  # of half the angle between them
     same: np.ndarray = ((np.abs(position - other).max(axis=-1) < SAME_POSE)
                         & (1 - cosine < SAME_POSE ** 2))

@@ -1,4 +1,18 @@
-"""From the platform's motion to the motion of drives and rods: Eq. (3) and its derivatives.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Inverse kinematics: drives and rods from the platform's motion, Eq. (3) and its derivatives.
 
 In chain i, with unit vectors e_i (radial), n_i (revolute axis) and k (up):
 C_i = R e_i + q_i n_i + q_(i+3) k and A_i = C_i + l (-cos u_i e_i + sin u_i k).
@@ -14,11 +28,12 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.mechanism.arithmetic import sqrt
+from pprs_dynamics.mechanism.chains import CHAINS, each_chain
 from pprs_dynamics.mechanism.evaluation import evaluate
+from pprs_dynamics.mechanism.kernel_parameters import Chain, GeometryParameters
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.numbers import Chain, Lengths, chain, lengths
+from pprs_dynamics.mechanism.motion_sample import MotionSample, Rotation, motion_sample, turned
 from pprs_dynamics.mechanism.robot import Geometry
-from pprs_dynamics.mechanism.sample import MotionSample, Rotation, motion_sample, turned
 from pprs_dynamics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
 
 CHAIN_COLUMNS = 48
@@ -79,12 +94,6 @@ class ChainKinematics:
             np.ascontiguousarray(table[:, column:column + 3]) for column in (39, 42, 45)))
         return cls(ChainVector(e, n, k), c_u, s_u, u_dot, u_ddot, q, q_dot, q_ddot, omega)
 
-    def table(self) -> Array:
-        """Return the table that `from_table` reads."""
-        return np.concatenate((
-            *self.arm, self.cos_u, self.sin_u, self.u_dot, self.u_ddot, self.position,
-            self.velocity, self.acceleration, *self.angular_velocity), axis=1)
-
 
 class ChainSample(NamedTuple):
     """One chain at one sample, see `ChainKinematics`."""
@@ -103,6 +112,9 @@ class ChainSample(NamedTuple):
     omega: ChainVector
 
 
+ThreeChains = tuple[ChainSample, ChainSample, ChainSample]
+
+
 def rod_direction(c_u: Any, s_u: Any) -> ChainVector:
     """Return d_i, the unit vector along the rod from C_i to A_i."""
     return ChainVector(-c_u, 0.0 * c_u, s_u)
@@ -118,16 +130,17 @@ def chain_arm(chain: Chain, R: Rotation) -> ChainVector:
     return in_chain(chain, turned(R, Vector(chain.x, chain.y, 0.0)))
 
 
-def chain_motion(size: Lengths, chain: Chain, motion: MotionSample) -> ChainSample:
-    """Return the motion of a chain that belongs to the platform's, Eq. (3) and (4)."""
-    R, l = size.R, size.l
+@each_chain
+def chain_motions(i: int, geometry: GeometryParameters, motion: MotionSample) -> ChainSample:
+    """Return the motion of chain i that belongs to the platform's, Eq. (3) and (4)."""
+    R, l, chain = geometry.R, geometry.l, geometry.chains[i]  # noqa: E741
     rho = chain_arm(chain, motion.rotation)
     omega = in_chain(chain, motion.omega)
     epsilon = in_chain(chain, motion.epsilon)
     A = add(in_chain(chain, motion.position), rho)
 
     cos_u = (R - A.e) / l
-    sin_u = size.elbow * sqrt(1.0 - cos_u * cos_u)
+    sin_u = geometry.elbow * sqrt(1.0 - cos_u * cos_u)
     q_slide = A.n                                                              # Eq. (3)
     q_lift = A.k - l * sin_u                                                   # Eq. (3)
 
@@ -145,7 +158,7 @@ def chain_motion(size: Lengths, chain: Chain, motion: MotionSample) -> ChainSamp
                        q_lift_dot, q_slide_ddot, q_lift_ddot, omega)
 
 
-def write_chain(table: Any, s: Any, i: int, c: ChainSample) -> None:
+def write_chain(i: int, table: Any, s: Any, c: ChainSample) -> None:
     """Write chain i of sample s to a table, see `ChainKinematics.from_table`."""
     table[s, i], table[s, 3 + i], table[s, 6 + i] = c.arm.e, c.arm.n, c.arm.k
     table[s, 9 + i], table[s, 12 + i] = c.cos_u, c.sin_u
@@ -156,8 +169,9 @@ def write_chain(table: Any, s: Any, i: int, c: ChainSample) -> None:
     table[s, 39 + i], table[s, 42 + i], table[s, 45 + i] = c.omega.e, c.omega.n, c.omega.k
 
 
-def read_chain(table: Any, s: Any, i: int) -> ChainSample:
-    """Return chain i of sample s of such a table."""
+@each_chain
+def read_chains(i: int, table: Any, s: Any) -> ChainSample:
+    """Return chain i of sample s of a table, see `ChainKinematics.from_table`."""
     return ChainSample(
         ChainVector(table[s, i], table[s, 3 + i], table[s, 6 + i]),
         table[s, 9 + i], table[s, 12 + i], table[s, 15 + i], table[s, 18 + i],
@@ -166,30 +180,27 @@ def read_chain(table: Any, s: Any, i: int) -> ChainSample:
         ChainVector(table[s, 39 + i], table[s, 42 + i], table[s, 45 + i]))
 
 
-def is_within_reach(c: ChainSample, minimum_sine: Any) -> Any:
-    """Return whether the rod reaches and is not too nearly horizontal; false for NaN."""
-    return abs(c.sin_u) >= minimum_sine
+def are_within_reach(rods: ThreeChains, minimum_sine: Any) -> Any:
+    """Return whether all rods reach and none is too nearly horizontal; false for NaN."""
+    within = abs(rods[0].sin_u) >= minimum_sine
+    for i in range(1, CHAINS):
+        within = within & (abs(rods[i].sin_u) >= minimum_sine)
+    return within
 
 
-def chain_kernel(p: Any, s: Any, motion: Any, chains: Any) -> Any:
-    """Fill a table of chains from a table of motions; p is the geometry and the least sine."""
-    m, size, least = motion_sample(motion, s), lengths(p), p[24]
-    one, two, three = (chain_motion(size, chain(p, 0), m), chain_motion(size, chain(p, 1), m),
-                       chain_motion(size, chain(p, 2), m))
-    write_chain(chains, s, 0, one)
-    write_chain(chains, s, 1, two)
-    write_chain(chains, s, 2, three)
-    return (is_within_reach(one, least) & is_within_reach(two, least)
-            & is_within_reach(three, least))
+class ReachParameters(NamedTuple):
+    """Parameters of `chain_kernel`: the smallest |sin u_i| allowed."""
+
+    geometry: GeometryParameters
+    minimum_sine: Any
 
 
-def spherical_joint_arms(geometry: Geometry, rotation: Array) -> Array:
-    """Return rho_i = Rot r e'_i in `base`, (N, 3, 3): samples, chains, components."""
-    arms = geometry.platform_radius * np.stack(
-        (np.cos(geometry.platform_angles), np.sin(geometry.platform_angles)))
-    # Only the first two columns of Rot act: the spherical joints lie in the platform's plane.
-    arm: Array = np.swapaxes(rotation[..., :2] @ arms, 1, 2)
-    return arm
+def chain_kernel(p: ReachParameters, s: Any, motion: Any, chains: Any) -> Any:
+    """Fill a table of chains from a table of motions."""
+    rods = chain_motions(p.geometry, motion_sample(motion, s))
+    for i in range(CHAINS):
+        write_chain(i, chains, s, rods[i])
+    return are_within_reach(rods, p.minimum_sine)
 
 
 @dataclass(frozen=True)
@@ -210,8 +221,8 @@ def joint_positions(geometry: Geometry, motion: PlatformMotion) -> JointPosition
     slide, lift = chains.position[:, :3], chains.position[:, 3:]
     R, zero = np.full_like(slide, geometry.base_radius), np.zeros_like(slide)
     base = geometry.frames.base
-    tip = motion.position[:, None, :] + base(chains.arm)
-    return JointPositions(base(ChainVector(R, slide, zero)), base(ChainVector(R, slide, lift)), tip)
+    return JointPositions(base(ChainVector(R, slide, zero)), base(ChainVector(R, slide, lift)),
+                          motion.position[:, None, :] + base(chains.arm))
 
 
 def solve_inverse_kinematics(
@@ -237,10 +248,10 @@ def solve_inverse_kinematics(
 
 
 def chain_table(geometry: Geometry, motion: PlatformMotion, minimum_sine: float) -> Array:
-    """Return the same as a table for kernels."""
+    """Return the motion of the chains as a table for kernels, see `solve_inverse_kinematics`."""
     table = np.empty((len(motion), CHAIN_COLUMNS))
-    numbers = np.append(geometry.numbers, minimum_sine)
-    if evaluate(chain_kernel, numbers, motion.rows, table) >= 0:
+    parameters = geometry.kernel_parameters.extended(ReachParameters, minimum_sine)
+    if evaluate(chain_kernel, parameters, motion.rows, table) >= 0:
         _require_reach(table[:, 9:12], geometry)
         _require_upright_rods(table[:, 12:15], minimum_sine)
     return table

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Jacobians of the mechanism: [A], [B], [J], [J_u], [J_omega] of Eq. (4), (10) and (11).
 
 Rows of [B] are the wrenches that unit reactions H_i and V_i put on the platform, so that its
@@ -15,16 +29,15 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.mechanism.closure import (
     INVERSE_COLUMNS,
+    InverseParameters,
     Wrench,
     closure_rows,
     inverse_kernel,
     rod_row,
-    unit_wrench,
 )
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import ChainKinematics
-from pprs_dynamics.mechanism.robot import ChainFrames, Geometry
-from pprs_dynamics.mechanism.vectors import ChainVector
+from pprs_dynamics.mechanism.robot import Geometry
 
 
 @dataclass(frozen=True)
@@ -89,25 +102,19 @@ class Jacobians:
         return self.J[:, 3:]
 
 
-def wrench_rows(frames: ChainFrames, direction: ChainVector, arm: ChainVector) -> Array:
-    """Return [f, rho x f] per chain for unit forces at A_i, in `base`, (N, 3, 6)."""
-    return _matrix(unit_wrench(frames, direction, arm))
-
-
 def _matrix(wrench: Wrench) -> Array:
     """Return wrenches as rows, (N, 3, 6)."""
     return np.stack((*wrench.force, *wrench.moment), axis=-1)
 
 
-def compute_jacobians(
-    geometry: Geometry, chains: ChainKinematics, condition_limit: float = np.inf,
-) -> Jacobians:
-    """Return the Jacobians at the poses of `chains`.
+def inverse_table(geometry: Geometry, chains: Array, condition_limit: float) -> Array:
+    """Return [B]^-1, (N, 36), at the poses of a table of chains.
 
     Parameters
     ----------
     geometry : Geometry
-    chains : ChainKinematics
+    chains : (N, 48) array
+        See `chain_table`.
     condition_limit : float
         Largest allowed condition number, see `condition_number`.
 
@@ -117,16 +124,10 @@ def compute_jacobians(
         Where det [B] = 0 (the drives cannot hold the platform) or the conditioning is over its
         limit.
     """
-    table = inverse_table(geometry, chains.table(), condition_limit)
-    return Jacobians(geometry, chains, table.reshape(-1, 6, 6))
-
-
-def inverse_table(geometry: Geometry, chains: Array, condition_limit: float) -> Array:
-    """Return [B]^-1, (N, 36), at the poses of a table of chains; see `compute_jacobians`."""
     inverse, bound = np.empty((len(chains), INVERSE_COLUMNS)), np.empty((len(chains), 1))
-    numbers = np.concatenate((
-        geometry.numbers, [condition_limit ** 2, geometry.platform_radius]))
-    if evaluate(inverse_kernel, numbers, chains, inverse, bound) >= 0:
+    parameters = geometry.kernel_parameters.extended(
+        InverseParameters, condition_limit ** 2, geometry.platform_radius)
+    if evaluate(inverse_kernel, parameters, chains, inverse, bound) >= 0:
         _require_regular(inverse)
         # The Frobenius condition number is never below the 2-norm one and costs a twentieth:
         # only samples that it does not clear are looked at closely.

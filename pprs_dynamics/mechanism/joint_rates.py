@@ -1,4 +1,18 @@
-"""Rates in the passive joints, and how their friction turns over."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rates in the passive joints, and the turnover of their friction."""
 
 from __future__ import annotations
 
@@ -8,8 +22,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.arithmetic import sqrt
+from pprs_dynamics.mechanism.chains import CHAINS
 from pprs_dynamics.mechanism.evaluation import evaluate
-from pprs_dynamics.mechanism.inverse_kinematics import read_chain
+from pprs_dynamics.mechanism.inverse_kinematics import read_chains
+from pprs_dynamics.mechanism.kernel_parameters import KernelParameters
 from pprs_dynamics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.mechanism.vectors import ChainVector
 
@@ -32,7 +48,7 @@ def length(v: ChainVector) -> Any:
 
 
 def turnover(u_dot: Any, omega: ChainVector, width: Any) -> Turnover:
-    """Return how friction turns over in the joints of a chain, within `width` [rad/s]."""
+    """Return the turnover of friction in the joints of a chain, within `width` [rad/s]."""
     return Turnover(sign_over_speed(abs(u_dot), width),
                     sign_over_speed(length(relative_rate(u_dot, omega)), width))
 
@@ -40,13 +56,19 @@ def turnover(u_dot: Any, omega: ChainVector, width: Any) -> Turnover:
 def turnover_table(chains: Array, width: float) -> Array:
     """Return `turnover` for a table of chains: C_i, then A_i, (N, 6)."""
     table = np.empty((len(chains), 6))
-    evaluate(turnover_kernel, np.array([width]), chains, table)
+    evaluate(turnover_kernel, KernelParameters(TurnoverParameters(width)), chains, table)
     return table
 
 
-def turnover_kernel(p: Any, s: Any, chains: Any, table: Any) -> Any:
-    """Fill a table of `turnover`; p is the width."""
-    for i in range(3):
-        c = read_chain(chains, s, i)
-        table[s, i], table[s, 3 + i] = turnover(c.u_dot, c.omega, p[0])
+class TurnoverParameters(NamedTuple):
+    """Parameters of `turnover_kernel`: the width in which friction turns over [rad/s]."""
+
+    width: Any
+
+
+def turnover_kernel(p: TurnoverParameters, s: Any, chains: Any, table: Any) -> Any:
+    """Fill a table of `turnover`."""
+    rods = read_chains(chains, s)
+    for i in range(CHAINS):
+        table[s, i], table[s, CHAINS + i] = turnover(rods[i].u_dot, rods[i].omega, p.width)
     return True

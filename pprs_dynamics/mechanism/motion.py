@@ -1,10 +1,23 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Motion of the platform: poses, twists and classical accelerations, checked once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -14,16 +27,22 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.mechanism.arithmetic import sqrt
 from pprs_dynamics.mechanism.evaluation import evaluate_if_ready
-from pprs_dynamics.mechanism.sample import rotation
+from pprs_dynamics.mechanism.kernel_parameters import KernelParameters
+from pprs_dynamics.mechanism.motion_checks import (
+    UNIT_LENGTH_TOLERANCE,
+    checked_matrix,
+    checked_times,
+    normalised,
+)
+from pprs_dynamics.mechanism.motion_sample import rotation
+from pprs_dynamics.mechanism.pose_spline import checked_poses, spline_rows
 
-# A quaternion printed with three decimals is still accepted; a Euler triple with a 0 is not.
-UNIT_LENGTH_TOLERANCE = 1e-3
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
               'linear_acceleration', 'angular_acceleration')
 WIDTHS = [3, 4, 3, 3, 3, 3]
 ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
 OTHERS = (0, 1, 2, *range(7, 19))  # columns that are not orientations
-_NONE = np.empty(0)
+_NO_PARAMETERS = KernelParameters(())
 FLOAT = np.dtype(np.float64)
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
@@ -67,10 +86,10 @@ class PlatformMotion:
         columns = (position, orientation, linear_velocity, angular_velocity, linear_acceleration,
                    angular_acceleration)
         rows = _joined(columns)
-        if rows is None or evaluate_if_ready(_motion_kernel, _NONE, rows) >= 0:
+        if rows is None or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, rows) >= 0:
             rows = _checked(columns)
         self.__dict__['rows'] = rows
-        self.__dict__['time'] = None if time is None else _times(time, len(rows))
+        self.__dict__['time'] = None if time is None else checked_times(time, len(rows))
 
     def _set(self, rows: Array, time: Array | None) -> None:
         self.__dict__['rows'] = rows
@@ -92,7 +111,8 @@ class PlatformMotion:
             raise MotionError('position', f'its shape is {(0, 3)}',
                               'be (N, 3) with N of at least 1', 'shape')
         selected = object.__new__(PlatformMotion)
-        selected._set(rows, None if self.time is None else _times(self.time[index], len(rows)))
+        selected._set(
+            rows, None if self.time is None else checked_times(self.time[index], len(rows)))
         return selected
 
     @cached_property
@@ -107,22 +127,22 @@ class PlatformMotion:
 
     @cached_property
     def linear_velocity(self) -> Array:
-        """v of o [m/s], (N, 3)."""
+        """Velocity v of o [m/s], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 7:10])
 
     @cached_property
     def angular_velocity(self) -> Array:
-        """omega [rad/s], (N, 3)."""
+        """Angular velocity omega [rad/s], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 10:13])
 
     @cached_property
     def linear_acceleration(self) -> Array:
-        """a_o [m/s^2], (N, 3)."""
+        """Acceleration a_o of o [m/s^2], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 13:16])
 
     @cached_property
     def angular_acceleration(self) -> Array:
-        """epsilon [rad/s^2], (N, 3)."""
+        """Angular acceleration epsilon [rad/s^2], (N, 3)."""
         return np.ascontiguousarray(self.rows[:, 16:19])
 
     def is_closed(self) -> bool:
@@ -133,9 +153,9 @@ class PlatformMotion:
         return bool(moved < 1e-3 and turned < 1e-3)
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
-        """Return the same motion with other times [s]."""
+        """Return the motion with other times [s]."""
         same = object.__new__(PlatformMotion)
-        same._set(self.rows, _times(time, len(self)))
+        same._set(self.rows, checked_times(time, len(self)))
         return same
 
     def resampled(self, rate: float) -> PlatformMotion:
@@ -186,12 +206,12 @@ class PlatformMotion:
     def from_rows(cls, rows: Array, time: ArrayLike | None = None) -> PlatformMotion:
         """Return the motion in a table such as `rows`, an (N, 19) array of floats."""
         checked = np.array(rows)
-        if not len(rows) or evaluate_if_ready(_motion_kernel, _NONE, checked) >= 0:
-            # What is wrong is said there.
+        if not len(rows) or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, checked) >= 0:
+            # The constructor raises the specific error.
             P, q, v, omega, a, epsilon = np.split(rows, ENDS, axis=1)
             return cls(P, q, v, omega, a, epsilon, time)
         motion = object.__new__(cls)
-        motion._set(checked, None if time is None else _times(time, len(checked)))
+        motion._set(checked, None if time is None else checked_times(time, len(checked)))
         return motion
 
     @classmethod
@@ -231,18 +251,11 @@ class PlatformMotion:
             Times at which to evaluate [s], in any order; the poses' own by default. The result
             carries times only without it.
         """
-        from pprs_dynamics.mechanism.pose_spline import spline_rows
-
-        position = checked_matrix('position', position, 3)
-        orientation = _normalised(checked_matrix('orientation', orientation, 4, len(position)))
-        knots = _times(time, len(position))
-        if len(knots) < 4:
-            raise MotionError('poses', f'{len(knots)} were given',
-                              'be at least four for velocities and accelerations', 'shape')
+        knots, places, turns = checked_poses(time, position, orientation)
         moments = knots if at is None else np.asarray(at, dtype=float)
         if not np.all(np.isfinite(moments)):
             raise MotionError('at', 'a time is not finite', 'be finite', 'finite')
-        rows = spline_rows(knots, position, orientation, moments)
+        rows = spline_rows(knots, places, turns, moments)
         return cls.from_rows(rows, knots if at is None else None)
 
 
@@ -257,7 +270,7 @@ def _joined(columns: Sequence[Any]) -> Array | None:
     return rows if right else None
 
 
-def _motion_kernel(p: Any, s: Any, rows: Any) -> Any:
+def _motion_kernel(p: tuple[()], s: Any, rows: Any) -> Any:
     """Normalise quaternions in place; return whether a sample needs no closer look."""
     x, y, z, w = rows[s, 3], rows[s, 4], rows[s, 5], rows[s, 6]
     length = sqrt(x * x + y * y + z * z + w * w)
@@ -277,62 +290,5 @@ def _checked(columns: Sequence[ArrayLike]) -> Array:
     for name, value, width in zip(QUANTITIES, columns, WIDTHS, strict=True):
         arrays.append(checked_matrix(name, value, width, samples))
         samples = len(arrays[0])
-    arrays[1] = _normalised(arrays[1])
+    arrays[1] = normalised(arrays[1])
     return np.concatenate(arrays, axis=1)
-
-
-def checked_matrix(
-    name: str, value: ArrayLike, width: int, samples: int | None = None,
-) -> Array:
-    """Return a finite (N, width) array of floats, or raise MotionError naming the quantity."""
-    try:
-        array = np.array(value, dtype=float, ndmin=2)
-    except (TypeError, ValueError):
-        raise MotionError(name, f'{str(value)[:60]!r} was given',
-                          f'be an (N, {width}) array of numbers', 'shape') from None
-    if array.ndim != 2 or array.shape[1] != width or len(array) == 0:
-        raise MotionError(name, f'its shape is {np.shape(value)}',
-                          f'be (N, {width}) with N of at least 1', 'shape')
-    if samples is not None and len(array) != samples:
-        raise MotionError(name, f'it has {len(array)} samples', f'have {samples}, as position',
-                          'shape')
-    if not np.all(np.isfinite(array)):
-        row = int(np.argmax(~np.isfinite(array).all(axis=1)))
-        raise MotionError(name, f'sample {row} is {array[row].tolist()}', 'be finite',
-                          'finite')
-    return array
-
-
-def _normalised(quaternions: Array) -> Array:
-    # hypot-like scaling is not needed: components are finite and a length near 1 is required.
-    with np.errstate(over='ignore'):
-        length = np.sqrt(np.sum(quaternions * quaternions, axis=1))
-    off = np.abs(length - 1) > UNIT_LENGTH_TOLERANCE
-    if np.any(off):
-        row = int(np.argmax(off))
-        raise MotionError('orientation', f'the quaternion of sample {row} has length '
-                          f'{length[row]:.6g}', f'be 1 within {UNIT_LENGTH_TOLERANCE:g}',
-                          'unit_length')
-    unit: Array = quaternions / length[:, None]
-    return unit
-
-
-def _times(time: ArrayLike, samples: int) -> Array:
-    try:
-        times = np.array(time, dtype=float, ndmin=1)
-    except (TypeError, ValueError):
-        raise MotionError('time', f'{str(time)[:60]!r} was given', f'be ({samples},) numbers',
-                          'shape') from None
-    if times.shape != (samples,):
-        raise MotionError('time', f'its shape is {np.shape(time)}', f'be ({samples},), as position',
-                          'shape')
-    if samples == 1 and isfinite(times[0]):
-        return times  # of a stream's message, where the rest would take longer than the model
-    if not np.all(np.isfinite(times)):
-        raise MotionError('time', f'sample {int(np.argmax(~np.isfinite(times)))} is not finite',
-                          'be finite', 'finite')
-    if np.any(np.diff(times) <= 0):
-        row = int(np.argmax(np.diff(times) <= 0))
-        raise MotionError('time', f'sample {row + 1} at {times[row + 1]:.9g} s follows '
-                          f'{times[row]:.9g} s', 'strictly increase', 'time')
-    return times

@@ -1,4 +1,18 @@
-"""Motions of splines through poses, for poses that come without velocities and accelerations.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Splines through poses, for poses that come without velocities and accelerations.
 
 Orientations are unit quaternions, made continuous in sign, with a spline through each of their
 components. Between the poses its length n is not 1; the orientation is s / n, and
@@ -15,7 +29,7 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.motion_checks import checked_matrix, checked_times, normalised
 
 FEWEST_POSES = 4
 QUINTIC_FROM = 6  # poses; below, the splines are cubic
@@ -51,19 +65,34 @@ def spline_derivatives(
     MotionError
         For poses or times that are none, or fewer than four.
     """
-    zero = np.zeros((len(np.atleast_2d(position)), 3))
-    poses = PlatformMotion(position, orientation, zero, zero, zero, zero, time)
-    if poses.time is None or len(poses) < FEWEST_POSES:
-        raise MotionError('poses', f'{len(poses)} were given', f'be at least {FEWEST_POSES} for '
-                          'velocities and accelerations', 'shape')
+    knots, places, turns = checked_poses(time, position, orientation)
     try:
-        # Absurd poses overflow, and are told by what is not finite.
+        # Poses too far apart overflow; the result is then not finite.
         with np.errstate(all='ignore'):
-            rows = spline_rows(poses.time, poses.position, poses.orientation, poses.time)
+            rows = spline_rows(knots, places, turns, knots)
         return rows[:, 7:13], rows[:, 13:]
     except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-        unknown = np.full((len(poses), 6), np.nan)
+        unknown = np.full((len(knots), 6), np.nan)
         return unknown, unknown
+
+
+def checked_poses(
+    time: ArrayLike, position: ArrayLike, orientation: ArrayLike,
+) -> tuple[Array, Array, Array]:
+    """Return times, positions and unit quaternions of poses that a spline can go through.
+
+    Raises
+    ------
+    MotionError
+        For poses or times that are none, or fewer than four.
+    """
+    places = checked_matrix('position', position, 3)
+    turns = normalised(checked_matrix('orientation', orientation, 4, len(places)))
+    knots = checked_times(time, len(places))
+    if len(knots) < FEWEST_POSES:
+        raise MotionError('poses', f'{len(knots)} were given', f'be at least {FEWEST_POSES} for '
+                          'velocities and accelerations', 'shape')
+    return knots, places, turns
 
 
 def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) -> Array:
@@ -108,7 +137,7 @@ def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) ->
 
 
 def _continuous(quaternion: Array) -> Array:
-    """Return the same orientations with signs such that neighbours are near each other."""
+    """Return quaternions with signs chosen such that neighbours are near each other."""
     turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
     signs = np.concatenate(([1.0], np.cumprod(np.where(turned, -1.0, 1.0))))
     continuous: Array = quaternion * signs[:, None]

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Inverse dynamics without friction, in the paper's four steps: Eq. (5) to (8).
 
 Gravity enters as the acceleration that each body would need to feel weightless, f = a - g, so
@@ -15,39 +29,34 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.arithmetic import sqrt
+from pprs_dynamics.mechanism.chains import CHAINS, each_chain
 from pprs_dynamics.mechanism.closure import Inverse, Wrench, power, read_inverse, unit_wrench
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import (
-    ChainKinematics,
     ChainSample,
-    read_chain,
+    ThreeChains,
+    read_chains,
     rod_normal,
 )
-from pprs_dynamics.mechanism.jacobians import Jacobians
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.numbers import (
-    ROBOT_NUMBERS,
-    Carriages,
-    Chain,
-    Platform,
-    carriages,
-    chain,
-    gravity,
-    platform,
+from pprs_dynamics.mechanism.kernel_parameters import (
+    ChainMasses,
+    PlatformBody,
+    RobotParameters,
 )
-from pprs_dynamics.mechanism.robot import Robot
-from pprs_dynamics.mechanism.sample import (
+from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.mechanism.motion_sample import (
     MotionSample,
     motion_sample,
     turned,
     turned_back,
     vector,
 )
+from pprs_dynamics.mechanism.robot import Robot
 from pprs_dynamics.mechanism.vectors import ChainVector, Vector, in_chain, plus, product, times
 
 
 class StructureLoad(NamedTuple):
-    """What the drives must overcome beside bodies and gravity.
+    """Loads on the mechanism beside bodies and gravity.
 
     Parameters
     ----------
@@ -120,7 +129,7 @@ class ChainForces(NamedTuple):
     lift_load: Any
 
 
-def platform_wrench(body: Platform, g: Vector, m: MotionSample) -> Wrench:
+def platform_wrench(body: PlatformBody, g: Vector, m: MotionSample) -> Wrench:
     """Return the wrench about o that moves platform and payload, in `base` [N, N m].
 
     Left side of Eq. (6) minus weight, with the centre of mass anywhere: with d its vector from
@@ -137,7 +146,7 @@ def platform_wrench(body: Platform, g: Vector, m: MotionSample) -> Wrench:
     return Wrench(force, moment)
 
 
-def _momentum(body: Platform, omega: Vector) -> Vector:
+def _momentum(body: PlatformBody, omega: Vector) -> Vector:
     xx, yy, zz = body.moments
     xy, xz, yz = body.products
     return Vector(xx * omega.x + xy * omega.y + xz * omega.z,
@@ -149,36 +158,43 @@ def _minus(a: Vector, b: Vector) -> Vector:
     return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
-def felt(c: ChainSample, g: ChainVector) -> ChainVector:
+@each_chain
+def specific_forces(i: int, p: RobotParameters, rods: ThreeChains) -> ChainVector:
     """Return f = a - g in C_i, where the lift is."""
-    return ChainVector(-g.e, c.slide_acceleration - g.n, c.lift_acceleration - g.k)
+    g = in_chain(p.geometry.chains[i], p.gravity)
+    return ChainVector(-g.e, rods[i].slide_acceleration - g.n, rods[i].lift_acceleration - g.k)
 
 
-def rod_reaction(m_b: Any, l: Any, c: ChainSample, f: ChainVector, hinge: Any) -> Any:
+@each_chain
+def rod_reactions(
+    i: int, p: RobotParameters, rods: ThreeChains, specific: Any, hinges: Any,
+) -> Any:
     """Return W_i, from the moments about C_i of the rod and of the hinge."""
+    m_b, l, c, f = p.masses[i].rod, p.geometry.l, rods[i], specific[i]  # noqa: E741
     W = m_b * (c.cos_u * f.k + c.sin_u * f.e) / 2.0 + m_b * l * c.u_ddot / 3.0     # Eq. (5)
-    return W + hinge / l
+    return W + hinges[i] / l
 
 
-def pushed(k: Chain, c: ChainSample, W: Any) -> Wrench:
-    """Return what W_i does to the platform."""
-    unit = unit_wrench(k, rod_normal(c.cos_u, c.sin_u), c.arm)
-    return Wrench(times(W, unit.force), times(W, unit.moment))
-
-
-def remaining(wrench: Wrench, a: Wrench, b: Wrench, c: Wrench) -> Wrench:
-    """Return a wrench less three others."""
-    return Wrench(_minus(wrench.force, plus(a.force, plus(b.force, c.force))),
-                  _minus(wrench.moment, plus(a.moment, plus(b.moment, c.moment))))
+def less_rod_reactions(
+    wrench: Wrench, p: RobotParameters, rods: ThreeChains, W: Any,
+) -> Wrench:
+    """Return a wrench on the platform less those of the rods' reactions W_i."""
+    force, moment = wrench
+    for i in range(CHAINS):
+        unit = unit_wrench(p.geometry.chains[i], rod_normal(rods[i].cos_u, rods[i].sin_u),
+                           rods[i].arm)
+        force = _minus(force, times(W[i], unit.force))
+        moment = _minus(moment, times(W[i], unit.moment))
+    return Wrench(force, moment)
 
 
 def chain_forces(
-    mass: Carriages, l: Any, g: ChainVector, c: ChainSample, f: ChainVector, H: Any, V: Any,
-    W: Any, printed: Any,
+    mass: ChainMasses, rod_length: Any, g: ChainVector, c: ChainSample, f: ChainVector, H: Any,
+    V: Any, W: Any, printed: Any,
 ) -> ChainForces:
     """Return reactions, drive forces and guide loads of a chain."""
     m_slide, m_lift, m_b = mass
-    c_u, s_u = c.cos_u, c.sin_u
+    l, c_u, s_u = rod_length, c.cos_u, c.sin_u  # noqa: E741
     # Acceleration of the rod's middle relative to C_i.
     rise = l * (c.u_ddot * c_u - c.u_dot * c.u_dot * s_u) / 2.0
     lean = l * (c.u_ddot * s_u + c.u_dot * c.u_dot * c_u) / 2.0
@@ -200,74 +216,68 @@ def chain_forces(
     return ChainForces(H, V, W, H_star, V_star, W_star, Q_slide, Q_lift, slide_load, lift_load)
 
 
-class Bodies(NamedTuple):
-    """Forces in all chains at one sample."""
-
-    one: ChainForces
-    two: ChainForces
-    three: ChainForces
+ThreeForces = tuple[ChainForces, ChainForces, ChainForces]
 
 
 def body_forces(
-    p: Any, m: MotionSample, one: ChainSample, two: ChainSample, three: ChainSample,
-    inverse: Inverse, load: Wrench, hinges: Vector, printed: Any,
-) -> Bodies:
-    """Return frictionless forces: the paper's four steps; p is the robot's row of numbers."""
-    l, g = p[1], gravity(p)
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
-    mass_1, mass_2, mass_3 = carriages(p, 0), carriages(p, 1), carriages(p, 2)
-    g1, g2, g3 = in_chain(k1, g), in_chain(k2, g), in_chain(k3, g)
-    f1, f2, f3 = felt(one, g1), felt(two, g2), felt(three, g3)
+    p: RobotParameters, m: MotionSample, rods: ThreeChains, inverse: Inverse, load: Wrench,
+    hinges: Any, printed: Any,
+) -> ThreeForces:
+    """Return frictionless forces in the chains: the paper's four steps."""
+    specific = specific_forces(p, rods)
 
     # Step 1: the rods about C_i.
-    W1 = rod_reaction(mass_1.rod, l, one, f1, hinges.x)
-    W2 = rod_reaction(mass_2.rod, l, two, f2, hinges.y)
-    W3 = rod_reaction(mass_3.rod, l, three, f3, hinges.z)
+    W = rod_reactions(p, rods, specific, hinges)
 
     # Step 2: the platform. Columns of [B]^-1 tell which reaction answers to which wrench.
-    bodies = platform_wrench(platform(p), g, m)
+    bodies = platform_wrench(p.platform, p.gravity, m)
     wrench = Wrench(plus(bodies.force, load.force), plus(bodies.moment, load.moment))
-    left = remaining(wrench, pushed(k1, one, W1), pushed(k2, two, W2), pushed(k3, three, W3))
-    H1, V1 = power(left, inverse.slide_1), power(left, inverse.lift_1)         # Eq. (6)
-    H2, V2 = power(left, inverse.slide_2), power(left, inverse.lift_2)         # Eq. (6)
-    H3, V3 = power(left, inverse.slide_3), power(left, inverse.lift_3)         # Eq. (6)
-    return Bodies(chain_forces(mass_1, l, g1, one, f1, H1, V1, W1, printed),
-                  chain_forces(mass_2, l, g2, two, f2, H2, V2, W2, printed),
-                  chain_forces(mass_3, l, g3, three, f3, H3, V3, W3, printed))
+    left = less_rod_reactions(wrench, p, rods, W)
+    return _forces_of_chains(p, rods, specific, W, left, inverse, printed)
+
+
+@each_chain
+def _forces_of_chains(
+    i: int, p: RobotParameters, rods: ThreeChains, specific: Any, W: Any, left: Wrench,
+    inverse: Inverse, printed: Any,
+) -> ChainForces:
+    H, V = power(left, inverse.columns.slides[i]), power(left, inverse.columns.lifts[i])  # Eq. (6)
+    return chain_forces(p.masses[i], p.geometry.l, in_chain(p.geometry.chains[i], p.gravity),
+                        rods[i], specific[i], H, V, W[i], printed)
+
+
+class BodyParameters(NamedTuple):
+    """Parameters of `body_kernel`: `printed` is 1 for Eq. (7) to the letter, else 0."""
+
+    robot: RobotParameters
+    printed: Any
 
 
 def body_kernel(
-    p: Any, s: Any, motion: Any, chains: Any, inverse: Any, load: Any, force: Any,
+    p: BodyParameters, s: Any, motion: Any, chains: Any, inverse: Any, load: Any, force: Any,
     guide_load: Any, reactions: Any,
 ) -> Any:
-    """Fill tables of forces, guide loads and reactions; p is the robot, then `printed`.
+    """Fill tables of forces, guide loads and reactions.
 
     A load has nine columns, the platform's wrench and the moments in the hinges.
     """
-    bodies = body_forces(
-        p, motion_sample(motion, s), read_chain(chains, s, 0), read_chain(chains, s, 1),
-        read_chain(chains, s, 2), read_inverse(inverse, s),
-        Wrench(vector(load, s, 0), vector(load, s, 3)), vector(load, s, 6), p[ROBOT_NUMBERS])
-    write_forces(force, guide_load, reactions, s, 0, bodies.one)
-    write_forces(force, guide_load, reactions, s, 1, bodies.two)
-    write_forces(force, guide_load, reactions, s, 2, bodies.three)
+    forces = body_forces(
+        p.robot, motion_sample(motion, s), read_chains(chains, s),
+        read_inverse(inverse, s), Wrench(vector(load, s, 0), vector(load, s, 3)),
+        vector(load, s, 6), p.printed)
+    for i in range(CHAINS):
+        f = forces[i]
+        force[s, i], force[s, 3 + i] = f.slide, f.lift
+        guide_load[s, i], guide_load[s, 3 + i] = f.slide_load, f.lift_load
+        reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i] = f.H, f.V, f.W
+        reactions[s, 9 + i], reactions[s, 12 + i] = f.H_star, f.V_star
+        reactions[s, 15 + i] = f.W_star
     return True
 
 
-def write_forces(
-    force: Any, guide_load: Any, reactions: Any, s: Any, i: int, forces: ChainForces,
-) -> None:
-    """Write the forces in chain i at sample s."""
-    force[s, i], force[s, 3 + i] = forces.slide, forces.lift
-    guide_load[s, i], guide_load[s, 3 + i] = forces.slide_load, forces.lift_load
-    reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i] = forces.H, forces.V, forces.W
-    reactions[s, 9 + i], reactions[s, 12 + i] = forces.H_star, forces.V_star
-    reactions[s, 15 + i] = forces.W_star
-
-
-def solve_inverse_dynamics(
-    robot: Robot, motion: PlatformMotion, chains: ChainKinematics, jacobians: Jacobians,
-    *, printed: bool = False, load: StructureLoad | None = None,
+def solve_bodies(
+    robot: Robot, motion: PlatformMotion, chains: Array, inverse: Array, printed: bool,
+    load: StructureLoad | None,
 ) -> RigidBody:
     """Return frictionless drive forces, reactions and guide loads.
 
@@ -275,27 +285,19 @@ def solve_inverse_dynamics(
     ----------
     robot : Robot
     motion : PlatformMotion
-    chains : ChainKinematics
-    jacobians : Jacobians
+    chains, inverse : arrays
+        See `chain_table` and `inverse_table`.
     printed : bool
         Take Eq. (7) to the letter, which lacks the factor l in its rod term.
     load : StructureLoad, optional
         Loads beside bodies and gravity.
     """
-    return solve_bodies(robot, motion, chains.table(), jacobians.B_inverse.reshape(-1, 36),
-                        printed, load)
-
-
-def solve_bodies(
-    robot: Robot, motion: PlatformMotion, chains: Array, inverse: Array, printed: bool,
-    load: StructureLoad | None,
-) -> RigidBody:
-    """Return the same from tables of chains and of [B]^-1."""
     samples = len(motion)
     force, guide_load = np.empty((samples, 6)), np.empty((samples, 6))
     reactions = np.empty((samples, 18))
     loads = (np.zeros((samples, 9)) if load is None
              else np.concatenate((load.wrench, load.hinge), axis=1))
-    evaluate(body_kernel, np.append(robot.numbers, float(printed)), motion.rows, chains,
-             np.ascontiguousarray(inverse), loads, force, guide_load, reactions)
+    parameters = robot.kernel_parameters.extended(BodyParameters, printed)
+    evaluate(body_kernel, parameters, motion.rows, chains, inverse, loads, force, guide_load,
+             reactions)
     return RigidBody(force, guide_load, reactions)

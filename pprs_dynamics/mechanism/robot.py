@@ -1,8 +1,22 @@
-"""What the robot is: geometry, masses and gravity."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The robot: geometry, masses and gravity."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,15 +24,15 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.mechanism.numbers import geometry_numbers, robot_numbers
-from pprs_dynamics.mechanism.vectors import (  # noqa: F401 - vectors for all
-    ChainVector,
-    Vector,
-    add,
-    cross,
-    in_base,
-    in_chain,
+from pprs_dynamics.mechanism.kernel_parameters import (
+    Chain,
+    ChainMasses,
+    GeometryParameters,
+    KernelParameters,
+    PlatformBody,
+    RobotParameters,
 )
+from pprs_dynamics.mechanism.vectors import ChainVector, Vector, in_base
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 AXIS = 'axis'  # the drive of a single axis
@@ -26,38 +40,17 @@ ELBOWS = ('up', 'down')
 
 
 class ChainFrames:
-    """The three chain frames (e_i, n_i, k), and the way between them and `base`.
+    """The three chain frames (e_i, n_i, k) in `base`.
 
     Parameters
     ----------
     angles : sequence of 3 floats
         Chain angles delta_i [rad].
-
-    Attributes
-    ----------
-    numbers : (24,) array
-        See `Geometry.numbers`.
     """
-
-    numbers: Array
 
     def __init__(self, angles: tuple[float, float, float]) -> None:
         self.cos = np.cos(angles)
         self.sin = np.sin(angles)
-
-    def components(self, vector: Array) -> ChainVector:
-        """Return the chain components of a vector given in `base`.
-
-        Parameters
-        ----------
-        vector : (N, 3) or (N, 3, 3) array
-            One vector for all chains, or one per chain (axis 1).
-        """
-        if vector.ndim == 2:
-            vector = vector[:, None, :]
-        x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
-        e, n, k = in_chain(self, Vector(x, y, z))
-        return ChainVector(e, n, np.broadcast_to(k, e.shape))
 
     def base(self, vector: ChainVector) -> Array:
         """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
@@ -86,7 +79,6 @@ class Geometry:
     chain_angles: tuple[float, float, float]
     platform_angles: tuple[float, float, float]
     elbow: str = 'up'
-    frames: ChainFrames = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ('base_radius', 'platform_radius', 'rod_length'):
@@ -100,22 +92,35 @@ class Geometry:
             _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
                      'hold three different directions')
         _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
-        object.__setattr__(self, 'frames', ChainFrames(self.chain_angles))
-        self.frames.numbers = geometry_numbers(self)
         turned = np.subtract(self.platform_angles, self.chain_angles)
         span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
         _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
-                 f'be greater than {span:.6g} m, for the platform to stand unturned above the base')
+                 f'be greater than {span:.6g} m, for the platform to stand unturned above the '
+                 'base')
 
     @property
     def elbow_sign(self) -> float:
         """Sign of sin u_i."""
         return 1.0 if self.elbow == 'up' else -1.0
 
-    @property
-    def numbers(self) -> Array:
-        """What kernels take, see `geometry_numbers`."""
-        return self.frames.numbers
+    @cached_property
+    def frames(self) -> ChainFrames:
+        """The frames of the chains."""
+        return ChainFrames(self.chain_angles)
+
+    @cached_property
+    def kernel_parameters(self) -> KernelParameters[GeometryParameters]:
+        """Lengths and the constants of the chains."""
+        frames, delta = self.frames, np.asarray(self.chain_angles)
+        joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
+        left = np.linalg.pinv(np.stack((-frames.sin, frames.cos), axis=1))
+        # The weights with which the three directions n_i add up to nothing.
+        balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
+        constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
+                             axis=1).tolist()
+        first, second, third = (Chain(*chain) for chain in constants)
+        return KernelParameters(GeometryParameters(
+            self.base_radius, self.rod_length, self.elbow_sign, (first, second, third)))
 
 
 @dataclass(frozen=True)
@@ -191,9 +196,16 @@ class Robot:
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
 
     @cached_property
-    def numbers(self) -> Array:
-        """What kernels take, see `robot_numbers`."""
-        return robot_numbers(self)
+    def kernel_parameters(self) -> KernelParameters[RobotParameters]:
+        """Geometry, masses and gravity."""
+        masses = self.masses
+        first, second, third = (ChainMasses(*chain) for chain in zip(
+            masses.slides, masses.lifts, masses.rods, strict=True))
+        body = PlatformBody(masses.total, Vector(*masses.centre), Vector(*masses.inertia[:3]),
+                            Vector(*masses.inertia[3:]))
+        return KernelParameters(RobotParameters(
+            self.geometry.kernel_parameters.named, body, (first, second, third),
+            Vector(*self.gravity)))
 
 
 def _require(key: str, value: Any, condition: bool, rule: str) -> None:

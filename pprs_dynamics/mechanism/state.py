@@ -1,4 +1,18 @@
-"""Everything that one evaluation of the mechanism yields, shared by all effects."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Motion, Jacobians and frictionless forces of the mechanism, as effects take them."""
 
 from __future__ import annotations
 
@@ -20,7 +34,7 @@ from pprs_dynamics.mechanism.robot import DRIVES, Geometry, Robot
 
 
 class DriveStates(Protocol):
-    """What effects on drives look at: N samples of D drives, whatever they move."""
+    """Protocol of N samples of D drives, whatever they move, as effects on drives take them."""
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -44,20 +58,20 @@ class DriveStates(Protocol):
 
     @property
     def direction(self) -> Array:
-        """sgn of the velocities, (N, D)."""
+        """Sign of the velocities, sgn, (N, D)."""
 
     @property
     def guide_load(self) -> Array:
         """[N], (N, D)."""
 
 
-class Kinematics:
-    """What a motion does to a mechanism whatever its masses; solved where it is asked for.
+class MechanismKinematics:
+    """Kinematics of a mechanism along a motion, independent of its masses; evaluated lazily.
 
     Raises
     ------
     WorkspaceError, SingularityError
-        On first use, see `solve_inverse_kinematics` and `compute_jacobians`.
+        On first use, see `solve_inverse_kinematics` and `inverse_table`.
     """
 
     def __init__(
@@ -120,14 +134,14 @@ class MechanismState:
 
     robot: Robot
     motion: PlatformMotion
-    kinematics: Kinematics
+    kinematics: MechanismKinematics
     reversal: Reversal
     printed: bool = False
     load: StructureLoad | None = None
 
     @classmethod
     def unsolved(
-        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: Kinematics,
+        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: MechanismKinematics,
     ) -> MechanismState:
         """Return the state of other fields and these; in a fifth of the constructor's time."""
         state = object.__new__(cls)
@@ -182,11 +196,11 @@ class MechanismState:
 
     @property
     def direction(self) -> Array:
-        """sgn of the drive velocities, turning over within the reversal velocity."""
+        """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
 
     def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
-        """Return the same motion with other bodies, and with a load more.
+        """Return a state of this motion with other bodies, and with an additional load.
 
         The robot must have the geometry that the state was solved for.
         """
@@ -206,9 +220,9 @@ def solve_mechanism(
     Raises
     ------
     WorkspaceError, SingularityError
-        See `solve_inverse_kinematics` and `compute_jacobians`.
+        See `solve_inverse_kinematics` and `inverse_table`.
     """
-    kinematics = Kinematics(robot.geometry, motion, minimum_sine, condition_limit)
+    kinematics = MechanismKinematics(robot.geometry, motion, minimum_sine, condition_limit)
     state = MechanismState(robot, motion, kinematics, reversal or Reversal(), printed)
     _ = kinematics.inverse_table
     return state

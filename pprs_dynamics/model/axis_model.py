@@ -1,10 +1,25 @@
-"""A single axis: one prismatic drive, as a builder measures it before the robot is assembled.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Model of a single axis: one prismatic drive on a test bench.
 
 F = M (q_ddot - g) + F_v q_dot + F_c sgn(q_dot) + offset + effects, positive along the drive.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -13,15 +28,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.load_friction import LoadFriction
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.robot import AXIS
-from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
-from pprs_dynamics.model.keys import AXIS_KEYS
+from pprs_dynamics.model.effects_block import added_effects
+from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
+from pprs_dynamics.model.keys import AXIS_KEYS, is_axis
+from pprs_dynamics.model.parameter_file import find_file, read_parameters
+from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
 
 @dataclass(frozen=True)
@@ -50,13 +69,13 @@ class AxisMotion:
                           None if self.time is None else self.time[samples])
 
     def with_time(self, time: Array) -> AxisMotion:
-        """Return the same motion at given times."""
+        """Return the motion at given times."""
         return AxisMotion(self.position, self.velocity, self.acceleration, time)
 
 
 @dataclass(frozen=True)
 class AxisState(AxisMotion):
-    """A motion, and what effects on drives look at beside it."""
+    """A motion with the quantities that effects on drives take."""
 
     reversal: Reversal = field(default_factory=Reversal)
 
@@ -67,7 +86,7 @@ class AxisState(AxisMotion):
 
     @cached_property
     def direction(self) -> Array:
-        """sgn of the velocity, turning over within the reversal velocity, (N, 1)."""
+        """Sign of the velocity, sgn, turning over within the reversal velocity, (N, 1)."""
         direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
         return direction
 
@@ -116,12 +135,29 @@ class AxisModel(ForceModel):
         ModelError
             For a key that is unknown, missing, of the wrong type or impossible, and for a 3-PPRS.
         """
-        from pprs_dynamics.model.model_file import load_model
+        file = find_file(path)
+        return cls.from_parameters(read_parameters(file), source=str(file))
 
-        model = load_model(path)
-        if not isinstance(model, AxisModel):
-            raise ModelError('geometry', 'that of a 3-PPRS', 'be a single axis', model.source)
-        return model
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> AxisModel:
+        """Build the model from flat keys and values, each checked; see `build_model`.
+
+        Raises
+        ------
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for those of
+            a 3-PPRS.
+        """
+        with source_of_errors(source):
+            if not is_axis(parameters):
+                raise ModelError('axis.mass', MISSING, 'be given: this needs a single axis')
+            values = checked_values(parameters)
+            friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])
+            effects = (friction, AxisOffset(values['axis.offset']),
+                       *added_effects(parameters, cls))
+            return cls(mass=values['axis.mass'], gravity=values['axis.gravity'], effects=effects,
+                       reversal=Reversal(values['friction.reversal_velocity']), values=values,
+                       source=source)
 
     @classmethod
     def offers(cls, effect: type[CatalogueEffect]) -> bool:
@@ -149,7 +185,7 @@ class AxisModel(ForceModel):
             effect.check_memory(state.memories)
             if not effect.is_measurement:
                 parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-        return AxisForces(np.sum(list(parts.values()), axis=0), parts, mechanism)
+        return AxisForces(total_force(tuple(parts.values())), parts, mechanism)
 
     def variables(self, state: AxisState) -> dict[str, Array]:
         """Return nothing: an axis has its own motion alone."""

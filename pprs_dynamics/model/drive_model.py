@@ -1,7 +1,22 @@
-"""The drive forces Q^m as a sum over a list: the rigid body, the paper's friction, and effects."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Model of the 3-PPRS: drive forces Q^m of the rigid body, the paper's friction and effects."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -12,16 +27,26 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction
 from pprs_dynamics.effects.effect import CatalogueEffect, Effect
-from pprs_dynamics.effects.passive_friction import PassiveFriction, WholeMechanismFriction
+from pprs_dynamics.effects.passive_friction import (
+    IndependentChainsFriction,
+    JointFriction,
+    PassiveFriction,
+    WholeMechanismFriction,
+)
 from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES, Robot
+from pprs_dynamics.mechanism.reversal import Reversal
+from pprs_dynamics.mechanism.robot import DRIVES, Geometry, Masses, Robot
 from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
-from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
-from pprs_dynamics.model.keys import KEYS
+from pprs_dynamics.model.effects_block import added_effects
+from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
+from pprs_dynamics.model.keys import KEYS, is_axis
 from pprs_dynamics.model.limits import Limits
 from pprs_dynamics.model.one_pass import FORCES, OnePass
+from pprs_dynamics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
+from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
 __all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
 
@@ -103,7 +128,7 @@ class DriveModel(ForceModel):
     equations: str = 'corrected'
 
     @classmethod
-    def load(cls, path: str | PathLike[str] = 'config/paper.yaml') -> DriveModel:
+    def load(cls, path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel:
         """Read a model file.
 
         Parameters
@@ -120,10 +145,38 @@ class DriveModel(ForceModel):
             For a key that is unknown, missing, of the wrong type or impossible, and for a single
             axis, which `AxisModel.load` and `load_model` read.
         """
-        from pprs_dynamics.model.model_file import build_robot, find_file, read_parameters
-
         file = find_file(path)
-        return build_robot(read_parameters(file), source=str(file))
+        return cls.from_parameters(read_parameters(file), source=str(file))
+
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> DriveModel:
+        """Build the model from flat keys and values, each checked; see `build_model`.
+
+        Raises
+        ------
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for those of
+            a single axis.
+        """
+        with source_of_errors(source):
+            axis = next((name for name in parameters if is_axis((name,))), None)
+            if axis is not None:
+                raise ModelError(axis, parameters[axis], 'not be given: this needs a 3-PPRS, and '
+                                 'a single axis is for pprs compare, diagnose, adopt and history')
+            values = checked_values(parameters)
+            for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
+                if not values[stroke][0] < values[stroke][1]:
+                    raise ModelError(stroke, values[stroke],
+                                     'be a lower and a higher position [m]')
+            robot = Robot(Geometry(**_group(values, 'geometry.')),
+                          Masses(**_group(values, 'masses.')), values['gravity'])
+            limits = Limits(**_group(values, 'limits.'))
+            effects = (ActiveFriction(**_group(values, 'friction.drives.')),
+                       _passive_friction(values, limits), *added_effects(parameters, cls))
+            _require_bodies(robot, effects)
+            reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
+            return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
+                       equations=values['equations'], values=values, source=source)
 
     @classmethod
     def offers(cls, effect: type[CatalogueEffect]) -> bool:
@@ -141,7 +194,7 @@ class DriveModel(ForceModel):
             For a pose nearer to a singularity than `limits.rod_sine` or
             `limits.condition_number` allow.
         """
-        # Absurd numbers overflow; what comes out is checked by whoever uses it.
+        # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             return solve_mechanism(
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
@@ -209,8 +262,7 @@ class DriveModel(ForceModel):
             for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-            total: Array = np.sum(list(parts.values()), axis=0)                # Eq. (14)
-        return DriveForces(total, parts, mechanism)
+            return DriveForces(total_force(tuple(parts.values())), parts, mechanism)
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return loads of the guides, rod angles, and where the platform is."""
@@ -227,3 +279,35 @@ class DriveModel(ForceModel):
         """
         mechanism = solve_mechanism(self.robot, motion, minimum_sine=self.limits.rod_sine)
         return condition_number(self.robot.geometry, mechanism.jacobians.J)
+
+
+def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the keys and values right below a prefix."""
+    return {name.removeprefix(prefix): value for name, value in values.items()
+            if name.startswith(prefix) and '.' not in name.removeprefix(prefix)}
+
+
+def _passive_friction(values: Mapping[str, Any], limits: Limits) -> PassiveFriction:
+    joints = (JointFriction(**_group(values, 'friction.revolute.')),
+              JointFriction(**_group(values, 'friction.spherical.')))
+    printed = values['equations'] == 'printed'
+    if values['friction.approach'] == WholeMechanismFriction.approach:
+        return WholeMechanismFriction(*joints, printed)
+    return IndependentChainsFriction(*joints, printed, limits.rod_cosine)
+
+
+def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
+    """Return the width that all drives share, or one for each."""
+    common: float = values['friction.reversal_velocity']
+    own: tuple[float, ...] = values['friction.reversal_velocities']
+    return tuple(width or common for width in own) if any(own) else common
+
+
+def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:
+    """Raise ModelError where effects leave bodies that cannot be."""
+    for effect in effects:
+        if isinstance(effect, BodyEffect):
+            robot = effect.changed(robot)
+            if not robot.masses.total > 0 or min(robot.masses.rods) < 0:
+                raise ModelError(f'effects.{effect.name}', effect.to_file(),
+                                 'leave masses greater than 0')

@@ -1,21 +1,33 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The blocks `effects` and `tolerances` of a model file, for models of every kind."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pprs_dynamics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.keys import Key
 
-# Blocks whose keys are not listed one by one.
+# Keys of the block `effects` that are no effect.
 LISTS = ('effects.active', 'effects.measured')
-ADDED = ('effects.', 'tolerances.', 'history.')
 
 
 def added_effects(
@@ -29,16 +41,14 @@ def added_effects(
         raise ModelError('effects.active', list(active), 'name each effect once')
     for name in active:
         if find_effect(name) is None:
-            raise ModelError('effects.active', list(active), f'name known effects, not {name!r}'
-                             + suggestion(name, catalogue()) + f': {", ".join(catalogue())}')
+            raise UnknownNameError('effect', name, catalogue(), 'effects.active')
     blocks = _nested('effects', {key: value for key, value in parameters.items()
                                  if key.startswith('effects.') and key not in LISTS})
     of_sensors = _effects_of_sensors(parameters)
     for name, block in blocks.items():
         found = find_effect(name)
         if found is None:
-            raise ModelError(f'effects.{name}', block, 'belong to a known effect'
-                             + suggestion(name, catalogue()) + f': {", ".join(catalogue())}')
+            raise UnknownNameError('effect', name, catalogue(), 'effects')
         _check_place(name, block, found, kind)
         # A block that is not active is checked all the same, but may still be incomplete.
         effect = found.from_file(block, complete=name in active)
@@ -59,9 +69,7 @@ def _check_place(name: str, block: Any, effect: type[CatalogueEffect],
     if issubclass(effect, DriveEffect) and isinstance(block, Mapping):
         for drive in block:
             if drive not in kind.drives:
-                several = 'one of the drives' if len(kind.drives) > 1 else 'the drive'
-                raise ModelError(f'effects.{name}.{drive}', block[drive],
-                                 f'sit on {several} {", ".join(kind.drives)}')
+                raise UnknownNameError('drive', drive, kind.drives, f'effects.{name}')
 
 
 def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
@@ -81,8 +89,8 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
         if target == name:
             continue
         if target not in keys or keys[target].choices:
-            raise ModelError(name, value, 'name a number of the model'
-                             + suggestion(target, keys))
+            raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
+                                                 if not keys[key].choices])
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
             raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
 
@@ -101,9 +109,3 @@ def _nested(root: str, flat: Mapping[str, Any]) -> dict[str, Any]:
             raise ModelError(name, value, 'not be a value: keys stand below it')
         branch[leaf] = value
     return tree
-
-
-def suggestion(name: str, known: Any) -> str:
-    """Return what might have been meant, for the end of a sentence."""
-    close = difflib.get_close_matches(name, list(known), 1)
-    return f' (did you mean {close[0]}?)' if close else ''

@@ -1,4 +1,18 @@
-"""What every model is: forces that drives must apply for a motion, as a sum over a list.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The base of all models: forces that drives must apply for a motion, as a sum over a list.
 
 The diagnosis works on any of them: it asks a model for its drives, its numbers, its forces and
 what its sensors say, never for what it moves.
@@ -24,6 +38,14 @@ from pprs_dynamics.model.keys import Key
 RIGID_BODY = 'rigid_body'
 
 
+def total_force(parts: tuple[Any, ...]) -> Any:
+    """Return the drive force Q^m, the sum of its parts, of numbers as of arrays."""
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part                                                   # Eq. (14)
+    return total
+
+
 @dataclass(frozen=True)
 class Forces:
     """Forces of N samples of D drives.
@@ -47,7 +69,7 @@ F = TypeVar('F', bound=Forces)
 
 
 class ModelState:
-    """What effects with memory keep between calls; made by `initial_state` of a model."""
+    """Memory of effects between calls; made by `initial_state` of a model."""
 
     def __init__(self, memories: dict[str, Any]) -> None:
         self.memories = memories
@@ -105,7 +127,7 @@ class ForceModel(ABC):
 
     @abstractmethod
     def variables(self, state: Any) -> dict[str, Array]:
-        """Return what an error may depend on beside time and the drives' own motion.
+        """Return the variables on which an error may depend beside time and the drives' motion.
 
         By name in the interface: (N, D) where every drive has its own, (N,) where all share it.
         """
@@ -129,7 +151,7 @@ class ForceModel(ABC):
         return fresh
 
     def measured(self, forces: F, state: ModelState | None = None) -> F:
-        """Return what the sensors say where the drives apply `forces`.
+        """Return the measured forces where the drives apply `forces`.
 
         Effects of measurement become parts of their own; without any, `forces` are returned.
 
@@ -157,7 +179,7 @@ class ForceModel(ABC):
 
     @property
     def position_error(self) -> Array:
-        """What must be taken off measured drive positions [m], (D,)."""
+        """Errors of measured drive positions [m], to be subtracted, (D,)."""
         errors = [effect.position_error(self.drives) for effect in self.effects
                   if isinstance(effect, MeasurementEffect)]
         total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))

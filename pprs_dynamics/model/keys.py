@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Every key of a model file, declared once: type, size, unit, rule and description.
 
 The file loader, the nodes' parameter descriptors and the documentation read this table.
@@ -53,20 +67,26 @@ class Key:
 
     @property
     def rule(self) -> str:
-        """What a value must be, completing "it must ..."."""
+        """The requirement on a value, completing "must ..."."""
         if self.choices:
             return f'be one of {", ".join(self.choices)} ({self.description})'
-        count = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
-        limits = []
+        form = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
+        return self._described(f'{form} {self._bounds}' if self._bounds else form)
+
+    @property
+    def _bounds(self) -> str:
+        bounds = []
         if self.positive:
-            limits.append('greater than 0')
+            bounds.append('greater than 0')
         elif self.lower > -math.inf:
-            limits.append(f'at least {self.lower:g}')
+            bounds.append(f'at least {self.lower:g}')
         if self.upper < math.inf:
-            limits.append(f'at most {self.upper:g}')
-        bounds = f', {" and ".join(limits)}' if limits else ''
+            bounds.append(f'at most {self.upper:g}')
+        return ' and '.join(bounds)
+
+    def _described(self, rule: str) -> str:
         unit = f' [{self.unit}]' if self.unit else ''
-        return f'{count}{bounds} ({self.description}{unit})'
+        return f'{rule} ({self.description}{unit})'
 
     def check(self, value: Any) -> Any:
         """Return the value as a word, a float or a tuple of floats, or raise ModelError."""
@@ -83,12 +103,13 @@ class Key:
         return tuple(self._number(element, list(value)) for element in value)
 
     def _number(self, element: Any, value: Any) -> float:
-        # Compared before it is converted: a whole number of any length compares.
-        good = (isinstance(element, (int, float)) and not isinstance(element, bool)
-                and max(self.lower, -LARGEST) <= element <= min(self.upper, LARGEST)
-                and not (self.positive and element <= 0))
-        if not good:
+        if isinstance(element, bool) or not isinstance(element, (int, float)):
             raise ModelError(self.name, value, self.rule)
+        # Compared before it is converted: a whole number of any length compares.
+        if not -LARGEST <= element <= LARGEST:
+            raise ModelError(self.name, value, self._described('be finite'))
+        if not self.lower <= element <= self.upper or (self.positive and element <= 0):
+            raise ModelError(self.name, value, self._described(f'be {self._bounds}'))
         return float(element)
 
 
@@ -101,13 +122,13 @@ def _friction(joint: str, where: str, symbol: str) -> tuple[Key, ...]:
 
 
 KEYS: dict[str, Key] = {key.name: key for key in (
-    Key('equations', 'the paper\'s (7), (12), (13) corrected or to the letter',
+    Key('equations', "the paper's (7), (12), (13) corrected or to the letter",
         choices=EQUATIONS),
     Key('geometry.base_radius', 'R, radius of the base', 'm', positive=True),
     Key('geometry.platform_radius', 'r, radius of the platform', 'm', positive=True),
     Key('geometry.rod_length', 'l, length of the guiding rods', 'm', positive=True),
     Key('geometry.chain_angles', 'delta_i, chains around the base', 'rad', size=3),
-    Key('geometry.platform_angles', 'delta\'_i, joints around the platform', 'rad', size=3),
+    Key('geometry.platform_angles', "delta'_i, joints around the platform", 'rad', size=3),
     Key('geometry.elbow', 'branch of the rods', choices=ELBOWS),
     Key('masses.platform', 'M, mass of the platform', 'kg', lower=0),
     Key('masses.payload', 'm, mass of the manipulated object', 'kg', lower=0),
@@ -120,7 +141,7 @@ KEYS: dict[str, Key] = {key.name: key for key in (
     Key('friction.approach', 'how passive friction reaches the drives', choices=APPROACHES),
     Key('friction.reversal_velocity', 'width in which sgn turns over in drives', 'm/s',
         positive=True),
-    Key('friction.reversal_velocities', 'the same drive by drive; 0: friction.reversal_velocity',
+    Key('friction.reversal_velocities', 'width drive by drive; 0: friction.reversal_velocity',
         'm/s', size=6, lower=0, default=(0.0,) * 6),
     Key('friction.reversal_rate', 'width in which sgn turns over in passive joints', 'rad/s',
         positive=True),
@@ -155,6 +176,10 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 )}
 
 
+# Blocks whose keys are not listed one by one.
+ADDED = ('effects.', 'tolerances.', 'history.')
+
+
 def is_axis(names: Iterable[str]) -> bool:
     """Return whether keys are those of a single axis, not of a 3-PPRS."""
     return any(name.startswith('axis.') for name in names)
@@ -174,6 +199,11 @@ NODE_KEYS = frozenset({
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)
+
+
+def as_list(value: Any) -> Any:
+    """Return a tuple as the list that a file holds for it, and any other value as it is."""
+    return list(value) if isinstance(value, tuple) else value
 
 
 def set_number(values: dict[str, Any], key: str, element: int | None, number: float) -> None:

@@ -1,4 +1,18 @@
-"""The ledger of a model file: which effect was added when, from which data, and what it gained.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The ledger of a model file: the effects added, when, from which data, and their gain.
 
 A step stands under `history.step_NN` in values that ROS 2 parameter files accept, and keeps what
 was there before, so that it can be taken back exactly.
@@ -12,7 +26,8 @@ from dataclasses import MISSING as NO_DEFAULT
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.model.keys import as_list
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -85,7 +100,7 @@ class Step:
 
     def to_json(self) -> dict[str, Any]:
         """Return the step for JSON."""
-        data = {one.name: getattr(self, one.name) for one in fields(self)}
+        data = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         data['drives'] = list(self.drives) or None
         data['previous'] = {key: list(value) if isinstance(value, tuple) else value
                             for key, value in self.previous.items()}
@@ -95,13 +110,13 @@ class Step:
     def as_values(self, prefix: str) -> dict[str, Any]:
         """Return flat keys and values of a model file, empty lists left out."""
         flat: dict[str, Any] = {}
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if one.name == PREVIOUS:
-                flat.update((f'{prefix}.{PREVIOUS}.{key}', _listed(old))
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if entry.name == PREVIOUS:
+                flat.update((f'{prefix}.{PREVIOUS}.{key}', as_list(old))
                             for key, old in value.items())
             elif value != ():
-                flat[f'{prefix}.{one.name}'] = _listed(value)
+                flat[f'{prefix}.{entry.name}'] = as_list(value)
         return flat
 
 
@@ -139,12 +154,12 @@ def step_name(number: int) -> str:
 def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -> dict[str, Any]:
     """Return the values `after` with a step that leads to them from the values `before`."""
     changed = {key for key in {*before, *after}
-               if not key.startswith(f'{BLOCK}.') and _listed(before.get(key, MISSING)) != _listed(
+               if not key.startswith(f'{BLOCK}.') and as_list(before.get(key, MISSING)) != as_list(
                    after.get(key, MISSING))}
     gone = changed - after.keys()
     if gone:
         raise ValueError(f'a step adds and changes, but {sorted(gone)} would go')
-    kept = Step(**{**{one.name: getattr(step, one.name) for one in fields(step)},
+    kept = Step(**{**{entry.name: getattr(step, entry.name) for entry in fields(step)},
                    PREVIOUS: {key: before[key] for key in before if key in changed},
                    ADDED: tuple(key for key in after if key in changed - before.keys())})
     number = len(read_steps(before)) + 1
@@ -189,19 +204,19 @@ def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
     found: dict[str, Any] = {
         PREVIOUS: {name.removeprefix(f'{PREVIOUS}.'): value for name, value in block.items()
                    if name.startswith(f'{PREVIOUS}.')}}
-    for one in fields(Step):
-        key = f'{prefix}.{one.name}'
-        if one.name == PREVIOUS:
+    for entry in fields(Step):
+        key = f'{prefix}.{entry.name}'
+        if entry.name == PREVIOUS:
             continue
-        if one.name not in block:
-            if one.default is NO_DEFAULT and one.default_factory is NO_DEFAULT:
+        if entry.name not in block:
+            if entry.default is NO_DEFAULT and entry.default_factory is NO_DEFAULT:
                 raise ModelError(key, MISSING, 'be given')
             continue
-        found[one.name] = _checked(key, block[one.name], str(one.type))
+        found[entry.name] = _checked(key, block[entry.name], str(entry.type))
     unknown = [name for name in block if name.split('.')[0] not in {f.name for f in fields(Step)}]
     if unknown:
-        raise ModelError(f'{prefix}.{unknown[0]}', block[unknown[0]], 'not be there: no such key '
-                         'of a step')
+        raise UnknownNameError('key', f'{prefix}.{unknown[0]}',
+                               [f'{prefix}.{entry.name}' for entry in fields(Step)])
     return Step(**found)
 
 
@@ -211,13 +226,9 @@ def _checked(key: str, value: Any, kind: str) -> Any:
     if kind != element:
         if isinstance(value, str) or not isinstance(value, Sequence):
             raise ModelError(key, value, 'be a list')
-        return tuple(_checked(key, one, element) for one in value)
+        return tuple(_checked(key, item, element) for item in value)
     right = {'str': isinstance(value, str), 'bool': isinstance(value, bool),
              'float': isinstance(value, (int, float)) and not isinstance(value, bool)}[element]
     if not right:
         raise ModelError(key, value, f'be {rules[element]}')
     return float(value) if element == 'float' else value
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, (tuple, list)) else value

@@ -1,17 +1,32 @@
-"""What the robot is allowed to do, checked for motions and for forces."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Limits of the robot, checked for motions and for forces."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, WorkspaceError
 from pprs_dynamics.mechanism.evaluation import evaluate
+from pprs_dynamics.mechanism.kernel_parameters import KernelParameters
 from pprs_dynamics.mechanism.robot import DRIVES
 
 COUNT = len(DRIVES)
@@ -64,15 +79,16 @@ class Limits:
         return clamped
 
     @cached_property
-    def _numbers(self) -> Array:
-        return np.concatenate((*self.strokes, self.efforts))
+    def _kernel_parameters(self) -> KernelParameters[LimitParameters]:
+        lower, upper = (tuple(end.tolist()) for end in self.strokes)
+        return KernelParameters(LimitParameters(lower, upper, tuple(self.effort)))
 
     def allow(
         self, forces: Array, drive_motion: tuple[Array, ...],
     ) -> bool:
         """Return whether all is finite, and neither a stroke nor an effort is exceeded.
 
-        In a tenth of the time that `check_strokes` and `check_efforts` need to say what is.
+        In a tenth of the time of `check_strokes` and `check_efforts`, which name what is exceeded.
 
         Parameters
         ----------
@@ -81,7 +97,7 @@ class Limits:
         drive_motion : three (N, 6) arrays
             Position, velocity and acceleration [m, m/s, m/s^2]; all of it C-contiguous.
         """
-        return evaluate(allowed_kernel, self._numbers, forces, *drive_motion) < 0
+        return evaluate(allowed_kernel, self._kernel_parameters, forces, *drive_motion) < 0
 
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, 6), outside its stroke."""
@@ -103,15 +119,23 @@ class Limits:
                              self.effort[drive])
 
 
+class LimitParameters(NamedTuple):
+    """Parameters of `allowed_kernel`: ends of the strokes [m] and efforts [N] of all drives."""
+
+    lower: tuple[Any, ...]
+    upper: tuple[Any, ...]
+    effort: tuple[Any, ...]
+
+
 def allowed_kernel(
-    p: Any, s: Any, forces: Any, position: Any, velocity: Any, acceleration: Any,
+    p: LimitParameters, s: Any, forces: Any, position: Any, velocity: Any, acceleration: Any,
 ) -> Any:
-    """Return whether a sample is allowed; p is the ends of the strokes, then the efforts."""
+    """Return whether a sample is allowed."""
     # 0 times infinity or NaN is NaN.
     allowed = 0.0 * forces[s, 0] == 0.0
     for i in range(COUNT):
         force, q = forces[s, i], position[s, i]
         finite = 0.0 * force + 0.0 * velocity[s, i] + 0.0 * acceleration[s, i] == 0.0
-        within = (q >= p[i]) & (q <= p[COUNT + i]) & (abs(force) <= p[2 * COUNT + i])
+        within = (q >= p.lower[i]) & (q <= p.upper[i]) & (abs(force) <= p.effort[i])
         allowed = allowed & finite & within
     return allowed

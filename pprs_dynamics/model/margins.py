@@ -1,4 +1,18 @@
-"""How far a motion keeps from what would be refused, so that a warning can come before."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Margins of a motion to the limits, for warnings before a refusal."""
 
 from __future__ import annotations
 
@@ -26,7 +40,7 @@ class Margins:
     ----------
     singularity : float
         1 minus the largest of: condition number over its limit, smallest sine of a rod angle
-        over that of the rods, and, with independent chains, the same for the cosine.
+        over that of the rods, and, with independent chains, the ratio for the cosine.
     workspace : float
         Distance of a drive from an end of its stroke, over half the stroke.
     drive : str

@@ -1,8 +1,27 @@
-"""Model files written: every key in its place, as ROS 2 and people read them.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Writer of model files: every key in its place, as ROS 2 and people read them.
 
 A file that exists is edited: what does not change keeps its place and its comments, so that a
 diff against the old one shows what was changed and nothing else. The blocks `effects` and
 `history`, which commands write, are written anew at the end.
+
+A library that keeps comments, ruamel.yaml, formats the whole file anew. Of 15 forms in which a
+model file may be written it changed untouched lines in nine: four spaces of indentation (40
+lines), values in a column, spaces within brackets, lists over several lines, `~`, `.1E-2`, an
+anchor, what follows `---`. It also writes 1e-05, which is a word for YAML 1.1. Hence an editor.
 """
 
 from __future__ import annotations
@@ -22,13 +41,9 @@ from pprs_dynamics.effects.catalogue import find_effect
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.atomic_file import write_text
-from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, keys_of
-from pprs_dynamics.model.model_file import (
-    build_model,
-    other_nodes,
-    parse_parameters,
-    read_parameters,
-)
+from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, as_list, keys_of
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.model.parameter_file import other_nodes, parse_parameters, read_parameters
 
 WRITTEN = ('effects', 'history')  # blocks of commands; the rest is people's
 INDENT = '  '
@@ -75,7 +90,7 @@ def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> No
 
 
 def kept_parameters(base: str | PathLike[str]) -> dict[str, Any]:
-    """Return what a model file holds and a model does not: the keys of nodes."""
+    """Return the keys of nodes in a model file, and their values."""
     parameters = read_parameters(base)
     keys = keys_of(parameters)
     return {key: value for key, value in parameters.items()
@@ -119,7 +134,7 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
     old = parse_parameters(text)
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()
-              if key in old or key not in keys or _listed(value) != _listed(keys[key].default)}
+              if key in old or key not in keys or as_list(value) != as_list(keys[key].default)}
     try:
         edited = _edited(text, old, wanted)
         if _same(parse_parameters(edited), wanted):
@@ -132,7 +147,7 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
 
 
 class _NotEditableError(Exception):
-    """The file's form does not let its values be replaced one by one."""
+    """Values cannot be replaced one by one in a file of this form."""
 
 
 def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
@@ -148,7 +163,7 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
         starts.append(starts[-1] + len(line))
     new = {}
     for key, value in wanted.items():
-        if key.split('.')[0] in WRITTEN or _listed(old.get(key)) == _listed(value):
+        if key.split('.')[0] in WRITTEN or as_list(old.get(key)) == as_list(value):
             continue
         node = places.get(key)
         if node is None:
@@ -169,7 +184,7 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
     if not text.endswith('\n') and end == len(lines):
         blocks = '\n' + blocks
     changes.append((starts[end], starts[end], blocks + '\n' * bool(blocks)))
-    for start, stop, change in sorted(changes, key=lambda one: one[:2], reverse=True):
+    for start, stop, change in sorted(changes, key=lambda change: change[:2], reverse=True):
         text = text[:start] + change + text[stop:]
     return text
 
@@ -301,8 +316,4 @@ def _verified(text: str, values: Mapping[str, Any]) -> str:
 
 
 def _same(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
-    return {k: _listed(v) for k, v in found.items()} == {k: _listed(v) for k, v in wanted.items()}
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
+    return {k: as_list(v) for k, v in found.items()} == {k: as_list(v) for k, v in wanted.items()}

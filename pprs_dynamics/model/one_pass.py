@@ -1,7 +1,21 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The rigid body and the paper's friction in one pass over the samples.
 
-Nothing between the motion and the forces is kept: the same equations as in `MechanismState` and
-the two effects, which store every step, in a third of the time.
+No intermediate quantity is stored. The equations are the functions that `MechanismState` and the
+two effects call, too, which store every step and take three times as long.
 """
 
 from __future__ import annotations
@@ -13,51 +27,67 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.effects.passive_friction import (
+    JointResistance,
     Joints,
     WholeMechanismFriction,
-    chain_resistance,
-    drive_forces_of,
+    friction_forces,
     joint_resistances,
-    joints_of,
 )
+from pprs_dynamics.mechanism.chains import CHAINS, each_chain
 from pprs_dynamics.mechanism.closure import (
     Wrench,
-    closure_rows,
     condition_bound,
     eliminate,
     invert,
+    rows_of_chains,
 )
 from pprs_dynamics.mechanism.evaluation import evaluate
 from pprs_dynamics.mechanism.inverse_kinematics import (
     ChainSample,
-    chain_motion,
-    is_within_reach,
+    ThreeChains,
+    are_within_reach,
+    chain_motions,
 )
 from pprs_dynamics.mechanism.joint_rates import turnover
+from pprs_dynamics.mechanism.kernel_parameters import RobotParameters
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.numbers import ROBOT_NUMBERS, Chain, chain, lengths
+from pprs_dynamics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.mechanism.rigid_body import ChainForces, body_forces
+from pprs_dynamics.mechanism.rigid_body import ThreeForces, body_forces
 from pprs_dynamics.mechanism.robot import Robot
-from pprs_dynamics.mechanism.sample import motion_sample
-from pprs_dynamics.mechanism.state import Kinematics, MechanismState
+from pprs_dynamics.mechanism.state import MechanismKinematics, MechanismState
 from pprs_dynamics.mechanism.vectors import Vector
+from pprs_dynamics.model.force_model import total_force
 from pprs_dynamics.model.limits import Limits
 
 
-class Settings(NamedTuple):
-    """What is neither the robot nor its friction."""
+class DriveFriction(NamedTuple):
+    """Friction of one drive: c [N s/m], mu and the reversal velocity [m/s]."""
 
+    viscous: Any
+    coulomb: Any
+    reversal_velocity: Any
+
+
+class ForcesParameters(NamedTuple):
+    """Parameters of `forces_kernel`.
+
+    `printed` and `printed_friction` are 1 for the equations to the letter, else 0; `bound` is
+    the square of the condition number allowed, `reversal_rate` that of the passive joints
+    [rad/s], `drives` six of `DriveFriction`.
+    """
+
+    robot: RobotParameters
+    platform_radius: Any
     printed: Any
     printed_friction: Any
-    least_sine: Any
+    minimum_sine: Any
     bound: Any
-    r: Any
-    rate: Any
+    reversal_rate: Any
+    joints: Joints
+    drives: tuple[DriveFriction, ...]
 
 
-JOINTS = ROBOT_NUMBERS + len(Settings._fields)
-DRIVES = JOINTS + len(Joints._fields)
 FORCES = 4  # total and three parts
 # Samples up to which the drives' motion is kept with the forces: a node checks it before it
 # answers; of a recording, writing it would take longer than calculating it where it is needed.
@@ -84,104 +114,78 @@ class OnePass:
         self._fields = {'robot': robot, 'reversal': reversal, 'printed': printed, 'load': None}
         self._geometry = robot.geometry
         self._bounds = limits.rod_sine, limits.condition_number
-        settings = Settings(
-            printed, passive.printed, limits.rod_sine, limits.condition_number ** 2,
-            robot.geometry.platform_radius, reversal.rate)
-        self.numbers = np.concatenate((
-            robot.numbers, settings, passive.numbers, active.viscous, active.coulomb,
-            np.broadcast_to(reversal.velocity, 6)))
+        widths = np.broadcast_to(reversal.velocity, len(active.viscous)).tolist()
+        drives = zip(active.viscous, active.coulomb, widths, strict=True)
+        self.parameters = robot.kernel_parameters.extended(
+            ForcesParameters, robot.geometry.platform_radius, float(printed),
+            float(passive.printed), limits.rod_sine, limits.condition_number ** 2, reversal.rate,
+            passive.joints, tuple(DriveFriction(*drive) for drive in drives))
 
     def forces(self, motion: PlatformMotion) -> Array | None:
         """Return total, rigid body, active and passive friction, (4, N, 6) [N].
 
         For up to `SHORT` samples (7, N, 6): position, velocity and acceleration of the drives
         follow [m, m/s, m/s^2]. None where a sample may be out of reach or too near a singularity:
-        whoever asks must look closely then.
+        the caller must check every sample then.
         """
         rows = motion.rows
         samples = len(rows)
         table = np.empty((7 if samples <= SHORT else FORCES, samples, 6))
-        doubtful = evaluate(forces_kernel, self.numbers, rows, table)
+        doubtful = evaluate(forces_kernel, self.parameters, rows, table)
         return table if doubtful < 0 else None
 
     def mechanism(self, motion: PlatformMotion, table: Array) -> MechanismState:
         """Return the state of the mechanism, not yet solved, for a motion and its forces."""
-        kinematics = Kinematics(self._geometry, motion, *self._bounds)
+        kinematics = MechanismKinematics(self._geometry, motion, *self._bounds)
         if len(table) > FORCES:
             kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
         return MechanismState.unsolved(self._fields, motion, kinematics)
 
 
-def settings_of(p: Any) -> Settings:
-    """Return the settings in a row of numbers."""
-    k = ROBOT_NUMBERS
-    return Settings(p[k], p[k + 1], p[k + 2], p[k + 3], p[k + 4], p[k + 5])
-
-
-def forces_kernel(p: Any, s: Any, motion: Any, parts: Any) -> Any:
-    """Fill tables of forces from one of motions; p and tables as in `OnePass`."""
-    m, size, settings = motion_sample(motion, s), lengths(p), settings_of(p)
-    k1, k2, k3 = chain(p, 0), chain(p, 1), chain(p, 2)
-    one, two = chain_motion(size, k1, m), chain_motion(size, k2, m)
-    three = chain_motion(size, k3, m)
+def forces_kernel(p: ForcesParameters, s: Any, motion: Any, parts: Any) -> Any:
+    """Fill tables of forces from one of motions, see `OnePass.forces`."""
+    m, geometry = motion_sample(motion, s), p.robot.geometry
+    rods = chain_motions(geometry, m)
     if len(parts) > FORCES:
-        _write_motion(parts, s, 0, one)
-        _write_motion(parts, s, 1, two)
-        _write_motion(parts, s, 2, three)
-    rows_1 = closure_rows(k1, one.arm, one.cos_u, one.sin_u)
-    rows_2 = closure_rows(k2, two.arm, two.cos_u, two.sin_u)
-    rows_3 = closure_rows(k3, three.arm, three.cos_u, three.sin_u)
-    inverse = invert(p, eliminate(p, rows_1, rows_2, rows_3, one, two, three), one, two, three)
-    zero = 0.0 * one.cos_u
+        for i in range(CHAINS):
+            _write_motion(i, parts, s, rods[i])
+    rows = rows_of_chains(geometry, rods)
+    inverse = invert(geometry, eliminate(geometry, rows, rods), rods)
+    zero = 0.0 * rods[0].cos_u
     nothing = Vector(zero, zero, zero)
-    bodies = body_forces(p, m, one, two, three, inverse, Wrench(nothing, nothing), nothing,
-                         settings.printed)
-    joints = joints_of(p, JOINTS)
-    passive = drive_forces_of(
-        inverse, one.sin_u, two.sin_u, three.sin_u,
-        _in_chain(settings, joints, k1, size.l, one, bodies.one),
-        _in_chain(settings, joints, k2, size.l, two, bodies.two),
-        _in_chain(settings, joints, k3, size.l, three, bodies.three))
-    parts[3, s, 0], parts[3, s, 1] = passive.slide_1, passive.slide_2
-    parts[3, s, 2], parts[3, s, 3] = passive.slide_3, passive.lift_1
-    parts[3, s, 4], parts[3, s, 5] = passive.lift_2, passive.lift_3
-    _write_drives(p, parts, s, 0, one, bodies.one)
-    _write_drives(p, parts, s, 1, two, bodies.two)
-    _write_drives(p, parts, s, 2, three, bodies.three)
-    least = settings.least_sine
-    bound = condition_bound(inverse, rows_1, rows_2, rows_3, one.sin_u, two.sin_u, three.sin_u,
-                            settings.r)
-    return (is_within_reach(one, least) & is_within_reach(two, least)
-            & is_within_reach(three, least) & (bound <= settings.bound))
+    bodies = body_forces(p.robot, m, rods, inverse, Wrench(nothing, nothing), nothing, p.printed)
+    k = _joint_resistances(p, rods, bodies)
+    passive = friction_forces(geometry, rods, inverse, k, p.printed_friction)
+    for i in range(CHAINS):
+        c, f = rods[i], bodies[i]
+        _write_forces(i, p, parts, s, f.slide, c.slide_velocity, f.slide_load, passive.slides[i])
+        _write_forces(CHAINS + i, p, parts, s, f.lift, c.lift_velocity, f.lift_load,
+                      passive.lifts[i])
+    bound = condition_bound(inverse, rows, rods, p.platform_radius)
+    return are_within_reach(rods, p.minimum_sine) & (bound <= p.bound)
 
 
-def _in_chain(
-    settings: Settings, joints: Joints, k: Chain, l: Any, c: ChainSample, f: ChainForces,
-) -> Wrench:
-    """Return what overcomes the friction in a chain's joints."""
-    k_r, k_s = joint_resistances(joints, f.H, f.V, f.W, f.V_star, f.W_star,
-                                 turnover(c.u_dot, c.omega, settings.rate))
-    return chain_resistance(k, l, c, k_r, k_s, settings.printed_friction)
+@each_chain
+def _joint_resistances(
+    i: int, p: ForcesParameters, rods: ThreeChains, bodies: ThreeForces,
+) -> JointResistance:
+    f = bodies[i]
+    return joint_resistances(p.joints, f.H, f.V, f.W, f.V_star, f.W_star,
+                             turnover(rods[i].u_dot, rods[i].omega, p.reversal_rate))
 
 
-def _write_drives(
-    p: Any, parts: Any, s: Any, i: int, c: ChainSample, f: ChainForces,
+def _write_forces(
+    drive: int, p: ForcesParameters, parts: Any, s: Any, rigid_body: Any, velocity: Any,
+    load: Any, passive: Any,
 ) -> None:
-    """Write rigid body, active friction and total of a chain's two drives."""
-    slide = DRIVES + i
-    lift = slide + 3
-    parts[1, s, i], parts[1, s, 3 + i] = f.slide, f.lift
-    parts[2, s, i] = drive_friction(
-        p[slide], p[slide + 6], c.slide_velocity, f.slide_load,
-        smooth_sign(c.slide_velocity, p[slide + 12]))
-    parts[2, s, 3 + i] = drive_friction(
-        p[lift], p[lift + 6], c.lift_velocity, f.lift_load,
-        smooth_sign(c.lift_velocity, p[lift + 12]))
-    parts[0, s, i] = parts[1, s, i] + parts[2, s, i] + parts[3, s, i]          # Eq. (14)
-    parts[0, s, 3 + i] = parts[1, s, 3 + i] + parts[2, s, 3 + i] + parts[3, s, 3 + i]  # Eq. (14)
+    """Write the parts of a drive's force, and their sum."""
+    c, mu, width = p.drives[drive]
+    active = drive_friction(c, mu, velocity, load, smooth_sign(velocity, width))
+    parts[0, s, drive] = total_force((rigid_body, active, passive))
+    parts[1, s, drive], parts[2, s, drive], parts[3, s, drive] = rigid_body, active, passive
 
 
-def _write_motion(parts: Any, s: Any, i: int, c: ChainSample) -> None:
+def _write_motion(i: int, parts: Any, s: Any, c: ChainSample) -> None:
     """Write the motion of a chain's two drives."""
     parts[FORCES, s, i], parts[FORCES, s, 3 + i] = c.slide, c.lift
     parts[FORCES + 1, s, i], parts[FORCES + 1, s, 3 + i] = c.slide_velocity, c.lift_velocity

@@ -1,4 +1,18 @@
-"""The paper's simulation: the helical translation, and what of its claims comes out.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The paper's simulation: the helical translation, and a check of the paper's claims.
 
 Forces of both approaches, in both forms of the equations, on the paper's own path with the
 paper's own numbers.
@@ -119,10 +133,12 @@ def _claims(
     agree = bool(np.allclose(first[:, 0], second[:, 0], atol=0.01, equal_nan=True))
     return [
         Claim('friction is about 25 % of the drive force (rms over rms, hard sgn)', '25 %',
-              f'motor 1: {share[0]:.1f} %; slides {share[:3].min():.1f} to {share[:3].max():.1f} %;'
-              f' lifts, which carry the weight, {share[3:].min():.1f} to {share[3:].max():.1f} %',
+              f'motor 1: {share[0]:.1f} %; slides {share[:3].min():.1f} to '
+              f'{share[:3].max():.1f} %; lifts, which carry the weight, '
+              f'{share[3:].min():.1f} to {share[3:].max():.1f} %',
               bool(20 <= share[0] <= 30)),
-        Claim('friction of the active joints dominates that of the passive joints', 'it dominates',
+        Claim('friction of the active joints dominates that of the passive joints',
+              'it dominates',
               f'motor 1: {a[0]:.2f} N rms active, {p1[0]:.2f} N rms passive',
               bool(a[0] > 3 * p1[0])),
         Claim('both approaches give the same passive friction for motor 1 on this path',
@@ -132,7 +148,8 @@ def _claims(
               'largest difference where the second is defined: '
               f'{np.nanmax(np.abs(first - second)):.2f} N',
               bool(np.nanmax(np.abs(first - second)) < 0.1 * np.abs(first).max())),
-        Claim('the second approach errs where a rod angle is near 90 degrees', 'significant errors',
+        Claim('the second approach errs where a rod angle is near 90 degrees',
+              'significant errors',
               f'u runs from {u.min():.1f} to {u.max():.1f} degrees on this very path; its force '
               f'reaches {near:.0f} N at |cos u| = 0.001', crossed and bool(near > 10 * a.max())),
         Claim('friction of the passive joints does not matter much for the drive forces',

@@ -16,7 +16,8 @@ from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.keys import KEYS, LARGEST, Key, is_axis
-from pprs_dynamics.model.model_file import build_robot, default_parameters, is_known
+from pprs_dynamics.model.parameter_file import default_parameters
+from pprs_dynamics.model.parameter_values import is_known
 
 ACTIVE = 'effects.active'
 LARGEST_INTEGER = 2**63 - 1
@@ -126,7 +127,7 @@ def declare_model(node: Node) -> list[str]:
     defaults = default_parameters()
     given = overrides(node)
     if is_axis(given):
-        build_robot(given)  # refuses it
+        DriveModel.from_parameters(given)  # refuses it
     if any(name.startswith('geometry.') for name in given):
         # Somebody's own robot: what is missing must not become the paper's in silence.
         defaults = {}
@@ -223,4 +224,4 @@ def model_from(values: Mapping[str, Any]) -> DriveModel:
     ModelError
         Where a value, or a name, is not one of a model.
     """
-    return build_robot(values)
+    return DriveModel.from_parameters(values)

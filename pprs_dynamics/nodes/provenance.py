@@ -11,7 +11,7 @@ from typing import Any
 
 from pprs_dynamics.model.bounded_yaml import read_text
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.model_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.plain_text import displayed
 
 OPTION = '--params-file'

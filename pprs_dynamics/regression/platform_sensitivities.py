@@ -25,7 +25,6 @@ from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.mechanism.state import MechanismState
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
-from pprs_dynamics.model.model_file import build_robot
 from pprs_dynamics.regression.sensitivities import (
     BARE,
     HOMING,
@@ -182,7 +181,7 @@ class ChunkSensitivities:
                                for k, one in enumerate(value))
         else:
             moved = value * (1 + RELATIVE_STEP)
-        model = build_robot({**self.model.values, key: moved})
+        model = DriveModel.from_parameters({**self.model.values, key: moved})
         if key.startswith('geometry.'):
             s = self.state
             found = solve_forward_motion(model.robot.geometry, s.position, s.velocity,

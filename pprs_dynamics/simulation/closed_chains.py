@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The 3-PPRS as closed chains in MuJoCo: one evaluation of its equations of motion.
 
 The engine holds four trees: three chains (slide, lift, rod) and the free platform. Its own mass
@@ -187,7 +201,7 @@ class ClosedChains:
 
     def place_home(self, values: Mapping[str, Any], height: float = 0.5) -> None:
         """Put the platform unturned above the base's centre."""
-        R, r, l = (values[f'geometry.{name}'] for name in
+        R, r, l = (values[f'geometry.{name}'] for name in  # noqa: E741
                    ('base_radius', 'platform_radius', 'rod_length'))
         up = 1.0 if values['geometry.elbow'] == 'up' else -1.0
         for i in range(3):

@@ -1,4 +1,18 @@
-"""The drives' electronics: PD loop, feedforward, limits, and what happens without commands."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The drives' electronics: PD loop, feedforward, limits, and the timeout of commands."""
 
 from __future__ import annotations
 
@@ -42,7 +56,7 @@ class ControlSettings:
 
 @dataclass(frozen=True)
 class Setpoint:
-    """What one command wants; arrays (6,) in drive order.
+    """Setpoint of one command; arrays (6,) in drive order.
 
     Parameters
     ----------
@@ -59,7 +73,7 @@ class Setpoint:
 
 @dataclass(frozen=True)
 class Note:
-    """Something the robot has to say: `code` is one of SATURATED, HOLD, REFUSED, STOPPED."""
+    """A message of the robot: `code` is one of SATURATED, HOLD, REFUSED, STOPPED."""
 
     time: float
     code: str
@@ -207,7 +221,7 @@ class DriveControl:
         return goal, speed
 
     def _as_late(self, speed: Array, measured: Array) -> Array:
-        """Return the wanted velocity, as late as the measured one.
+        """Return the wanted velocity, delayed like the measured one.
 
         Else the loop would take the lag of differentiation for an error: at 80 Hz and 150 N s/m
         0.3 N per m/s^2, more than a feedforward leaves to it.
@@ -257,6 +271,6 @@ class DriveControl:
         return ''
 
     def _note(self, now: float, code: str, message: str) -> None:
-        # The same complaint in a row is told once.
+        # A message that repeats the last one is not given again.
         if not self.notes or (self.notes[-1].code, self.notes[-1].message) != (code, message):
             self.notes.append(Note(now, code, message))

@@ -1,4 +1,18 @@
-"""What the engine's mechanism does along a motion of its drives that is given.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Motion of the engine's mechanism along a given motion of its drives.
 
 N samples are the first axis of every array.
 """
@@ -20,7 +34,7 @@ from pprs_dynamics.simulation.hidden_effect import PlatformMoment
 
 @dataclass(frozen=True)
 class DrivenMotion:
-    """What the engine's mechanism does along a motion of its drives.
+    """Motion of the engine's mechanism along a motion of its drives.
 
     Parameters
     ----------
@@ -107,7 +121,7 @@ class DrivenMotion:
         return cls(times, q, y, y_dot, qpos, qvel, qacc, rotation, T_d, inverse, rates, axes)
 
     def platform_moment(self, sample: int) -> PlatformMoment:
-        """Return what platform and rods do at one sample."""
+        """Return the state of platform and rods at one sample."""
         qpos, qvel, rotation = self.qpos[sample], self.qvel[sample], self.rotation[sample]
         return PlatformMoment(float(self.time[sample]), qpos[9:12], rotation, qvel[9:12],
-                              rotation @ qvel[12:], qpos[2:9:3], qvel[2:9:3])
+                              rotation @ qvel[12:], qpos[2:9:3])

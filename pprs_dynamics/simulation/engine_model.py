@@ -1,4 +1,18 @@
-"""The engine, and the robot's four trees in its language."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""MuJoCo's model of the robot: four trees, to be closed at the spherical joints."""
 
 from __future__ import annotations
 
@@ -34,7 +48,7 @@ def describe_trees(values: Mapping[str, Any]) -> str:
     accelerations of the rods' tips, then of the platform's ends of the spherical joints. The
     hinge's angle is u_i: at 0 the rod points inwards from C_i.
     """
-    R, r, l = (values[f'geometry.{name}'] for name in
+    R, r, l = (values[f'geometry.{name}'] for name in  # noqa: E741
                ('base_radius', 'platform_radius', 'rod_length'))
     # Off centre, so that the engine prepares for any mass matrix and not for a diagonal one.
     body = '<inertial pos="0.1 0.2 0.3" quat="1 0.1 0.2 0.3" mass="1" diaginertia="3 4 5"/>'

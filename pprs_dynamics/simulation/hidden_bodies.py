@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Hidden bodies: masses, inertias and gravity that are not what the model says."""
 
 from __future__ import annotations
@@ -18,12 +32,12 @@ Body = tuple[float, Array, Array]
 """Mass [kg], centre of mass from o [m] and inertia tensor about it [kg m^2], in `platform`."""
 
 
-def join(one: Body, other: Body) -> Body:
+def join(first: Body, second: Body) -> Body:
     """Return two bodies fixed to each other, as one."""
-    total = one[0] + other[0]
-    centre: Array = (one[0] * one[1] + other[0] * other[1]) / total
-    tensor: Array = (one[2] + _steiner(one[0], one[1] - centre)
-                     + other[2] + _steiner(other[0], other[1] - centre))
+    total = first[0] + second[0]
+    centre: Array = (first[0] * first[1] + second[0] * second[1]) / total
+    tensor: Array = (first[2] + _steiner(first[0], first[1] - centre)
+                     + second[2] + _steiner(second[0], second[1] - centre))
     return total, centre, tensor
 
 
@@ -98,7 +112,7 @@ class RodMass(BodyChange):
 
     def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
         """Add the collars."""
-        l, extra = values['geometry.rod_length'], self.parameters['mass']
+        l, extra = values['geometry.rod_length'], self.parameters['mass']  # noqa: E741
         for i, mass in enumerate(values['masses.rods']):
             across = mass * l ** 2 / 12 + extra * (0.6 * l) ** 2 / 12
             chains.set_mass(f'rod_{i + 1}', mass + extra, np.array([-l / 2, 0.0, 0.0]),
@@ -127,7 +141,7 @@ class DriveInertia(DriveBound, BodyChange):
     """Rotor and screw, reflected: inertia along the drive, without weight."""
 
     name: ClassVar[str] = 'drive_inertia'
-    form: ClassVar[str] = 'm dv/dt, as the armature of the engine\'s joint'
+    form: ClassVar[str] = "m dv/dt, as the armature of the engine's joint"
     ranges: ClassVar[dict[str, Range]] = {'mass': Range('kg', 0.2, 1.0, 'log', scales=True)}
 
     def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:

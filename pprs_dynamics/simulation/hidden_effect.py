@@ -1,4 +1,18 @@
-"""What a hidden effect is: physics in the simulated robot of which the model knows nothing.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Base of hidden effects: physics in the simulated robot that the model lacks.
 
 Each is known by its name in the interface where the catalogue has one, but has a form of its
 own, so that a diagnosis is not tested against itself. Signs are the interface's: positive is
@@ -57,7 +71,7 @@ class Range:
     neutral: float = 0.0
 
     def draw(self, rng: np.random.Generator, scale: float, drive: str = '') -> float:
-        """Return a random value, for a drive where it sits on one."""
+        """Return a random value, by drive where the effect acts in drives."""
         low, high = self.low, self.high
         if self.lifts is not None and drive.startswith('lift'):
             low, high = self.lifts
@@ -76,7 +90,7 @@ class Range:
 
 @dataclass(slots=True)
 class DriveMoment:
-    """What the drives do at one moment, in SI units; arrays (6,), or at many moments (N, 6)."""
+    """State of the drives at one moment, in SI units; arrays (6,), or at many moments (N, 6)."""
 
     time: float | Array
     position: Array
@@ -84,13 +98,13 @@ class DriveMoment:
     guide_load: Array
 
     def at(self, velocity: Array) -> DriveMoment:
-        """Return the same moment at other velocities."""
+        """Return the state with other velocities."""
         return DriveMoment(self.time, self.position, velocity, self.guide_load)
 
 
 @dataclass(frozen=True)
 class PlatformMoment:
-    """What platform and rods do at one moment, in `base`.
+    """State of platform and rods at one moment, in `base`.
 
     Parameters
     ----------
@@ -98,8 +112,8 @@ class PlatformMoment:
     position, velocity, angular_velocity : (3,) arrays
         Of the platform.
     rotation : (3, 3) array
-    rod_angle, rod_rate : (3,) arrays
-        u_i and its rate.
+    rod_angle : (3,) array
+        u_i [rad].
     """
 
     time: float
@@ -108,7 +122,6 @@ class PlatformMoment:
     velocity: Array
     angular_velocity: Array
     rod_angle: Array
-    rod_rate: Array
 
 
 class HiddenEffect(ABC):
@@ -143,7 +156,7 @@ class HiddenEffect(ABC):
 
     @property
     def drives(self) -> tuple[str, ...] | None:
-        """Drives on which it sits; None for passive joints, platform and structure."""
+        """Drives on which it acts; None for passive joints, platform and structure."""
         return None
 
     def truth(self) -> dict[str, Any]:
@@ -153,7 +166,7 @@ class HiddenEffect(ABC):
 
 
 class DriveBound(HiddenEffect):
-    """An effect that sits on one drive, some or all.
+    """An effect that acts in one drive, some or all.
 
     Parameters
     ----------
@@ -164,7 +177,7 @@ class DriveBound(HiddenEffect):
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         for drive, parameters in drives.items():
             if drive not in DRIVES:
-                raise HiddenEffectError(f'{self.name} sits on a drive, not on {drive!r}')
+                raise HiddenEffectError(f'{self.name} acts in a drive, not in {drive!r}')
             require_parameters(type(self), parameters)
         self.parameters = {drive: dict(parameters) for drive, parameters in drives.items()}
         # One array per parameter, neutral where a drive has not got the effect.
@@ -183,7 +196,7 @@ class DriveBound(HiddenEffect):
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Drives on which it sits."""
+        """Drives on which it acts."""
         return tuple(drive for drive in DRIVES if drive in self.parameters)
 
 
@@ -205,7 +218,7 @@ class DriveForce(DriveBound):
 
     @abstractmethod
     def force(self, moment: DriveMoment) -> Array:
-        """Return what the drives must apply more [N], (6,)."""
+        """Return the additional drive forces [N], (6,)."""
 
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Advance memory by a time step; nothing to do without one."""
@@ -234,7 +247,7 @@ class StructureForce(HiddenEffect):
 
 
 class BodyChange(HiddenEffect):
-    """Bodies or gravity that are not what the model says."""
+    """A difference of bodies or gravity from the model."""
 
     @abstractmethod
     def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
@@ -246,7 +259,7 @@ class BodyChange(HiddenEffect):
 
 
 class SensorEffect(DriveBound):
-    """What a sensor says, beside the truth; see `sensors.Sensors`."""
+    """A systematic error of a sensor; see `sensors.Sensors`."""
 
 
 def require_parameters(effect: type[HiddenEffect], given: Mapping[str, float]) -> None:

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The simulated mechanism in motion: friction, hidden effects and time stepping.
 
 Its state is the six drive positions and velocities; passive joints and platform follow. A step
@@ -52,7 +66,6 @@ from pprs_dynamics.simulation.resistance import Resistance
 
 LOAD_ROUNDS = 20
 LOAD_TOLERANCE = 3e-5  # [N], between rounds; what is left in the forces is below mu times it
-SOLVER_ITERATIONS = 40
 # Stops at the ends of the strokes.
 STOP_STIFFNESS = 1e5  # [N/m]
 STOP_DAMPING = 300.0  # [N s/m]
@@ -63,7 +76,7 @@ LONGEST_MOVE = 0.1
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """How the mechanism is simulated.
+    """Settings of the simulation.
 
     Parameters
     ----------
@@ -87,7 +100,7 @@ class PlantSettings:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the mechanism really does at one moment, everything in `base`.
+    """True state of the mechanism at one moment, everything in `base`.
 
     Parameters
     ----------
@@ -245,7 +258,7 @@ class Plant:
         return ''
 
     def observe(self, effort: Array) -> Truth:
-        """Return what the mechanism does now, when the drives apply efforts (6,) [N]."""
+        """Return the true state now, when the drives apply efforts (6,) [N]."""
         chains, y = self.chains, self.velocity
         gap = chains.close()
         pose = chains.qpos[9:16].copy()
@@ -283,7 +296,7 @@ class Plant:
         rotation, velocities = chains.rotation.copy(), chains.qvel
         moment = PlatformMoment(
             time, chains.qpos[9:12].copy(), rotation, velocities[9:12].copy(),
-            rotation @ velocities[12:], chains.qpos[2:9:3].copy(), velocities[2:9:3].copy())
+            rotation @ velocities[12:], chains.qpos[2:9:3].copy())
         for effect in self._structure_forces:
             hinges, force, torque = effect.apply(moment)
             passive[:3] += hinges

@@ -1,4 +1,18 @@
-"""The simulated robot along a motion that is given: what its drives must apply, fast.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Drive forces of the simulated robot along a given motion, without time stepping.
 
 The plant finds the motion from the efforts, step by step; here the motion is known and the
 efforts are asked for, at the samples of a recording. With a = T y_dot + g the engine's inverse
@@ -45,7 +59,7 @@ from pprs_dynamics.simulation.sensors import SensorFaults
 
 @dataclass(frozen=True)
 class BodyForces:
-    """What bodies need to move along a motion.
+    """Inverse dynamics of the bodies along a motion.
 
     Parameters
     ----------
@@ -62,7 +76,7 @@ class BodyForces:
 
 @dataclass(frozen=True)
 class Efforts:
-    """What the drives apply along a motion.
+    """Efforts of the drives along a motion.
 
     Parameters
     ----------
@@ -78,7 +92,7 @@ class Efforts:
 
 @dataclass(frozen=True)
 class Readings:
-    """What perfect encoders and effort sensors say, but for hidden faults; (N, 6) arrays.
+    """Readings of sensors without noise, with hidden faults; (N, 6) arrays.
 
     Parameters
     ----------
@@ -115,7 +129,7 @@ class PrescribedPlant:
 
     def efforts(self, effects: Sequence[HiddenEffect] = (),
                 delay: Array | None = None) -> Efforts:
-        """Return what the drives apply.
+        """Return the efforts of the drives.
 
         Parameters
         ----------
@@ -148,7 +162,7 @@ class PrescribedPlant:
         return Efforts(total, loads)
 
     def readings(self, effects: Sequence[HiddenEffect] = ()) -> Readings:
-        """Return what is measured, without noise and quantisation."""
+        """Return the readings, without noise and quantisation."""
         motion, faults = self.motion, SensorFaults.of(effects)
         effort = (1 + faults.gain) * self.efforts(effects, faults.effort_delay).total
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration

@@ -1,4 +1,18 @@
-"""All that resists the drives by velocity, and the acceleration that it leaves them."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Velocity-dependent resistance to the drives, and the acceleration with it."""
 
 from __future__ import annotations
 
@@ -51,7 +65,7 @@ class Resistance:
         self._resolved = RESOLVED_SHARE * float(friction.width[:6].min())
 
     def in_drives(self, equations: Equations, moment: DriveMoment, loads: Array) -> Array:
-        """Return what the drives must apply more [N], (6,), at loads (12,) [N]."""
+        """Return the additional drive forces [N], (6,), at loads (12,) [N]."""
         relative = equations.rates.dot(moment.velocity)
         resistances, _ = self.of_joints(relative, loads)
         force: Array = (resistances.take(JOINT_OF_RATE) * relative).dot(equations.rates)
@@ -60,7 +74,7 @@ class Resistance:
         return force
 
     def of_passive_joints(self, equations: Equations, velocity: Array, loads: Array) -> Array:
-        """Return what friction takes from hinges and platform [N m], (9,)."""
+        """Return the moments of friction on hinges and platform [N m], (9,)."""
         relative = equations.rates.dot(velocity)
         resistances, _ = self.of_joints(relative, loads)
         moments = resistances.take(JOINT_OF_RATE) * relative

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The simulated robot: mechanism, drives' control and sensors, advanced tick by tick."""
 
 from __future__ import annotations
@@ -70,13 +84,8 @@ class SimulatedRobot:
 
     @property
     def notes(self) -> list[Note]:
-        """What the robot has had to say."""
+        """Messages of the robot so far."""
         return self.control.notes
-
-    @property
-    def stopped(self) -> bool:
-        """True after the mechanism came to a singular pose: it moves no more."""
-        return self._stopped
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
         """Put the drives at encoder positions (6,) [m], at rest or with velocities [m/s].
@@ -99,11 +108,11 @@ class SimulatedRobot:
             self.time, setpoint, following, self.steps_per_tick * self.plant.settings.step)
 
     def tick(self) -> Measurement:
-        """Return what the sensors say now, and advance to the next tick."""
+        """Return the readings now, and advance to the next tick."""
         return self.tick_with_truth(want_truth=False)[0]
 
     def tick_with_truth(self, want_truth: bool = True) -> tuple[Measurement, Truth | None]:
-        """As `tick`, and what really happens now."""
+        """Return the readings and the true state now, and advance to the next tick."""
         now, step, plant = self.time, self.plant.settings.step, self.plant
         measurement, truth = None, None
         for k in range(self.steps_per_tick):

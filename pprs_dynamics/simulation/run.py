@@ -1,4 +1,18 @@
-"""From a reference to a recording of the simulated robot, without ROS."""
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Runs of the simulated robot along a reference, without ROS."""
 
 from __future__ import annotations
 
@@ -33,7 +47,7 @@ class HasValues(Protocol):
 
 @dataclass(frozen=True, init=False)
 class DriveReference:
-    """What the drives are told at every tick.
+    """Setpoints of the drives at every tick.
 
     Parameters
     ----------
@@ -77,7 +91,7 @@ class DriveReference:
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """A recording, and what really happened.
+    """A recording, and the true motion and forces.
 
     Parameters
     ----------

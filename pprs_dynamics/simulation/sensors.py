@@ -1,4 +1,18 @@
-"""What the robot's sensors say: quantised positions, noisy efforts, faults.
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sensors of the simulated robot: quantised positions, noisy efforts, faults.
 
 All randomness comes from one generator, so that a seed repeats a recording bit for bit.
 """
@@ -64,7 +78,7 @@ class SensorSettings:
 
 @dataclass(frozen=True)
 class SensorFaults:
-    """What is wrong with the sensors, summed over hidden effects; (6,) arrays.
+    """Faults of the sensors, summed over hidden effects; (6,) arrays.
 
     Parameters
     ----------
@@ -141,7 +155,7 @@ class EffortNoise:
         return noise
 
     def autocovariance(self, lags: Array) -> Array:
-        """Return that of one effort's noise at whole lags [samples], (L,) [N^2]."""
+        """Return the autocovariance of one effort's noise at whole lags [samples], (L,) [N^2]."""
         steps = np.abs(np.asarray(lags, dtype=float))
         slow: Array = (self._sizes ** 2) @ self._keep[:, None] ** steps
         return slow + self._white ** 2 * (steps == 0)
@@ -149,7 +163,7 @@ class EffortNoise:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the sensors say at one moment: `time` [s] and (6,) arrays in drive order."""
+    """Readings of the sensors at one moment: `time` [s] and (6,) arrays in drive order."""
 
     time: float
     position: Array
@@ -212,7 +226,7 @@ class Sensors:
         self._past.appendleft((self.position, self.velocity, (before + after) / 2))
 
     def measure(self, time: float) -> Measurement:
-        """Return what is published now, with faults and noise."""
+        """Return the readings to publish now, with faults and noise."""
         faults = self._faults
         position, velocity = (self._delayed(i, faults.position_delay) for i in (0, 1))
         effort = self._delayed(2, faults.effort_delay)

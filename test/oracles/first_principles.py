@@ -32,7 +32,7 @@ def closure(geometry, q, P, turn):
     e, n = chain_vectors(geometry)
     A = P + Rotation.from_rotvec(turn).apply(platform_points(geometry))
     C = geometry.base_radius * e + q[:3, None] * n + q[3:, None] * UP
-    rod, l = A - C, geometry.rod_length
+    rod, l = A - C, geometry.rod_length  # noqa: E741
     return np.concatenate((np.sum(rod * n, axis=1), (np.sum(rod * rod, axis=1) - l * l) / (2 * l)))
 
 
