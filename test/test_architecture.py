@@ -101,7 +101,8 @@ def test_arrows_point_one_way(file: Path) -> None:
     folder = file.relative_to(PACKAGE).parts[0]
     used = imports(file)
     own = {name.split('.')[1] for name in used if name.startswith('pprs_dynamics.')}
-    assert own - {'arrays', 'errors', 'parallel', 'plain_text', 'threads', folder} <= MAY_USE[folder]
+    shared = {'arrays', 'errors', 'parallel', 'plain_text', 'threads', folder}
+    assert own - shared <= MAY_USE[folder]
     libraries = {name.split('.')[0] for name in used}
     if folder != 'nodes':
         assert not libraries & ROS

@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import block_diag
 
 from pprs_dynamics.regression.base_columns import BaseColumn
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block
 from pprs_dynamics.residuals.residuals import Residuals
 
 SAMPLES, DRIVES, PERIOD = 240, 2, 0.01

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.adoption.adopt import adopt
+from pprs_dynamics.adoption.adopt import adopt, original
 from pprs_dynamics.adoption.request import EffectRequest
-from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
+from pprs_dynamics.commands.arguments import MODEL, PAGE, add_details, output_file
+from pprs_dynamics.commands.diagnosis_cache import diagnosis_key, kept_diagnosis
 from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
@@ -36,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
+    add_details(parser)
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
                         help='write a page with all figures')
 
@@ -49,10 +51,11 @@ def run(options: argparse.Namespace) -> int:
     request.require_place(model)
     recordings = read_recordings(options, screen, model)
     validation = read_validation(options, screen, model, recordings)
+    known = kept_diagnosis(diagnosis_key(original(model), options.recordings, options.topic))
     with progress_bar(screen, f'adopting {request.name}') as progress:
         answer = adopt(model, request, recordings, validation, options.force,
-                       lambda share: progress(share, 1.0))
-    screen.print(adoption_view(answer))
+                       lambda share: progress(share, 1.0), known)
+    screen.print(adoption_view(answer, options.details))
     if options.json:
         write_json(options.json, answer.to_json())
     if options.report:
@@ -61,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     if not answer.adopted:
         return 1
     book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
-                   dict(zip(options.validate, validation, strict=True)))
+                         dict(zip(options.validate, validation, strict=True)))
     write_model(options.output, book.entered(answer).values, base)
     screen.print(f'model: {shown(options.output)}')
     return 0

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from pprs_dynamics.adoption.loop import REFUSED, adopt_all
 from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
@@ -16,7 +15,8 @@ from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_writer import write_model
-from pprs_dynamics.report.adoption_tables import adoption_view
+from pprs_dynamics.report.adoption_tables import adoption_view, headline
+from pprs_dynamics.report.progress import staged_bar
 from pprs_dynamics.report.terminal import shown
 
 
@@ -31,15 +31,12 @@ def adopt_what_was_found(
     """
     base = check_output(options.output, options.model)
     book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
-                   dict(zip(options.validate, validate, strict=True)))
-    columns = (TextColumn('{task.description}', markup=False), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=screen, transient=True) as bar:
-        task = bar.add_task('adopting', total=1.0)
-        outcome = adopt_all(
-            model, recordings, validate, book.entered,
-            lambda what, share: bar.update(task, description=what, completed=share), diagnosis)
+                         dict(zip(options.validate, validate, strict=True)))
+    with staged_bar(screen) as advance:
+        outcome = adopt_all(model, recordings, validate, book.entered, advance, diagnosis)
     for step in outcome.steps:
-        screen.print(adoption_view(step))
+        screen.print(adoption_view(step, details=True) if options.details
+                     else escape(headline(step)))
     screen.print(f'[bold]{outcome.ended}[/]: {escape(outcome.reason)}')
     if options.json:
         write_json(options.json, {**diagnosis.to_json(), 'adoption': outcome.to_json()})

@@ -13,6 +13,14 @@ LARGEST_SEED = 2**63 - 1
 MOST_DIGITS = 30  # of a whole number; Python refuses to read those of thousands
 
 
+DEFAULT_MODEL = 'config/paper.yaml'
+
+
+def add_details(parser: argparse.ArgumentParser) -> None:
+    """Declare --details."""
+    parser.add_argument('--details', action='store_true', help='print all there is to say')
+
+
 def number(lower: float, upper: float, unit: str = '', above: bool = False,
            ) -> Callable[[str], float]:
     """Return a reader of numbers from `lower`, or above it, to `upper`."""

@@ -6,11 +6,12 @@ import argparse
 
 from rich.markup import escape
 
-from pprs_dynamics.commands.arguments import PAGE, output_file
+from pprs_dynamics.commands.arguments import DEFAULT_MODEL, PAGE, add_details, output_file
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import localise
+from pprs_dynamics.diagnosis.sentences import GivenFiles
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.comparison_page import comparison_page
 from pprs_dynamics.report.progress import progress_bar
@@ -18,12 +19,13 @@ from pprs_dynamics.report.tables import comparison_table
 from pprs_dynamics.report.terminal import console, shown
 from pprs_dynamics.residuals.measuring import measure_residuals
 
-MOST_SHOWN = 8
+MOST_SHOWN = 3  # places without --details
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser)
+    add_details(parser)
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
                         help='write a page with all figures')
 
@@ -40,15 +42,23 @@ def run(options: argparse.Namespace) -> int:
     comparison = compare(residuals, where)
     screen.print(comparison_table(comparison))
     screen.print(escape(comparison.verdict))
-    for number, statement in enumerate(where.statements[:MOST_SHOWN], start=1):
+    told = comparison.where if options.details else comparison.where[:MOST_SHOWN]
+    for number, statement in enumerate(told, start=1):
         screen.print(f'{number}. {escape(statement.text)}')
-    if not where.statements:
+    if not told:
         screen.print('Nowhere in particular: nothing stands out against noise.')
-    if len(where.statements) > MOST_SHOWN:
-        screen.print(f'… and {len(where.statements) - MOST_SHOWN} more, in --json and --report')
+    if len(comparison.where) > len(told):
+        screen.print(f'… and {len(comparison.where) - len(told)} more, with --details, --json or '
+                     '--report')
+    if options.details:
+        for drive in comparison.drives.values():
+            screen.print(escape(drive.verdict))
     if options.json:
         write_json(options.json, {**comparison.to_json(), 'verdict': comparison.verdict})
     if options.report:
-        page = comparison_page(model, recordings, residuals, comparison, notes)
+        files = GivenFiles(tuple(options.recordings), (),
+                           '' if options.model == DEFAULT_MODEL else str(options.model))
+        page = comparison_page(model, recordings, residuals, comparison, notes,
+                               files.command('diagnose', '--report', 'why.html'))
         screen.print(f'page: {shown(page.write(options.report))}')
     return 0

@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.commands.adopt_all import adopt_what_was_found
-from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
+from pprs_dynamics.commands.arguments import (
+    DEFAULT_MODEL,
+    MODEL,
+    PAGE,
+    add_details,
+    output_file,
+)
+from pprs_dynamics.commands.diagnosis_cache import diagnosis_key, keep
 from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
@@ -15,7 +22,8 @@ from pprs_dynamics.commands.recordings import (
     read_validation,
 )
 from pprs_dynamics.diagnosis.diagnose import diagnose
-from pprs_dynamics.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.diagnosis.rivals import rival_effects
+from pprs_dynamics.diagnosis.sentences import GivenFiles, word_diagnosis
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.diagnosis_page import diagnosis_page
@@ -33,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser)
     add_validation(parser)
+    add_details(parser)
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
                         help='write a page with all figures')
     parser.add_argument('--adopt-all', action='store_true',
@@ -50,15 +59,19 @@ def run(options: argparse.Namespace) -> int:
     validate = read_validation(options, screen, model, recordings)
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
-    words = word_diagnosis(diagnosis)
-    screen.print(diagnosis_view(diagnosis, words))
+    keep(diagnosis_key(model, options.recordings, options.topic), diagnosis)
+    rivals = rival_effects(diagnosis)
+    words = word_diagnosis(diagnosis, GivenFiles(
+        tuple(options.recordings), tuple(options.validate),
+        '' if options.model == DEFAULT_MODEL else str(options.model)), rivals)
+    screen.print(diagnosis_view(diagnosis, words, options.details))
     if options.json:
         write_json(options.json, diagnosis.to_json())
     if options.report:
         with progress_bar(screen, 'page') as progress:
             after, _ = measure_residuals(diagnosis.adopted, recordings, progress)
             page = diagnosis_page(diagnosis, words, after, [one.name for one in recordings],
-                                  [one.name for one in validate])
+                                  [one.name for one in validate], rivals)
         screen.print(f'page: {shown(page.write(options.report))}')
     if options.adopt_all:
         return adopt_what_was_found(options, model, recordings, validate, diagnosis, screen)

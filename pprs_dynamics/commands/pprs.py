@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import NoReturn
 
 from pprs_dynamics import __version__
-from pprs_dynamics.commands.arguments import JSON, output_file
+from pprs_dynamics.commands.arguments import DEFAULT_MODEL, JSON, output_file
 from pprs_dynamics.commands.streams import lasting_output
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.plain_text import displayed
@@ -86,8 +86,8 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     for name in COMMANDS:
         summary = _summary(name)
         command = commands.add_parser(name, help=summary, description=summary)
-        command.add_argument('--model', metavar='FILE', default='config/paper.yaml',
-                             help='model file (default: the paper\'s robot, config/paper.yaml)')
+        command.add_argument('--model', metavar='FILE', default=DEFAULT_MODEL,
+                             help=f'model file (default: the paper\'s robot, {DEFAULT_MODEL})')
         command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
                              help='write the result as JSON too')
         if name in given:

@@ -16,7 +16,8 @@ from scipy.stats import norm, rankdata
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.statements import Statement, word_scatter, word_statement
 from pprs_dynamics.parallel import each
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.selection.candidates import Prices, UnknownCandidate

@@ -48,7 +48,7 @@ def percent(share: float) -> str:
     """Return a share in percent, with two digits below 10 %; 'none' for NaN."""
     if not isfinite(share):
         return 'none'
-    return f'{100 * share:.0f} %' if abs(share) >= 0.0995 else f'{plain(100 * share, 2)} %'
+    return f'{100 * share:.0f}%' if abs(share) >= 0.0995 else f'{plain(100 * share, 2)}%'
 
 
 def change(before: float, after: float) -> str:

@@ -27,9 +27,10 @@ from pprs_dynamics.regression.base_columns import (
     ReversalShape,
     present_values,
 )
-from pprs_dynamics.regression.design import Design, FullRate, Rows, Term
+from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.platform_sensitivities import ChunkSensitivities
 from pprs_dynamics.regression.sensitivities import DRIVE_WIDTHS
+from pprs_dynamics.regression.terms import FullRate, Rows, Term
 from pprs_dynamics.residuals.residuals import Residuals
 
 HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow

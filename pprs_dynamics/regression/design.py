@@ -31,7 +31,6 @@ from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.model.axis_model import AxisModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel, Forces
@@ -55,6 +54,7 @@ from pprs_dynamics.regression.sensitivities import (
     Sensitivities,
     reversal_columns,
 )
+from pprs_dynamics.regression.terms import FullRate, Point, Term
 from pprs_dynamics.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.residuals.residuals import Residuals
 
@@ -64,97 +64,6 @@ FREE = 1e-6  # prior precision of what is not known beforehand
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
 TURNED, LEAST_MOVING = 2.0, 0.05
-Rows = Mapping[int, Array]
-"""Columns by drive, (k, M) each; drives that are not in it feel nothing."""
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """One way in which an effect may be there: on one drive, or in the structure; one shape.
-
-    Parameters
-    ----------
-    effect : type of CatalogueEffect
-    drive : int or None
-        On which it sits.
-    shape : mapping of str to float
-    rows : dict of drive to (k, M) array
-        One row per coefficient [N].
-    bare : dict of drive to (k, M) array, optional
-        The rows if friction did not follow the loads that the effect adds.
-    """
-
-    effect: type[CatalogueEffect]
-    drive: int | None
-    shape: Mapping[str, float]
-    rows: Rows
-    bare: Rows | None = None
-
-    @property
-    def is_fixed(self) -> bool:
-        """True where the only row has the coefficient 1: its shape says it all."""
-        return not self.effect.coefficients
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Coefficients of the rows; none where the only row has the coefficient 1."""
-        return tuple(c.name for c in self.effect.coefficients)
-
-
-@dataclass(frozen=True)
-class FullRate:
-    """What the drives did at every sample of a recording, in segments; (N, D) arrays.
-
-    `effort` is what the model's drives apply, before any sensor; `effort_measured` the
-    recording's; `start` the time at which the recording began [s].
-    """
-
-    time: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
-    direction: Array
-    guide_load: Array
-    effort: Array
-    effort_measured: Array
-    segments: tuple[slice, ...]
-    treat: Treatment
-    start: float
-
-    def samples(self, part: slice, drive: int, memory: object = None) -> DriveSamples:
-        """Return one drive in one segment."""
-        return DriveSamples(
-            self.time[part], self.position[part, drive], self.velocity[part, drive],
-            self.acceleration[part, drive], self.direction[part, drive],
-            self.guide_load[part, drive], memory)
-
-
-@dataclass(frozen=True)
-class PlacedEffect:
-    """An effect on a drive or in the structure, with all its coefficients by name."""
-
-    effect: type[CatalogueEffect]
-    drive: int | None
-    shape: Mapping[str, float]
-    coefficients: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Point:
-    """Where forces are linear: a model, and what makes it differ from the given one.
-
-    Parameters
-    ----------
-    model : ForceModel
-    base : (P,) array
-        Coefficients of the base columns; those of reversals are 0.
-    effects : tuple of PlacedEffect
-        What it has beside the given model.
-    """
-
-    model: ForceModel
-    base: Array
-    effects: tuple[PlacedEffect, ...] = ()
 
 
 @dataclass

@@ -18,10 +18,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.regression.base_columns import BaseColumn
+from pprs_dynamics.regression.normal_equations import Block, NormalEquations, term_gains
 from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
@@ -29,30 +29,6 @@ from pprs_dynamics.residuals.residuals import Residuals
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less; rounds are bounded.
 CONVERGED, MOST_ROUNDS, NOISE_STEPS = 0.01, 40, 60
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Columns of one term, transformed, with the prior of their coefficients.
-
-    Parameters
-    ----------
-    rows : mapping of drive to (k, n) array
-        DCT coefficients [N]; drives that are not in it feel nothing.
-    precision : (k, k) array
-        Of the Gaussian prior about 0.
-    is_fixed : bool
-        True where the only row has the coefficient 1.
-    """
-
-    rows: Mapping[int, Array]
-    precision: Array
-    is_fixed: bool = False
-
-    @property
-    def size(self) -> int:
-        """Number of coefficients that are fitted."""
-        return 0 if self.is_fixed else len(self.precision)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +95,7 @@ class Regression:
         self.base = {d: series.transform(np.stack(
             [self.columns[k].rows[d][series.index] for k in self.base_index[d]] + [series.error]))
             for d, series in self.series.items()}
-        self._base_products = {d: self.series[d].products(rows, rows)
+        self.base_products = {d: self.series[d].products(rows, rows)
                                for d, rows in self.base.items()}
         self._products: dict[tuple[Block, Block | None, int], Array] = {}
         self.error_scale = error_scale or {
@@ -185,7 +161,7 @@ class Regression:
         start : (D, J + 1) array, optional
             Amplitudes of the noise to start from.
         """
-        system = _System(self, blocks)
+        system = NormalEquations(self, blocks)
         shapes = self.noise_shapes
         if start is None:
             start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
@@ -202,7 +178,7 @@ class Regression:
 
     def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
         """Return the fit of blocks under given noise."""
-        system = _System(self, blocks)
+        system = NormalEquations(self, blocks)
         solution = system.solve(self.noise_shapes.spectrum(amplitudes), self.counts)
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         solution.deviance, solution.squares, system.places)
@@ -285,151 +261,3 @@ class Regression:
             taken[:, index] += known
         plain = np.diag(S).copy()
         return S - taken @ fit.covariance @ taken.T, b, plain
-
-
-def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
-    """Return by how much the deviance falls with each of n terms, (n,).
-
-    Parameters
-    ----------
-    S : (n, k, k) array
-        Whitened sums of products of the rows, less what is fitted already.
-    b : (n, k) array
-        Whitened sums of products with what is left.
-    precision : (n, k, k) array
-        Of the prior.
-    is_fixed : bool
-        True where the coefficient is 1.
-    """
-    if is_fixed:
-        fixed: Array = 2 * b[:, 0] - S[:, 0, 0]
-        return fixed
-    posterior = (S + S.transpose(0, 2, 1)) / 2 + precision
-    # What is fitted already can take all of a row, to rounding; then only the prior is left.
-    floor = 1e-6 * np.einsum('nkk->nk', precision)
-    diagonal = np.einsum('nkk->nk', posterior)
-    np.einsum('nkk->nk', posterior)[:] = np.maximum(diagonal, floor)
-    scale = 1 / np.sqrt(np.einsum('nkk->nk', posterior))
-    scaled = posterior * scale[:, :, None] * scale[:, None, :]
-    values, axes = np.linalg.eigh(scaled)
-    kept = values > 1e-7
-    along = np.einsum('nkj,nk->nj', axes, b * scale)
-    quadratic = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
-    log_det = (np.sum(np.log(np.maximum(values, 1e-7)), axis=1) - 2 * np.sum(np.log(scale), axis=1)
-               - np.linalg.slogdet(precision)[1])
-    gains: Array = quadratic - log_det
-    return gains
-
-
-class _DriveSystem:
-    """Band sums of one drive's columns with each other and with the error."""
-
-    def __init__(self, regression: Regression, d: int, blocks: Sequence[Block],
-                 places: Mapping[Block, slice]) -> None:
-        felt = [block for block in blocks if d in block.rows]
-        fixed = [block for block in felt if block.is_fixed]
-        free = [block for block in felt if not block.is_fixed]
-        base = regression._base_products[d]
-        count, first = base.shape[0], base.shape[1] - 1
-        size = first + sum(block.size for block in free)
-        gram = np.empty((count, size, size))
-        side = np.empty((count, size))
-        gram[:, :first, :first] = base[:, :-1, :-1]
-        side[:, :first] = base[:, :-1, -1]
-        squares = base[:, -1, -1].copy()
-        index = [regression.base_index[d]]
-        at = first
-        spots: list[tuple[Block, slice]] = []
-        for block in free:
-            spot = slice(at, at + block.size)
-            with_base = regression.products(block, None, d)
-            gram[:, spot, :first] = with_base[:, :, :-1]
-            gram[:, :first, spot] = with_base[:, :, :-1].transpose(0, 2, 1)
-            side[:, spot] = with_base[:, :, -1]
-            for other, place in [*spots, (block, spot)]:
-                pair = regression.products(block, other, d)
-                gram[:, spot, place] = pair
-                gram[:, place, spot] = pair.transpose(0, 2, 1)
-            spots.append((block, spot))
-            index.append(np.arange(places[block].start, places[block].stop))
-            at += block.size
-        for number, block in enumerate(fixed):
-            with_base = regression.products(block, None, d)[:, 0]
-            side[:, :first] -= with_base[:, :-1]
-            squares += regression.products(block, block, d)[:, 0, 0] - 2 * with_base[:, -1]
-            for other in fixed[:number]:
-                squares += 2 * regression.products(block, other, d)[:, 0, 0]
-            for other, place in spots:
-                side[:, place] -= regression.products(other, block, d)[:, :, 0]
-        self.index = np.concatenate(index)
-        self.gram, self.side, self.squares = gram, side, squares
-        self._flat = gram.reshape(count, -1)
-
-    def weighted(self, weights: Array) -> tuple[Array, Array]:
-        """Return X^T S^-1 X and X^T S^-1 y."""
-        size = len(self.index)
-        return (weights @ self._flat).reshape(size, size), weights @ self.side
-
-    def left(self, coefficients: Array) -> Array:
-        """Return the sums of squares that coefficients leave in the bands, (B,)."""
-        explained = self.gram @ coefficients
-        left: Array = self.squares - 2 * self.side @ coefficients + explained @ coefficients
-        return np.maximum(left, 1e-12 * self.squares)
-
-    def leverage(self, covariance: Array, weights: Array) -> Array:
-        """Return the degrees of freedom spent in the bands, (B,)."""
-        spent: Array = weights * (self._flat @ covariance.ravel())
-        return spent
-
-
-@dataclass(frozen=True)
-class _Solution:
-    coefficients: Array
-    covariance: Array
-    deviance: float
-    squares: Array
-    leverage: Array
-
-
-class _System:
-    """The normal equations of all drives."""
-
-    def __init__(self, regression: Regression, blocks: Sequence[Block]) -> None:
-        place = len(regression.precision)
-        self.places: dict[Block, slice] = {}
-        precision = [np.diag(regression.precision)]
-        for block in blocks:
-            self.places[block] = slice(place, place + block.size)
-            place += block.size
-            if not block.is_fixed:
-                precision.append(block.precision)
-        self.precision = np.zeros((place, place))
-        self.log_precision, at = 0.0, 0
-        for part in precision:
-            self.precision[at:at + len(part), at:at + len(part)] = part
-            at += len(part)
-            if len(part):
-                self.log_precision += float(np.linalg.slogdet(part)[1])
-        self.drives = [_DriveSystem(regression, d, blocks, self.places) for d in regression.drives]
-
-    def solve(self, spectra: Array, counts: Array) -> _Solution:
-        """Return the solution under noise spectra (D, B)."""
-        H, b = self.precision.copy(), np.zeros(len(self.precision))
-        weights = 1 / spectra
-        for k, drive in enumerate(self.drives):
-            gram, side = drive.weighted(weights[k])
-            H[np.ix_(drive.index, drive.index)] += gram
-            b[drive.index] += side
-        scale = 1 / np.sqrt(np.einsum('ii->i', H))
-        factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)))
-        coefficients = scale * cho_solve(factor, scale * b)
-        covariance = cho_solve(factor, np.eye(len(H))) * np.outer(scale, scale)
-        squares = np.stack([drive.left(coefficients[drive.index]) for drive in self.drives])
-        leverage = np.stack([
-            drive.leverage(covariance[np.ix_(drive.index, drive.index)], weights[k])
-            for k, drive in enumerate(self.drives)])
-        log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
-        deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
-                         + coefficients @ self.precision @ coefficients
-                         + log_det - self.log_precision)
-        return _Solution(coefficients, covariance, deviance, squares, leverage)

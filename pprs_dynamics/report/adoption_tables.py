@@ -12,11 +12,39 @@ from rich.panel import Panel
 from rich.table import Table
 
 from pprs_dynamics.adoption.adopt import VALIDATION, Adoption
+from pprs_dynamics.diagnosis.quantities import newtons, plain, with_uncertainty
+
+MOST_SHOWN = 6  # values without --details
+MOST_REMARKS = 2
 
 
-def adoption_view(answer: Adoption) -> Group:
-    """Return what the terminal shows, most important first."""
-    return Group(*_parts(answer))
+def adoption_view(answer: Adoption, details: bool = False) -> Group:
+    """Return what the terminal shows, most important first; all there is with `details`."""
+    return Group(*(_parts if details else _brief)(answer))
+
+
+def _brief(answer: Adoption) -> Iterator[Any]:
+    """Yield the answer, the fall of the error and the first values, in at most 20 lines."""
+    yield _verdict(answer)
+    held = 'held out' if answer.held_out_on == VALIDATION else 'held-out blocks'
+    for label, before, after in (('recordings', answer.error_before, answer.error_after),
+                                 (held, answer.held_out_before, answer.held_out_after)):
+        yield f'  error on {label}: {plain(before)} → {plain(after)} N'
+    yield f'  noise: {newtons(answer.noise_floor)}'
+    rows = parameter_rows(answer)
+    for key, text in rows[:MOST_SHOWN]:
+        yield f'  {escape(key)} = {escape(text)}'
+    if len(rows) > MOST_SHOWN:
+        yield f'  … and {len(rows) - MOST_SHOWN} more, with --details'
+    for remark in answer.remarks[:MOST_REMARKS]:
+        yield f'[yellow]![/] {escape(remark)}'
+
+
+def _verdict(answer: Adoption) -> Panel:
+    word, colour = (('refused', 'red') if not answer.adopted else
+                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
+    return Panel(escape(headline(answer)), title=f'[bold {colour}]{word}[/]', border_style=colour,
+                 title_align='left')
 
 
 def headline(answer: Adoption) -> str:
@@ -46,17 +74,13 @@ def error_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
 
 
 def _parts(answer: Adoption) -> Iterator[Any]:
-    word, colour = (('refused', 'red') if not answer.adopted else
-                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
-    yield Panel(escape(headline(answer)), title=f'[bold {colour}]{word}[/]', border_style=colour,
-                title_align='left')
+    yield _verdict(answer)
     yield _table('Error, rms over samples and drives',
                  ('on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
-                 f'noise leaves {answer.noise_floor:.4f} N')
+                 f'the noise is {newtons(answer.noise_floor)}')
     rows = parameter_rows(answer)
     if rows:
-        yield _table(f'{answer.effect}, ± two standard deviations',
-                     ('parameter', 'value', '±', 'unit'), rows)
+        yield _table(f'{answer.effect}, ± two standard deviations', ('parameter', 'value'), rows)
     if answer.adopted and answer.calibrated:
         clear = [one for one in answer.calibrated if abs(one.after - one.before) > 2 * one.std]
         told = f', clearly {", ".join(one.label for one in clear)}' if clear else ''

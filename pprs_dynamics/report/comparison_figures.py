@@ -274,4 +274,5 @@ def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:
         parts.append((np.append(time, time[-1:]), *(np.append(one, gap) for one in curves)))
     time, *joined = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     # A screen shows no more than single precision holds.
-    return time, *(one.astype(np.float32) for one in joined)
+    shown: list[Any] = [one.astype(np.float32) for one in joined]
+    return time, *shown

@@ -14,51 +14,89 @@ from rich.table import Table
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import RankedEffect
-from pprs_dynamics.diagnosis.quantities import name_drives
-from pprs_dynamics.diagnosis.sentences import Finding, FittedValue, Sentences, fitted_values
+from pprs_dynamics.diagnosis.quantities import name_drives, plain
+from pprs_dynamics.diagnosis.sentences import (
+    Finding,
+    FittedValue,
+    Sentences,
+    fitted_values,
+    set_rows,
+)
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give
+MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 
 
-def diagnosis_view(diagnosis: Diagnosis, words: Sentences) -> Group:
-    """Return all that the terminal shows, most important first."""
-    return Group(*_parts(diagnosis, words))
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False) -> Group:
+    """Return what the terminal shows, most important first; all there is with `details`."""
+    return Group(*(_parts if details else _brief)(diagnosis, words))
+
+
+def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
+    yield _verdict(diagnosis, words)
+    if diagnosis.effects:
+        yield _plain_table(('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
+                           _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
+        values = _joined(fitted_values(diagnosis))
+        for effect, drive, text in values[:MOST_LISTED]:
+            yield f'  {escape(f"{effect} on {drive}" if drive else effect)}: {escape(text)}'
+        if len(values) > MOST_LISTED:
+            yield f'  … and values of {len(values) - MOST_LISTED} more'
+    if len(diagnosis.sets) > 1:
+        text, cost = set_rows(diagnosis)[1]
+        yield f'[bold]Runner-up[/] {escape(text)}, cost {cost}'
+    for line in words.within_model_error[:1]:
+        yield escape(line)
+    if words.warnings:
+        yield f'[yellow]![/] {escape(words.warnings[0])}'
+    yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
+    if words.command:
+        yield f'  [bold cyan]{escape(words.command)}[/]'
+    yield '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
+
+
+def _verdict(diagnosis: Diagnosis, words: Sentences) -> Panel:
+    colour = COLOURS[diagnosis.verdict]
+    return Panel(escape(words.headline), title=f'[bold {colour}]{diagnosis.verdict}[/]',
+                 border_style=colour, title_align='left')
 
 
 def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
-    colour = COLOURS[diagnosis.verdict]
-    yield Panel(escape(words.headline), title=f'[bold {colour}]{diagnosis.verdict}[/]',
-                border_style=colour, title_align='left')
+    yield _verdict(diagnosis, words)
     if diagnosis.effects:
-        yield _effects(diagnosis)
-    for number, finding in enumerate((*words.effects, *words.unexplained), start=1):
+        held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
+                else 'blocks of the same recordings')
+        yield _table(f'Those with most evidence first; held out: {held}',
+                     ('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
+                     _effect_rows(diagnosis), right=(2, 3, 4))
+    for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
         yield _finding(number, finding)
     values = fitted_values(diagnosis)
     if len({(one.effect, one.drive) for one in values}) > MOST_LISTED:
-        yield _table('Parameters, ± two standard deviations', ('effect', 'drive', 'values'),
-                     _joined(values))
+        yield _table('Values, ± two standard deviations', ('effect', 'drive', 'values'),
+                     [tuple(map(escape, row)) for row in _joined(values)])
+    if diagnosis.sets:
+        yield _table('The best sets of effects, and their costs above the best', ('cost', 'set'),
+                     [(cost, escape(text)) for text, cost in set_rows(diagnosis)])
     if diagnosis.candidates:
-        yield _table('Candidates for the first place',
-                     ('effect', 'on', 'evidence', 'error after [N]'),
+        yield _table('Each effect alone', ('effect', 'on', 'evidence', 'error after [N]'),
                      [_ranked(one, diagnosis) for one in diagnosis.candidates], right=(2, 3))
     yield from _list('Within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
     yield from _list('Within model error', words.within_model_error, 'blue')
     yield from _list('Warnings', words.warnings, 'yellow')
-    yield f'[bold]Next[/] {escape(words.following)}'
+    yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
+    if words.command:
+        yield f'  [bold cyan]{escape(words.command)}[/]'
 
 
-def _effects(diagnosis: Diagnosis) -> Table:
-    held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
-            else 'blocks of the same recordings')
-    return _table(
-        f'In the order of adoption; held out: {held}',
-        ('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
-        [(one.name, sites(one.drives, diagnosis), _fall(one.error_before, one.error_after),
-          _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
-         for one in diagnosis.effects], right=(2, 3, 4))
+def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    return [(one.name, sites(one.drives, diagnosis), _fall(one.error_before, one.error_after),
+             _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
+            for one in diagnosis.effects]
 
 
 def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
@@ -92,12 +130,12 @@ def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis) -> str:
 
 def _ranked(one: RankedEffect, diagnosis: Diagnosis) -> tuple[str, ...]:
     return (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
-            f'{one.error_after:.4f}')
+            f'{one.error_after:.3f}')
 
 
 def _fall(before: float, after: float) -> str:
     colour = 'green' if after < before else 'red'
-    return f'{before:.3g} → [{colour}]{after:.3g}[/]'
+    return f'{plain(before)} → [{colour}]{plain(after)}[/]'
 
 
 def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
@@ -113,6 +151,18 @@ def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
 def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
            right: Sequence[int] = ()) -> Table:
     table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
+    for number, heading in enumerate(headings):
+        table.add_column(escape(heading), justify='right' if number in right else 'left',
+                         no_wrap=number in right or number == 0)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]],
+                 right: Sequence[int] = ()) -> Table:
+    """Return a table without lines and title."""
+    table = Table(box=None, padding=(0, 1))
     for number, heading in enumerate(headings):
         table.add_column(escape(heading), justify='right' if number in right else 'left',
                          no_wrap=number in right or number == 0)

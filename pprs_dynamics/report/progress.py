@@ -9,11 +9,34 @@ from typing import Any
 
 @contextmanager
 def progress_bar(console: Any, what: str) -> Iterator[Callable[[float, float], None]]:
-    """Show a bar while the block lasts; call the given function with (done, total)."""
+    """Show a bar while the block lasts; call the given function with (done, total).
+
+    It never goes back, whatever it is called with.
+    """
+    with staged_bar(console) as advance:
+        yield lambda done, total: advance(what, done / total if total else 0.0)
+
+
+@contextmanager
+def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
+    """Show a bar while the block lasts; call the given function with (stage, share done).
+
+    Each stage has a bar of its own in place of the one before; none goes back.
+    """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn('{task.description}', markup=False), BarColumn(),
                TextColumn('{task.percentage:3.0f} %'), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task, stage, furthest = None, '', 0.0
+
+        def advance(what: str, share: float) -> None:
+            nonlocal task, stage, furthest
+            if task is None or what != stage:
+                if task is not None:
+                    bar.remove_task(task)
+                task, stage, furthest = bar.add_task(what, total=1.0), what, 0.0
+            furthest = max(furthest, share)
+            bar.update(task, completed=furthest)
+
+        yield advance

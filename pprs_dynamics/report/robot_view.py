@@ -16,7 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.inverse_kinematics import JointPositions, joint_positions
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.report.page import plotly_objects
+from pprs_dynamics.report.page import Page, plotly_objects
 
 FRAMES = 60
 SLIDE, LIFT, PLATFORM, PATH = '#0072B2', '#009E73', '#E69F00', '#999999'
@@ -70,10 +70,9 @@ def write_robot_page(
     path: str | PathLike[str], model: DriveModel, motion: PlatformMotion, title: str,
 ) -> Path:
     """Write the animation as one HTML file that needs no network."""
-    file = Path(path)
-    animate_robot(model, motion, title).write_html(
-        file, include_plotlyjs=True, auto_play=False, full_html=True)
-    return file
+    page = Page(title)
+    page.figure(animate_robot(model, motion, title), 'The robot in motion; it plays on request.')
+    return page.write(path)
 
 
 def _rails(go: Any, model: DriveModel, joints: JointPositions, motion: PlatformMotion) -> list[Any]:

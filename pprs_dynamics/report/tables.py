@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from pprs_dynamics.diagnosis.comparison import Comparison
+from pprs_dynamics.diagnosis.quantities import percent
 from pprs_dynamics.measurement.recording import Summary
 from pprs_dynamics.model.reproduction import Claim
 
@@ -48,8 +49,8 @@ def _span(bounds: tuple[float, float] | None) -> str:
 
 def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
     """Return one row of text per drive, and one for all; the page and the terminal show them."""
-    return [(name, f'{drive.rms:.4f}', _percent(drive.relative), f'{drive.bias:+.4f}',
-             f'{drive.peak:.3f}', _percent(drive.explained_variance), f'{drive.noise_floor:.4f}',
+    return [(name, f'{drive.rms:.3f}', percent(drive.relative), f'{drive.bias:+.3f}',
+             f'{drive.peak:.3f}', percent(drive.explained_variance), f'{drive.noise_floor:.3f}',
              f'{drive.effective_samples:.0f} of {drive.samples}', drive.verdict)
             for name, drive in comparison.drives.items()]
 
@@ -60,15 +61,10 @@ def comparison_table(comparison: Comparison) -> Any:
     from rich.table import Table
 
     colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
-    table = Table(title='Measured minus model', caption=f'overall {comparison.rms:.4f} N rms, '
-                  f'{_percent(comparison.relative)}')
+    table = Table(box=None, padding=(0, 1))
     for heading in ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained',
                     'noise [N]'):
         table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
     for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
         table.add_row(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
     return table
-
-
-def _percent(share: float) -> str:
-    return 'none' if share != share else f'{share:.1%}'

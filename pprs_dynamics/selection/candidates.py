@@ -13,8 +13,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.regression.design import Term
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block
+from pprs_dynamics.regression.terms import Term
 from pprs_dynamics.selection.decisions import Decisions
 from pprs_dynamics.selection.patterns import Family, Pattern
 

@@ -26,7 +26,8 @@ from pprs_dynamics.regression.base_columns import (
     move_present,
     within,
 )
-from pprs_dynamics.regression.design import Design, PlacedEffect, Point
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.terms import PlacedEffect, Point
 from pprs_dynamics.selection.candidates import (
     CandidateSet,
 )

@@ -11,8 +11,10 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.regression.design import Design, Term, searched_in_drives
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression, term_gains
+from pprs_dynamics.regression.design import Design, searched_in_drives
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block, term_gains
+from pprs_dynamics.regression.terms import Term
 from pprs_dynamics.selection.candidates import Candidate, EffectCandidate, Placement, Prices
 
 

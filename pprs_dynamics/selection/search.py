@@ -8,54 +8,47 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain, combinations
+from itertools import combinations
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.design import Design
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.selection.candidates import (
     Candidate,
     CandidateSet,
     EffectCandidate,
     Placement,
-    Prices,
     UnknownCandidate,
     set_key,
 )
 from pprs_dynamics.selection.decisions import Decisions
-from pprs_dynamics.selection.library import Library
+from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
 from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
-SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
-LEAST_IMPROVEMENT = 0.1  # in cost, for which a search goes on
 # Lowest score of a proposal, and how much worse than the best a replacement may look at the best
 # one's noise: its own noise may favour it by about as much.
 PROPOSED, REPLACED = -12.0, 15.0
 
 SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
-Candidates = tuple[Candidate, ...]
 
 
-class Search:
+class Search(FittedSets):
     """A search over the candidates of one design.
 
     Parameters
     ----------
-    design : Design
-    decisions : Decisions
-    error_scale : mapping of drive to float, optional
-        See `Regression`.
+    design, decisions, error_scale
+        See `FittedSets`.
     progress : callable, optional
         Called with the share of the work that is done.
     with_unknown : bool
@@ -66,99 +59,36 @@ class Search:
                  error_scale: Mapping[int, float] | None = None,
                  progress: Callable[[float], None] | None = None,
                  with_unknown: bool = True) -> None:
-        self.design, self.decisions = design, decisions
-        self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
-        prices = Prices.of(self.regression, decisions)
-        self.library = Library(design, self.regression, prices)
-        self.patterns = ([PatternLibrary(self.regression, prices, d)
+        super().__init__(design, decisions, error_scale)
+        self.patterns = ([PatternLibrary(self.regression, self.prices, d)
                           for d in self.regression.drives] if with_unknown else [])
-        self.evaluated: dict[Hashable, CandidateSet] = {}
         self._report = progress or (lambda share: None)
-
-    @property
-    def best(self) -> CandidateSet:
-        """The set of lowest cost so far."""
-        return min(self.evaluated.values(), key=lambda found: found.cost)
 
     def run(self, start: Candidates = ()) -> CandidateSet:
         """Return the best set that the search reaches."""
         self.evaluate(())
         if start:
             self.refined(self.evaluate(start))
-        done = 1.0
-        while True:
-            done *= 0.7
-            self._report(1 - done)
-            before = self.best.cost
-            self._try(self._additions())
-            if self.best.cost > before - LEAST_IMPROVEMENT:
-                self._try(self._replacements())
-                if self.best.cost > before - LEAST_IMPROVEMENT:
-                    break
-            self._simplify()
+        # Effects first: a pattern of no catalogue stands only beside what effects explain.
+        self._descend(False, 0.0)
+        if self.patterns:
+            self._descend(True, 0.5)
         self._report(1.0)
         return self.best
 
-    def evaluate(self, candidates: Candidates, near: CandidateSet | None = None) -> CandidateSet:
-        """Return a set, fitted; one that was fitted before is not fitted again."""
-        key = set_key(candidates)
-        if key not in self.evaluated:
-            start = near.fit.amplitudes if near is not None else (
-                self.evaluated[frozenset()].fit.amplitudes if self.evaluated else None)
-            self.evaluated[key] = self._fitted(candidates, start)
-        return self.evaluated[key]
-
-    def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
-        blocks = [block for candidate in candidates for block in candidate.blocks]
-        fit = self.regression.fit(blocks, start)
-        doubtful = self._doubtful_blocks(candidates, fit)
-        if doubtful:
-            fit = self.regression.fit([*blocks, *chain(*doubtful.values())], fit.amplitudes)
-        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
-
-    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
-                         ) -> dict[Placement, tuple[Block, ...]]:
-        """Return columns for what effects leave open, in proportion to their fitted force.
-
-        Whether friction follows the loads that an effect adds; and how friction turns over. Each
-        has a coefficient of unit prior.
-        """
-        found = {}
-        for candidate in candidates:
-            for placement in candidate.placements if isinstance(candidate, EffectCandidate) else ():
-                c, blocks = fit.of(placement.block), []
-                if placement.bare is not None:
-                    rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
-                    blocks.append(Block(rows, np.eye(1)))
-                turning = self.library.turning_rows(placement)
-                if turning is not None:
-                    assert placement.drive is not None
-                    blocks.append(Block({placement.drive: np.tensordot(c, turning, 1)},
-                                        np.eye(turning.shape[1])))
-                if blocks:
-                    found[placement] = tuple(blocks)
-        return found
-
-    def _at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
-        """Return a smaller set under the noise of a larger one: what a replacement starts from."""
-        placements = {placement for candidate in candidates
-                      if isinstance(candidate, EffectCandidate)
-                      for placement in candidate.placements}
-        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in placements}
-        blocks = [block for candidate in candidates for block in candidate.blocks]
-        fit = self.regression.at([*blocks, *chain(*doubtful.values())], found.fit.amplitudes)
-        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
-
-    def price(self, candidates: Candidates, fit: JointFit) -> float:
-        """Return the price of all that was chosen, and of signs that are unphysical."""
-        total = 0.0
-        for candidate in candidates:
-            total += candidate.total_price
-            if isinstance(candidate, EffectCandidate):
-                total += sum(self.library.prices.of_signs(
-                    candidate.effect, placement.values(fit.of(placement.block)))
-                    for placement in candidate.placements)
-        return total
+    def _descend(self, with_patterns: bool, begin: float) -> None:
+        """Move from the best set to better neighbours until there is none."""
+        left = 0.5
+        while True:
+            left *= 0.7
+            self._report(begin + 0.5 - left)
+            before = self.best.cost
+            self._try(self._additions(with_patterns))
+            if self.best.cost > before - LEAST_IMPROVEMENT:
+                self._try(self._replacements())
+                if self.best.cost > before - LEAST_IMPROVEMENT:
+                    return
+            self._simplify()
 
     # Moves
 
@@ -178,7 +108,7 @@ class Search:
         unknown = sum(isinstance(candidate, UnknownCandidate) for candidate in candidates)
         return unknown <= MOST_UNKNOWN and len(candidates) - unknown <= MOST_EFFECTS
 
-    def _additions(self) -> list[tuple[Candidates, CandidateSet]]:
+    def _additions(self, with_patterns: bool) -> list[tuple[Candidates, CandidateSet]]:
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[tuple[Candidates, CandidateSet]] = []
         ranked = sorted(self.evaluated.values(), key=lambda one: one.cost)
@@ -188,7 +118,7 @@ class Search:
             if rank == 0:
                 fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
                 found += [(candidates, fast) for candidates in self.proposals(fast, REPLACEMENTS)]
-                for near in (base, fast) if self.patterns else ():
+                for near in (base, fast) if with_patterns else ():
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
                     found += [((*base.candidates, pattern), near) for pattern in patterns]
         return found
@@ -374,91 +304,9 @@ class Search:
                         yield self._exchanged(best, candidate, self.library.candidate(
                             effect, [*rest, other]))
 
-    def drop_cost(self, found: CandidateSet, placement: Placement) -> float:
-        """Return by how much the deviance rises without a placement, at the noise of a fit.
-
-        By the Savage-Dickey ratio of prior and posterior density at 0.
-        """
-        if placement.block.is_fixed:
-            return np.inf
-        place = found.fit.places[placement.block]
-        c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
-        return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
-                     + np.linalg.slogdet(placement.block.precision)[1])
-
     @staticmethod
     def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
         return tuple(new if c is old else c for c in found.candidates)
-
-    def refined(self, found: CandidateSet) -> CandidateSet:
-        """Return the set with all shapes moved by Gauss-Newton steps that lower the cost."""
-        for _ in range(SHAPE_ROUNDS):
-            moved = self._moved(found)
-            if moved is None:
-                return found
-            after = self.evaluate(moved, found)
-            if after.cost > found.cost - LEAST_IMPROVEMENT:
-                return found
-            found = after
-        return found
-
-    def _moved(self, found: CandidateSet) -> Candidates | None:
-        """Return candidates with shapes after one Gauss-Newton step."""
-        slopes = self.slopes(found)
-        if not slopes:
-            return None
-        fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
-                                 found.fit.amplitudes)
-        moved: dict[Placement, Placement] = {}
-        for placement, block in slopes:
-            effect, d = placement.term.effect, placement.drive
-            assert d is not None
-            assert issubclass(effect, DriveEffect)
-            shape = dict(placement.term.shape)
-            reach = self._reach(placement)
-            for parameter, step in zip(effect.shape, fit.of(block), strict=True):
-                limit = reach[parameter.name]
-                value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
-                shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
-            moved[placement] = self.library.placed(effect, d, shape, placement.names)
-        return tuple(
-            self.library.candidate(c.effect, [moved.get(one, one) for one in c.placements])
-            if isinstance(c, EffectCandidate) else c for c in found.candidates)
-
-    def slopes(self, found: CandidateSet) -> list[tuple[Placement, Block]]:
-        """Return derivatives by the shapes of a set, of unit prior, for the placements with any."""
-        slopes = []
-        for candidate in found.effects:
-            for placement in candidate.placements if candidate.effect.shape else ():
-                c = found.coefficients(placement)
-                if placement.names:
-                    every = np.zeros(len(placement.term.names))
-                    every[[placement.term.names.index(name) for name in placement.names]] = c
-                    c = every
-                assert placement.drive is not None
-                rows = self.design.slope_rows(placement.term, c)
-                slopes.append((placement, self.regression.block(
-                    {placement.drive: rows}, precision=np.eye(len(rows)))))
-        return slopes
-
-    def _reach(self, placement: Placement) -> dict[str, float]:
-        """Return how far each shape parameter may move at once: half the way between trials."""
-        effect, d = placement.term.effect, placement.drive
-        assert d is not None
-        assert issubclass(effect, DriveEffect)
-        trials = effect.trials(self.design.covered[d])
-        reach = {}
-        for parameter in effect.shape:
-            value = placement.term.shape[parameter.name]
-            known = np.array(sorted({trial[parameter.name] for trial in trials}))
-            if len(known) < 2:
-                reach[parameter.name] = 0.5
-                continue
-            at = int(np.clip(np.searchsorted(known, value), 1, len(known) - 1))
-            gap = float(known[at] - known[at - 1])
-            reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
-        return reach
-
 
 def _same(placement: Placement) -> Placement:
     return placement

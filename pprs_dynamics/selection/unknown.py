@@ -13,7 +13,8 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression, term_gains
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block, term_gains
 from pprs_dynamics.residuals.bins import LEAST_SHARE
 from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.selection.candidates import Prices, UnknownCandidate

@@ -1,0 +1,149 @@
+// Draws figures when they come into view, links their time axes, cursor and menus.
+'use strict';
+(() => {
+  const dark = matchMedia('(prefers-color-scheme: dark)');
+  // Lines that are dark on white, as they are drawn on black.
+  const ON_BLACK = {
+    '#666666': '#a9aeb5', '#1a1a1a': '#f2f2f2', '#0072B2': '#56B4E9', '#009E73': '#2fcf9f',
+    '#D55E00': '#ff8a3d', '#bbbbbb': '#6d737b', '#000000': '#ffffff', '#999999': '#c0c4c9',
+  };
+  const plots = [...document.querySelectorAll('.plot')];
+  const menus = [...document.querySelectorAll('select[data-menu]')];
+  const drawn = new Set();
+  let span = null;
+  let library = null;
+
+  function plotly() {
+    library ??= (async () => {
+      const packed = atob(document.getElementById('plotly').textContent);
+      const bytes = Uint8Array.from(packed, (letter) => letter.charCodeAt(0));
+      const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
+      const script = document.createElement('script');
+      script.textContent = await new Response(unpacked).text();
+      document.head.append(script);
+      return window.Plotly;
+    })();
+    return library;
+  }
+
+  function contentOf(plot) {
+    let text = document.getElementById(`${plot.id}-data`).textContent;
+    if (dark.matches) {
+      for (const [from, to] of Object.entries(ON_BLACK)) text = text.replaceAll(from, to);
+    }
+    const {data, layout, frames} = JSON.parse(text);
+    const ink = dark.matches ? '#ececec' : '#1a1a1a';
+    const grid = dark.matches ? '#3d4248' : '#e2e2e2';
+    const paper = dark.matches ? '#16181b' : '#ffffff';
+    const axis = {gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true};
+    layout.xaxis ??= {};
+    layout.yaxis ??= {};
+    for (const key of Object.keys(layout)) {
+      if (/^[xy]axis/.test(key)) layout[key] = {...axis, ...layout[key]};
+    }
+    Object.assign(layout, {paper_bgcolor: paper, plot_bgcolor: paper});
+    layout.font = {size: 13, color: ink, family: 'system-ui, sans-serif', ...layout.font};
+    layout.hoverlabel = {font: {size: 13}, ...layout.hoverlabel};
+    if (layout.scene) {
+      for (const name of ['xaxis', 'yaxis', 'zaxis']) {
+        layout.scene[name] = {gridcolor: grid, color: ink, backgroundcolor: paper,
+                              ...layout.scene[name]};
+      }
+    }
+    if (span && plot.dataset.time !== undefined) layout.xaxis.range = span;
+    show(data);
+    return {data, layout, frames};
+  }
+
+  // Traces of a drive are shown where the menus stand on it.
+  function show(data) {
+    const drive = menus[0]?.value;
+    const shown = data.map((trace) => !trace.meta?.drive || trace.meta.drive === drive);
+    data.forEach((trace, k) => { if (trace.meta?.drive) trace.visible = shown[k]; });
+    return shown;
+  }
+
+  async function draw(plot) {
+    if (drawn.has(plot)) return;
+    drawn.add(plot);
+    const Plotly = await plotly();
+    const {data, layout, frames} = contentOf(plot);
+    await Plotly.newPlot(plot, data, layout, {displayModeBar: false, responsive: true});
+    if (frames?.length) await Plotly.addFrames(plot, frames);
+    if (plot.dataset.time !== undefined) link(Plotly, plot);
+    plot.dataset.drawn = '';
+  }
+
+  function link(Plotly, plot) {
+    const cursor = document.createElement('div');
+    cursor.className = 'cursor';
+    cursor.hidden = true;
+    plot.append(cursor);
+    const others = () => plots.filter((one) => one !== plot && one.dataset.time !== undefined
+                                      && one.dataset.drawn !== undefined);
+    plot.on('plotly_relayout', (change) => {
+      const key = Object.keys(change).find((name) => /^xaxis\d*\.(range\[0\]|autorange)$/.test(name));
+      if (!key) return;
+      const now = key.endsWith('autorange') ? null : [...plot.layout.xaxis.range];
+      if (String(now) === String(span)) return;
+      span = now;
+      for (const one of others()) {
+        Plotly.relayout(one, now ? {'xaxis.range': now} : {'xaxis.autorange': true});
+      }
+    });
+    plot.on('plotly_hover', ({points}) => {
+      for (const one of [plot, ...others()]) {
+        const axis = one._fullLayout.xaxis;
+        const line = one.querySelector('.cursor');
+        line.style.left = `${axis._offset + axis.d2p(points[0].x)}px`;
+        line.hidden = one === plot;
+      }
+    });
+    plot.on('plotly_unhover', () => {
+      document.querySelectorAll('.cursor').forEach((line) => { line.hidden = true; });
+    });
+  }
+
+  for (const menu of menus) {
+    menu.addEventListener('change', async () => {
+      menus.forEach((one) => { one.value = menu.value; });
+      const Plotly = await plotly();
+      for (const plot of plots) {
+        if (plot.dataset.drawn !== undefined && plot.data.some((trace) => trace.meta?.drive)) {
+          Plotly.restyle(plot, {visible: show(plot.data)});
+        }
+      }
+    });
+  }
+
+  dark.addEventListener('change', async () => {
+    const Plotly = await plotly();
+    for (const plot of plots.filter((one) => one.dataset.drawn !== undefined)) {
+      const {data, layout} = contentOf(plot);
+      Plotly.react(plot, data, layout);
+    }
+  });
+
+  for (const button of document.querySelectorAll('.command button')) {
+    button.addEventListener('click', async () => {
+      const code = button.previousElementSibling;
+      try {
+        await navigator.clipboard.writeText(code.textContent);
+      } catch {
+        getSelection().selectAllChildren(code);
+        document.execCommand('copy');
+      }
+      button.textContent = 'Copied';
+    });
+  }
+
+  const seen = new IntersectionObserver((entries) => {
+    entries.filter((one) => one.isIntersecting).forEach((one) => {
+      seen.unobserve(one.target);
+      // The text is painted first.
+      requestAnimationFrame(() => setTimeout(() => draw(one.target)));
+    });
+  }, {rootMargin: '200px'});
+  plots.forEach((plot) => seen.observe(plot));
+  addEventListener('beforeprint', () => plots.forEach(draw));
+})();

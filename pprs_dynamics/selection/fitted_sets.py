@@ -1,0 +1,204 @@
+"""Sets of candidates, fitted: their cost, and shapes moved to where it is lowest."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.effects.drive_effect import DriveEffect
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block
+from pprs_dynamics.selection.allowance import share_of_allowance
+from pprs_dynamics.selection.candidates import (
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+    Placement,
+    Prices,
+    set_key,
+)
+from pprs_dynamics.selection.decisions import Decisions
+from pprs_dynamics.selection.library import Library
+
+SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
+LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
+
+Candidates = tuple[Candidate, ...]
+
+
+class FittedSets:
+    """All sets of one design that were fitted.
+
+    Parameters
+    ----------
+    design : Design
+    decisions : Decisions
+    error_scale : mapping of drive to float, optional
+        See `Regression`.
+    """
+
+    def __init__(self, design: Design, decisions: Decisions,
+                 error_scale: Mapping[int, float] | None = None) -> None:
+        self.design, self.decisions = design, decisions
+        self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
+        self.prices = Prices.of(self.regression, decisions)
+        self.library = Library(design, self.regression, self.prices)
+        self.evaluated: dict[Hashable, CandidateSet] = {}
+
+    @property
+    def best(self) -> CandidateSet:
+        """The set of lowest cost so far."""
+        return min(self.evaluated.values(), key=lambda found: found.cost)
+
+    def evaluate(self, candidates: Candidates, near: CandidateSet | None = None) -> CandidateSet:
+        """Return a set, fitted; one that was fitted before is not fitted again."""
+        key = set_key(candidates)
+        if key not in self.evaluated:
+            start = near.fit.amplitudes if near is not None else (
+                self.evaluated[frozenset()].fit.amplitudes if self.evaluated else None)
+            self.evaluated[key] = self._fitted(candidates, start)
+        return self.evaluated[key]
+
+    def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        fit = self.regression.fit(blocks, start)
+        doubtful = self._doubtful_blocks(candidates, fit)
+        if doubtful:
+            fit = self.regression.fit([*blocks, *chain(*doubtful.values())], fit.amplitudes)
+        found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+        return found if self._is_admissible(found) else replace(found, cost=np.inf)
+
+    def _is_admissible(self, found: CandidateSet) -> bool:
+        """Return whether every pattern is more than the lack of fit of the effects beside it."""
+        return all(share_of_allowance(self.design, self.regression, self.decisions, found,
+                                      candidate)[0] >= 1 for candidate in found.unknowns)
+
+    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
+                         ) -> dict[Placement, tuple[Block, ...]]:
+        """Return columns for what effects leave open, in proportion to their fitted force.
+
+        Whether friction follows the loads that an effect adds; and how friction turns over. Each
+        has a coefficient of unit prior.
+        """
+        found = {}
+        for candidate in candidates:
+            for placement in candidate.placements if isinstance(candidate, EffectCandidate) else ():
+                c, blocks = fit.of(placement.block), []
+                if placement.bare is not None:
+                    rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
+                    blocks.append(Block(rows, np.eye(1)))
+                turning = self.library.turning_rows(placement)
+                if turning is not None:
+                    assert placement.drive is not None
+                    blocks.append(Block({placement.drive: np.tensordot(c, turning, 1)},
+                                        np.eye(turning.shape[1])))
+                if blocks:
+                    found[placement] = tuple(blocks)
+        return found
+
+    def _at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
+        """Return a smaller set under the noise of a larger one: what a replacement starts from."""
+        placements = {placement for candidate in candidates
+                      if isinstance(candidate, EffectCandidate)
+                      for placement in candidate.placements}
+        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in placements}
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        fit = self.regression.at([*blocks, *chain(*doubtful.values())], found.fit.amplitudes)
+        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+
+    def price(self, candidates: Candidates, fit: JointFit) -> float:
+        """Return the price of all that was chosen, and of signs that are unphysical."""
+        total = 0.0
+        for candidate in candidates:
+            total += candidate.total_price
+            if isinstance(candidate, EffectCandidate):
+                total += sum(self.library.prices.of_signs(
+                    candidate.effect, placement.values(fit.of(placement.block)))
+                    for placement in candidate.placements)
+        return total
+
+    def drop_cost(self, found: CandidateSet, placement: Placement) -> float:
+        """Return by how much the deviance rises without a placement, at the noise of a fit.
+
+        By the Savage-Dickey ratio of prior and posterior density at 0.
+        """
+        if placement.block.is_fixed:
+            return np.inf
+        place = found.fit.places[placement.block]
+        c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
+        return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
+                     + np.linalg.slogdet(placement.block.precision)[1])
+
+    def refined(self, found: CandidateSet) -> CandidateSet:
+        """Return the set with all shapes moved by Gauss-Newton steps that lower the cost."""
+        for _ in range(SHAPE_ROUNDS):
+            moved = self._moved(found)
+            if moved is None:
+                return found
+            after = self.evaluate(moved, found)
+            if after.cost > found.cost - LEAST_IMPROVEMENT:
+                return found
+            found = after
+        return found
+
+    def _moved(self, found: CandidateSet) -> Candidates | None:
+        """Return candidates with shapes after one Gauss-Newton step."""
+        slopes = self.slopes(found)
+        if not slopes:
+            return None
+        fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
+                                 found.fit.amplitudes)
+        moved: dict[Placement, Placement] = {}
+        for placement, block in slopes:
+            effect, d = placement.term.effect, placement.drive
+            assert d is not None
+            assert issubclass(effect, DriveEffect)
+            shape = dict(placement.term.shape)
+            reach = self._reach(placement)
+            for parameter, step in zip(effect.shape, fit.of(block), strict=True):
+                limit = reach[parameter.name]
+                value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
+                shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
+            moved[placement] = self.library.placed(effect, d, shape, placement.names)
+        return tuple(
+            self.library.candidate(c.effect, [moved.get(one, one) for one in c.placements])
+            if isinstance(c, EffectCandidate) else c for c in found.candidates)
+
+    def slopes(self, found: CandidateSet) -> list[tuple[Placement, Block]]:
+        """Return derivatives by the shapes of a set, of unit prior, for the placements with any."""
+        slopes = []
+        for candidate in found.effects:
+            for placement in candidate.placements if candidate.effect.shape else ():
+                c = found.coefficients(placement)
+                if placement.names:
+                    every = np.zeros(len(placement.term.names))
+                    every[[placement.term.names.index(name) for name in placement.names]] = c
+                    c = every
+                assert placement.drive is not None
+                rows = self.design.slope_rows(placement.term, c)
+                slopes.append((placement, self.regression.block(
+                    {placement.drive: rows}, precision=np.eye(len(rows)))))
+        return slopes
+
+    def _reach(self, placement: Placement) -> dict[str, float]:
+        """Return how far each shape parameter may move at once: half the way between trials."""
+        effect, d = placement.term.effect, placement.drive
+        assert d is not None
+        assert issubclass(effect, DriveEffect)
+        trials = effect.trials(self.design.covered[d])
+        reach = {}
+        for parameter in effect.shape:
+            value = placement.term.shape[parameter.name]
+            known = np.array(sorted({trial[parameter.name] for trial in trials}))
+            if len(known) < 2:
+                reach[parameter.name] = 0.5
+                continue
+            at = int(np.clip(np.searchsorted(known, value), 1, len(known) - 1))
+            gap = float(known[at] - known[at - 1])
+            reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
+        return reach
