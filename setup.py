@@ -26,7 +26,8 @@ setup(
     maintainer='The pprs_dynamics founders',
     maintainer_email='pprs-dynamics@example.org',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed', 'report/*.css', 'report/*.js']},
+    package_data={package_name: ['py.typed', 'report/*.css', 'report/*.js',
+                                 'report/plotly-basic.*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

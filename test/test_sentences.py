@@ -23,7 +23,7 @@ from rich.console import Console
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
-from pprs_dynamics.diagnosis.partial import partial_residual, remaining_profile
+from pprs_dynamics.diagnosis.partial import partial_residual
 from pprs_dynamics.diagnosis.quantities import name_drives, with_uncertainty
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.effects.catalogue import CATALOGUE
@@ -76,7 +76,8 @@ def test_an_effect_is_told_with_drive_values_errors_and_its_card() -> None:
     card = CATALOGUE['coulomb_friction'].card
     assert finding.cause[1:-1] == card.causes[1:]
     assert finding.confirm[1:-1] == card.confirm[1:]
-    assert 'pprs adopt coulomb_friction' in words.following
+    assert words.command == ('pprs adopt coulomb_friction RECORDING --output '
+                             'with_coulomb_friction.yaml')
 
 
 def test_blocks_are_told_as_the_weaker_evidence_and_another_recording_is_not() -> None:
@@ -91,9 +92,12 @@ def test_blocks_are_told_as_the_weaker_evidence_and_another_recording_is_not() -
 def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
     worse = made_up_diagnosis(effects=(found_effect('hysteresis', held_out_after=0.3),))
     words = word_diagnosis(worse)
-    assert 'does not fall with hysteresis' in words.headline
+    assert 'lacks' not in words.headline
+    assert 'hysteresis lowers the error of the fit, but not the one on held-out' in words.headline
+    assert 'Fitted, but not confirmed: hysteresis' in words.effects[0].what
     assert 'do not adopt it' in words.effects[0].why
     assert words.following.startswith('Do not add hysteresis')
+    assert 'adopt' not in words.command
 
 
 def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:
@@ -106,16 +110,13 @@ def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:
 def test_ambiguous_names_all_and_says_how_to_tell_them_apart() -> None:
     words = word_diagnosis(ambiguous())
     assert 'base_tilt or external_wrench: this data cannot tell which' in words.headline
-    remark = ' '.join(words.effects[0].remarks)
-    assert 'pprs next-experiment' in remark
-    assert CATALOGUE['external_wrench'].card.confirm in remark
-    assert 'pprs next-experiment' in words.following
+    assert 'from external_wrench' in words.effects[0].remarks[0]
+    assert words.command == 'pprs next-experiment RECORDING --output next.csv'
 
 
 def test_adequate_claims_no_more_than_the_noise_allows() -> None:
     words = word_diagnosis(made_up_diagnosis('adequate'))
-    assert words.headline.startswith('Nothing is missing beyond noise: what the model leaves, '
-                                     '0.05 N rms')
+    assert words.headline.startswith('Nothing is missing beyond noise, which is 0.05 N rms.')
     assert 'could still hide' in words.headline
     assert words.effects == words.unexplained == ()
 
@@ -277,13 +278,12 @@ def test_the_shape_of_what_remains_is_the_one_that_was_planted() -> None:
     lead = residuals.variables['position'][:, 3]
     remaining = residuals.error.copy()
     remaining[:, 0] += 10 * lead
-    profile = remaining_profile(unknown(), 'slide_1', 'position of lift_1')
-    planted = remaining_profile(replace(unknown(), remaining=remaining), 'slide_1',
-                                'position of lift_1')
-    assert profile is not None
-    assert planted is not None
-    middle = (planted.edges[1:] + planted.edges[:-1]) / 2
-    np.testing.assert_allclose(planted.mean - profile.mean, 10 * middle, atol=0.03)
+    found = statement(variable='position of lift_1', limits=None)
+    before, planted = (unknown_picture(one, found) for one in (
+        unknown(), replace(unknown(), remaining=remaining)))
+    curve, shape = before.data[0], planted.data[0]
+    # Positions are drawn in mm.
+    np.testing.assert_allclose(shape.y - curve.y, 10 * shape.x / 1e3, atol=0.03)
 
 
 def test_the_page_escapes_what_comes_from_files() -> None:

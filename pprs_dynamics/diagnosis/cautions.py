@@ -91,8 +91,11 @@ def _filtered(design: Design) -> list[str]:
 def _unexcited(search: Search, best: CandidateSet) -> list[str]:
     """Return effects that this motion would not show even at a size that matters."""
     regression = search.regression
+    adopted = {candidate.name for candidate in best.effects}
     weak = []
     for term in search.design.structure:
+        if term.effect.name in adopted:
+            continue
         own = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])
         sizes = np.diag(own) * scales ** 2
@@ -103,7 +106,8 @@ def _unexcited(search: Search, best: CandidateSet) -> list[str]:
                         else f'{term.effect.name} ({", ".join(names)})')
     if not weak:
         return []
-    return [f'this motion hardly excites {", ".join(weak)}: whether they are there it cannot tell']
+    return [f'this motion hardly excites {", ".join(weak)}: it cannot tell whether '
+            f'{"it is" if len(weak) == 1 else "they are"} there']
 
 
 def _bounds(effects: Sequence[FoundEffect]) -> list[str]:

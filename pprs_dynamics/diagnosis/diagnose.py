@@ -52,7 +52,7 @@ class Diagnosis:
     ----------
     verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
     effects : tuple of FoundEffect
-        Those with most evidence first.
+        Those without which the error would be largest first.
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
     candidates, suspects : tuple of RankedEffect
@@ -196,15 +196,19 @@ class _Answer:
     def _effects(self, remaining: Array) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
         search = self.search
-        evidence = {c: self._without(c).cost - self.kept.cost for c in self.kept.effects}
-        ordered = sorted(self.kept.effects, key=lambda c: -evidence[c])
+        measured = search.regression.residuals.measured
+        without = {c: self._without(c) for c in self.kept.effects}
+        evidence = {c: one.total - self.kept.total for c, one in without.items()}
+        # First what lowers the error most: that matters first to whoever compensates it.
+        ordered = sorted(self.kept.effects, key=lambda c: -_rms(
+            measured - linear_prediction(search, without[c])))
         if not ordered:
             return []
         unknown = self.kept.unknowns
         steps = [search.evaluate((*ordered[:k], *unknown), self.kept)
                  for k in range(len(ordered))] + [self.kept]
         errors = [_rms(self.selection.first.design.residuals.error),
-                  *(_rms(search.regression.residuals.measured - linear_prediction(search, step))
+                  *(_rms(measured - linear_prediction(search, step))
                     for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.selection.first.design.given
@@ -240,7 +244,7 @@ class _Answer:
         statements = []
         libraries = {library.d: library for library in self.search.patterns}
         for candidate in self.kept.unknowns:
-            evidence = self._without(candidate).cost - self.kept.cost
+            evidence = self._without(candidate).total - self.kept.total
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
                     self.drives[d], libraries[d], candidate, self.kept.fit.of(block), evidence,

@@ -32,7 +32,7 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                           answer.noise_floor),
                  *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
                    for name in errors)],
-                'Error on the recordings, rms, before (grey) and with it (blue); dotted: the '
+                'Error on the recordings, rms [N], before (grey) and with it (blue); dotted: the '
                 'noise.')
     page.table(('error on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
                caption='What was fitted to, and what decides.')

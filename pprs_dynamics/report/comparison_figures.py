@@ -219,19 +219,23 @@ def over_workspace(residuals: Residuals) -> Any | None:
     if x is None or y is None or np.ptp(x) == 0 or np.ptp(y) == 0:
         return None
     edges = [np.linspace(axis.min(), axis.max(), MAP_CELLS + 1) for axis in (x, y)]
+    middles = [(axis[1:] + axis[:-1]) / 2 for axis in edges]
     figure = go.Figure()
     for drive, name in enumerate(residuals.drives):
         error = residuals.error[:, drive]
         known = np.isfinite(error)
         total = np.histogram2d(x[known], y[known], edges, weights=error[known] ** 2)[0]
         samples = np.histogram2d(x[known], y[known], edges)[0]
-        rms = np.sqrt(np.divide(total, samples, out=np.full_like(total, np.nan),
-                                where=samples > 0))
-        figure.add_trace(go.Heatmap(
-            x=1e3 * edges[0], y=1e3 * edges[1], z=rms.T.astype(np.float32), meta={'drive': name},
-            colorscale='Cividis', colorbar={'title': 'rms [N]'},
-            hovertemplate='x %{x:.1f} mm, y %{y:.1f} mm: %{z:.3f} N<extra></extra>'))
+        held = samples > 0
+        i, j = np.nonzero(held)
+        figure.add_trace(go.Scatter(
+            x=1e3 * middles[0][i], y=1e3 * middles[1][j], mode='markers', meta={'drive': name},
+            marker={'symbol': 'square', 'size': 15, 'colorscale': 'Cividis',
+                    'color': np.sqrt(total[held] / samples[held]).astype(np.float32),
+                    'colorbar': {'title': 'rms [N]'}},
+            hovertemplate='x %{x:.1f} mm, y %{y:.1f} mm: %{marker.color:.3f} N<extra></extra>'))
     figure.update_layout(height=460, xaxis_title='platform x [mm]', margin={**MARGIN, 't': 10},
+                         showlegend=False,
                          yaxis_title='platform y [mm]')
     figure.update_yaxes(scaleanchor='x')
     return figure

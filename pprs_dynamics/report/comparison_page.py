@@ -14,7 +14,7 @@ from pprs_dynamics.report.tables import comparison_rows
 from pprs_dynamics.residuals.residuals import Residuals
 
 HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained', 'noise [N]',
-            'independent samples', 'verdict')
+            'independent samples')
 FIRST = 3  # statements on the first screen
 
 
@@ -45,7 +45,7 @@ def comparison_page(
         with page.block():
             page.errors([ErrorRow(name, drive.rms, None, drive.noise_floor)
                          for name, drive in comparison.drives.items()],
-                        'Error, rms; dotted: the noise.')
+                        'Error, rms [N]; dotted: the noise.')
             if statements:
                 page.bullets([one.text for one in statements[:FIRST]], numbered=True)
             else:
@@ -64,6 +64,7 @@ def comparison_page(
     with page.fold('Drive by drive'):
         page.table(HEADINGS, comparison_rows(comparison),
                    [drive.grade for drive in comparison.drives.values()])
+        page.bullets([drive.verdict for drive in comparison.drives.values()])
     with page.fold('Over time'):
         page.text('The three worst seconds of each drive are marked. Drag to zoom, on all drives '
                   'at once; double-click to return. No peak is lost by thinning.', 'note')
@@ -98,7 +99,7 @@ def _by_drive(page: Page, residuals: Residuals, comparison: Comparison) -> None:
     if chart is not None:
         with page.fold('Over the workspace'):
             page.menu('Drive', names, worst)
-            page.figure(chart, 'Error, rms, over the platform\'s position.')
+            page.figure(chart, 'Error, rms [N], over the platform\'s position.')
     with page.fold('Spectrum of the error'):
         page.menu('Drive', names, worst)
         page.figure(figures.spectrum(residuals, comparison),

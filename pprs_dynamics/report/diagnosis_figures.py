@@ -144,5 +144,6 @@ def evidence_bars(diagnosis: Diagnosis) -> Any:
     reach = highest - lowest or 1.0
     figure.update_layout(
         height=90 + 26 * len(ranked), xaxis_title='evidence', margin={**MARGIN, 't': 15, 'r': 60},
+        yaxis={'automargin': True},
         xaxis={'range': [lowest - 0.12 * reach * (lowest < 0), highest + 0.15 * reach]})
     return figure

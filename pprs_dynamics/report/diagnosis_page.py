@@ -93,8 +93,8 @@ def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> Non
                      diagnosis.noise_floor)]
     rows += [ErrorRow(name, first.drives[d], last.drives[d] if fell else None, floors[name])
              for d, name in enumerate(diagnosis.residuals.drives) if name in floors]
-    page.errors(rows, 'Error, rms, before (grey) and with what was found (blue); dotted: the noise.'
-                if fell else 'Error, rms; dotted: the noise.')
+    page.errors(rows, 'Error, rms [N], before (grey) and with what was found (blue); dotted: the '
+                'noise.' if fell else 'Error, rms [N]; dotted: the noise.')
 
 
 def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
@@ -162,8 +162,8 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
         if len(steps) > 2:
             page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
                          for k, step in enumerate(steps)],
-                        'Error over all drives, rms, as one after the other is added; both ends '
-                        f'are what a comparison says, the noise is '
+                        'Error over all drives, rms [N], as one after the other is added; both '
+                        f'ends are what a comparison says, the noise is '
                         f'{newtons(diagnosis.noise_floor)}.')
         page.table(EFFECTS, [
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',

@@ -28,8 +28,8 @@ def history_page(name: str, steps: Sequence[Step]) -> Page:
     page.errors([ErrorRow('as given', first.error_before, first.held_out_before, noise),
                  *(ErrorRow(f'+ {step.effect}', step.error_after, step.held_out_after, noise)
                    for step in steps)],
-                'Error, rms, after each step. Grey: on the recordings; blue: on held-out data; '
-                'dotted: the noise.', ('recordings [N]', 'held out [N]'))
+                'Error, rms [N], after each step. Grey: on the recordings; blue: on held-out data; '
+                'dotted: the noise.', ('recordings', 'held out'))
     page.table(HEADINGS, step_rows(steps))
     for number, step in enumerate(steps, start=1):
         page.heading(f'{number}. {step.effect}')

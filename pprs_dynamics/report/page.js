@@ -15,9 +15,9 @@
 
   function plotly() {
     library ??= (async () => {
-      const packed = atob(document.getElementById('plotly').textContent);
-      const bytes = Uint8Array.from(packed, (letter) => letter.charCodeAt(0));
-      const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
+      const letters = document.getElementById('plotly').textContent;
+      const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
+      const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
       const script = document.createElement('script');
       script.textContent = await new Response(unpacked).text();
       document.head.append(script);
@@ -35,7 +35,7 @@
     const ink = dark.matches ? '#ececec' : '#1a1a1a';
     const grid = dark.matches ? '#3d4248' : '#e2e2e2';
     const paper = dark.matches ? '#16181b' : '#ffffff';
-    const axis = {gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true};
+    const axis = {gridcolor: grid, zerolinecolor: grid, linecolor: grid};
     layout.xaxis ??= {};
     layout.yaxis ??= {};
     for (const key of Object.keys(layout)) {
@@ -71,7 +71,7 @@
     await Plotly.newPlot(plot, data, layout, {displayModeBar: false, responsive: true});
     if (frames?.length) await Plotly.addFrames(plot, frames);
     if (plot.dataset.time !== undefined) link(Plotly, plot);
-    plot.dataset.drawn = '';
+    plot.dataset.drawn = Math.round(performance.now());
   }
 
   function link(Plotly, plot) {

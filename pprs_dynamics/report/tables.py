@@ -48,10 +48,10 @@ def _span(bounds: tuple[float, float] | None) -> str:
 
 
 def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
-    """Return one row of text per drive, and one for all; the page and the terminal show them."""
+    """Return one row of text per drive; the page and the terminal show them."""
     return [(name, f'{drive.rms:.3f}', percent(drive.relative), f'{drive.bias:+.3f}',
              f'{drive.peak:.3f}', percent(drive.explained_variance), f'{drive.noise_floor:.3f}',
-             f'{drive.effective_samples:.0f} of {drive.samples}', drive.verdict)
+             f'{drive.effective_samples:.0f} of {drive.samples}')
             for name, drive in comparison.drives.items()]
 
 

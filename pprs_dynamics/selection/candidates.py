@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import comb, log
+from math import comb, inf, log
 from typing import Any
 
 import numpy as np
@@ -176,16 +176,24 @@ class CandidateSet:
     ----------
     candidates : tuple of Candidate
     fit : JointFit
-    cost : float
-        Penalised deviance with all prices; lower is better.
+    total : float
+        Penalised deviance with all prices.
     doubtful : mapping of Placement to tuple of Block
         Columns for what the placements leave open, fitted with them.
+    is_admissible : bool
+        False where a pattern may be the lack of fit of the effects beside it.
     """
 
     candidates: tuple[Candidate, ...]
     fit: JointFit
-    cost: float
+    total: float
     doubtful: Mapping[Placement, tuple[Block, ...]] = field(default_factory=dict, repr=False)
+    is_admissible: bool = True
+
+    @property
+    def cost(self) -> float:
+        """What the search makes as low as possible: infinite for a set that may not be."""
+        return self.total if self.is_admissible else inf
 
     @cached_property
     def key(self) -> Hashable:

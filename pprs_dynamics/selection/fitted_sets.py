@@ -71,7 +71,7 @@ class FittedSets:
         if doubtful:
             fit = self.regression.fit([*blocks, *chain(*doubtful.values())], fit.amplitudes)
         found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
-        return found if self._is_admissible(found) else replace(found, cost=np.inf)
+        return replace(found, is_admissible=self._is_admissible(found))
 
     def _is_admissible(self, found: CandidateSet) -> bool:
         """Return whether every pattern is more than the lack of fit of the effects beside it."""

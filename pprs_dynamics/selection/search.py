@@ -36,7 +36,8 @@ REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
 # Lowest score of a proposal, and how much worse than the best a replacement may look at the best
 # one's noise: its own noise may favour it by about as much.
-PROPOSED, REPLACED = -12.0, 15.0
+# And how much of what is lost without it a replacement has to make good at that noise.
+PROPOSED, REPLACED, RECOVERED = -12.0, 15.0, 0.9
 
 SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
@@ -253,7 +254,7 @@ class Search(FittedSets):
                 rests.append((self._exchanged(best, candidate, less), placement.drive))
         for rest, drive in rests:
             base = self._at_noise_of(best, rest)
-            least = base.cost - best.cost - REPLACED
+            least = RECOVERED * (base.total - best.total) - REPLACED
             for candidates in self.proposals(base, REPLACEMENTS, drive, least):
                 yield candidates, best
         for candidate in best.effects:
