@@ -38,8 +38,8 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
     """Answers every valid trajectory with friction-compensated drive forces.
 
     A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
-    reason stands in `~/status` and in the log. When commands go stale, and when the node is
-    deactivated or ended, `timeout_action` is done once.
+    reason stands in `~/status` and in the log. When commands go stale, when an effect of another
+    package fails, and when the node is deactivated or ended, `timeout_action` is done once.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -232,8 +232,14 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
-        self._status.report('ERROR', rejection.code, rejection.text)
-        self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
+        text, watchdog = rejection.text, self._watchdog
+        if rejection.code == 'EFFECT' and watchdog is not None and watchdog.fresh:
+            # Not the message is wrong but the model: waiting for a better one would help nothing.
+            watchdog.stop()
+            self._counters['stale'] += 1
+            text = f'{text}; {self._do_timeout_action()}'
+        self._status.report('ERROR', rejection.code, text)
+        self.get_logger().warning(f'rejected, {rejection.code}: {text}', throttle_duration_sec=1.0)
 
     # --- stale commands -------------------------------------------------------------------------
 
@@ -267,7 +273,10 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
             self._joint_command.publish(answer_cdr.joint_state(
                 self.get_clock().now().nanoseconds, held.effort[0],
                 held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
-        return 'the last pose is held at rest' if action == HOLD_GRAVITY else 'forces are zero'
+        if action != HOLD_GRAVITY:
+            return 'forces are zero'
+        failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
+        return f'the last pose is held at rest{", without " if failed else ""}{", ".join(failed)}'
 
     # --- status ---------------------------------------------------------------------------------
 
