@@ -50,6 +50,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._subscription: Any = None
         self._watchdog: CommandWatchdog | None = None
         self._active = False
+        self._state = 'unconfigured'  # rclpy shows it in no public way
         self._failure: Exception | None = None
         own = declare_own(self, PARAMETERS)
         self._settings = ModelParameters(self, PARAMETERS, self._use_settings)
@@ -91,11 +92,12 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._status.report('OK', 'INACTIVE', 'waiting to be activated')
+        self._state = 'inactive'
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer messages from now on."""
-        self._active = True
+        self._active, self._state = True, 'active'
         self._status.report('OK', 'WAITING', 'waiting for the first message')
         model = self._settings.model
         self.get_logger().info(
@@ -108,12 +110,14 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._last_word()
         self._active = False
         self._status.report('OK', 'INACTIVE', 'waiting to be activated')
+        self._state = 'inactive'
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take the topics away."""
         self._destroy_topics()
         self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
+        self._state = 'unconfigured'
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -122,6 +126,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._active = False
         self._destroy_topics()
         self._status.report('OK', 'FINALIZED', 'shut down')
+        self._state = 'finalized'
         return super().on_shutdown(state)
 
     def finish(self) -> None:
@@ -291,7 +296,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._counted = (accepted, now)
         threshold = self._settings.own['lag_warning']
         self._status.facts.update(
-            state=self._state_machine.current_state[1],
+            state=self._state,
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
             lagging=bool(threshold and accepted > before and self._lag.median > threshold),
