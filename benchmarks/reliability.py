@@ -2,18 +2,20 @@
 
     python benchmarks/reliability.py [--full] [PART ...]
 
-PARTs are latency, fuzz, storm, soak, restart; all by default. What each found is kept in
-output/reliability, so that parts can be run one by one; the page is written from what is there.
+PARTs are latency, storm, restart, soak, fuzz; all by default. What each found is kept in
+output/reliability, also while it runs, so that parts can be run one by one and a run that is ended
+early is not lost; the page is written from what is there. `--resume` leaves out parts that have
+been run at the size that is asked for.
 """
 
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +31,12 @@ PAGE = ROOT / 'docs' / 'reliability.md'
 # Part: how to run it, and its size in short and in full.
 PARTS: dict[str, tuple[Callable[..., dict[str, Any]], float, float]] = {
     'latency': (latency.run, 10.0, 60.0),
-    'fuzz': (fuzz.run, 100_000, 1_000_000),
     'storm': (parameter_storm.run, 2_000, 10_000),
-    'soak': (soak.run, 5.0, 20.0),
     'restart': (restart.run, 5, 20),
+    'soak': (soak.run, 5.0, 20.0),
+    'fuzz': (fuzz.run, 100_000, 1_000_000),
 }
+KEPT_AS_THEY_GROW = ('storm', 'restart', 'fuzz')
 
 
 def main() -> int:
@@ -42,6 +45,7 @@ def main() -> int:
     parser.add_argument('parts', nargs='*', metavar='PART', help=', '.join(PARTS))
     parser.add_argument('--full', action='store_true', help='the sizes that were asked for')
     parser.add_argument('--write', action='store_true', help='run nothing')
+    parser.add_argument('--resume', action='store_true', help='leave out what has been run')
     arguments = parser.parse_args()
     unknown = set(arguments.parts) - set(PARTS)
     if unknown:
@@ -49,18 +53,28 @@ def main() -> int:
     KEPT.mkdir(parents=True, exist_ok=True)
     for name in () if arguments.write else arguments.parts or PARTS:
         run, short, full = PARTS[name]
-        found = run(full if arguments.full else short)
-        keep(name, full if arguments.full else short, found)
+        size = full if arguments.full else short
+        if arguments.resume and kept_size(name) >= size:
+            continue
+        growing = {'keep': partial(keep, name)} if name in KEPT_AS_THEY_GROW else {}
+        found = run(size, **growing)
+        keep(name, size, found)
         print(f'{name}: {json.dumps(found)}', flush=True)
     PAGE.write_text(page())
     return 0
 
 
 def keep(name: str, size: float, found: dict[str, Any]) -> None:
-    """Keep what a part found, with when and at what load of the machine."""
+    """Keep what a part found, with the load of the machine."""
     (KEPT / f'{name}.json').write_text(json.dumps({
-        'size': size, 'date': datetime.date.today().isoformat(), 'cores': os.cpu_count(),
-        'load': round(os.getloadavg()[1], 2), 'found': found}, indent=1))
+        'size': size, 'cores': os.cpu_count(), 'load': round(os.getloadavg()[1], 2),
+        'found': found}, indent=1))
+
+
+def kept_size(name: str) -> float:
+    """Return the size at which a part has been run; 0 where it has not."""
+    file = KEPT / f'{name}.json'
+    return float(json.loads(file.read_text())['size']) if file.is_file() else 0.0
 
 
 def page() -> str:
@@ -76,8 +90,8 @@ def page() -> str:
         kept = json.loads(file.read_text())
         size = f'{kept["size"]:g}'
         text.append(words(kept['found']))
-        text.append(f'Run of {kept["date"]}, size {size}, {kept["cores"]} cores, load of the '
-                    f'machine over the last five minutes {kept["load"]}.')
+        text.append(f'Size {size}, {kept["cores"]} cores, load of the machine over the last five '
+                    f'minutes {kept["load"]}.')
         if kept['size'] < full:
             text.append(f'The full size is {full:g}: '
                         f'`python benchmarks/reliability.py --full {name}`.')
@@ -88,7 +102,7 @@ def page() -> str:
 HEAD = """# How far the feedforward node can be relied on
 
 `make reliability` runs all of this (about 20 minutes) and writes this page; `make
-reliability-full` does it at full size. What stands here was measured, on the date given, on a
+reliability-full` does it at full size. What stands here was measured on a
 virtual machine that other programs used too: a load over the number of cores means that node and
 client waited for a processor. The tests contain short forms of the last four.
 """
