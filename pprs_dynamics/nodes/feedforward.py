@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
@@ -19,6 +19,7 @@ from pprs_dynamics.nodes import answer_cdr
 from pprs_dynamics.nodes.answer import Answer, Feedforward
 from pprs_dynamics.nodes.conversions import NANOSECONDS
 from pprs_dynamics.nodes.feedforward_settings import HOLD_GRAVITY, PARAMETERS, SILENT
+from pprs_dynamics.nodes.managed_node import ManagedNode
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.nodes.parameters import declare_own
 from pprs_dynamics.nodes.provenance import files_given, fingerprint
@@ -34,7 +35,7 @@ MARGINS_PERIOD = 0.01
 LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
 
 
-class FeedforwardNode(ExplainsRefusals, LifecycleNode):
+class FeedforwardNode(ExplainsRefusals, ManagedNode):
     """Answers every valid trajectory with friction-compensated drive forces.
 
     A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
@@ -43,14 +44,12 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        LifecycleNode.__init__(
+        ManagedNode.__init__(
             self, 'feedforward', allow_undeclared_parameters=True, **options)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._subscription: Any = None
         self._watchdog: CommandWatchdog | None = None
-        self._active = False
-        self._state = 'unconfigured'  # rclpy shows it in no public way
         self._failure: Exception | None = None
         own = declare_own(self, PARAMETERS)
         self._settings = ModelParameters(self, PARAMETERS, self._use_settings)
@@ -92,12 +91,10 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._status.report('OK', 'INACTIVE', 'waiting to be activated')
-        self._state = 'inactive'
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer messages from now on."""
-        self._active, self._state = True, 'active'
         self._status.report('OK', 'WAITING', 'waiting for the first message')
         model = self._settings.model
         self.get_logger().info(
@@ -108,25 +105,20 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer nothing any more, with the timeout's action as the last word."""
         self._last_word()
-        self._active = False
         self._status.report('OK', 'INACTIVE', 'waiting to be activated')
-        self._state = 'inactive'
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take the topics away."""
         self._destroy_topics()
         self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
-        self._state = 'unconfigured'
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End for good; the process goes on telling so until it is stopped."""
         self._last_word()
-        self._active = False
         self._destroy_topics()
         self._status.report('OK', 'FINALIZED', 'shut down')
-        self._state = 'finalized'
         return super().on_shutdown(state)
 
     def finish(self) -> None:
@@ -177,7 +169,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
 
     def _on_trajectory(self, data: bytes, info: dict[str, int]) -> None:
         began = time.perf_counter()
-        if not self._active or self._watchdog is None:
+        if self.state != 'active' or self._watchdog is None:
             return
         self._counters['received'] += 1
         own, now = self._settings.own, self.get_clock().now().nanoseconds
@@ -296,7 +288,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._counted = (accepted, now)
         threshold = self._settings.own['lag_warning']
         self._status.facts.update(
-            state=self._state,
+            state=self.state,
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
             lagging=bool(threshold and accepted > before and self._lag.median > threshold),
