@@ -24,6 +24,7 @@ import latency
 import parameter_storm
 import restart
 import soak
+from reliability_page import HEAD, RELEASES, SECTIONS
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / 'output' / 'reliability'
@@ -88,66 +89,14 @@ def page() -> str:
             text.append(f'Not run yet: `python benchmarks/reliability.py {name}`.\n')
             continue
         kept = json.loads(file.read_text())
-        size = f'{kept["size"]:g}'
-        text.append(words(kept['found']))
-        text.append(f'Size {size}, {kept["cores"]} cores, load of the machine over the last five '
-                    f'minutes {kept["load"]}.')
+        size = 'Full size'
         if kept['size'] < full:
-            text.append(f'The full size is {full:g}: '
-                        f'`python benchmarks/reliability.py --full {name}`.')
-        text.append('')
-    return '\n'.join(text)
-
-
-HEAD = """# How far the feedforward node can be relied on
-
-`make reliability` runs all of this (about 20 minutes) and writes this page; `make
-reliability-full` does it at full size. What stands here was measured on a
-virtual machine that other programs used too: a load over the number of cores means that node and
-client waited for a processor. The tests contain short forms of the last four.
-"""
-
-
-def _latency(found: dict[str, Any]) -> str:
-    return ('\n'.join(latency.rows(found)) + "\n\nThe echo node is what rclpy's tutorials show: "
-            "message objects, rclpy's executor, six zeros. Both ran at the same time, measured in "
-            'turns by one client of one thread.\n')
-
-
-def _fuzz(found: dict[str, Any]) -> str:
-    rejected = ', '.join(f'{code} {count}' for code, count in found['rejected'].items())
-    return (f'{found["messages"]} messages, of which {found["accepted"]} were valid and answered. '
-            f'Rejected: {rejected}. Counted under a wrong code: {len(found["miscounted"])} codes. '
-            f'Numbers that left the node: {found["numbers_seen"]}, not finite or over a limit: '
-            f'{found["bad_numbers"]}. Answers to a known pose that were wrong after damage: '
-            f'{found["wrong_answers_after_damage"]}. Node alive at the end: {found["alive"]}.\n')
-
-
-def _storm(found: dict[str, Any]) -> str:
-    return (f'{found["sets"]} sets of random parameters while streaming, {found["accepted"]} of '
-            f'them accepted. Accepted though no model file may hold them: '
-            f'{found["wrongly_accepted"]}; refused though one may: {found["wrongly_refused"]}; '
-            f'without a reason: {found["refused_without_reason"]}. Of {found["answers"]} answers, '
-            f'{found["wrong_answers"]} were not those of the model that the accepted ones make.\n')
-
-
-def _soak(found: dict[str, Any]) -> str:
-    return (f'{found["minutes"]:g} minutes at {found["rate"]:g} Hz: {found["sent"]} messages sent, '
-            f'{found["answered"]} answered. Resident memory after the first minute '
-            f'{found["memory_mb"]} MB, growth from then on {found["growth_mb"]} MB (goal: below '
-            f'2). Stale at the worst {found["stale"]} times.\n')
-
-
-def _restart(found: dict[str, Any]) -> str:
-    slowest = max(found['start_to_first_command_s'])
-    return (f'Killed with SIGKILL in mid-stream and started again {found["kills"]} times: messages '
-            f'that reached a new node and were not answered: {found["unanswered"]}. From the start '
-            f'of the process to its first command at most {slowest:.2f} s.\n')
-
-
-SECTIONS = {'latency': ('Speed', _latency), 'fuzz': ('Damaged messages', _fuzz),
-            'storm': ('Parameters', _storm), 'soak': ('Endurance', _soak),
-            'restart': ('Restart', _restart)}
+            size = (f'Size {kept["size"]:,g} of {full:,g} '
+                    f'(`python benchmarks/reliability.py --full {name}`)')
+        text.append(words(kept['found']))
+        text.append(f'{size}; {kept["cores"]} cores, load of the machine over the last five '
+                    f'minutes {kept["load"]}.\n')
+    return '\n'.join([*text, RELEASES])
 
 
 if __name__ == '__main__':

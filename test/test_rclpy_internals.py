@@ -64,7 +64,8 @@ def test_the_node_answers_takes_parameters_and_has_its_last_word(
                    f'masses.payload:={PAYLOAD}', '-p', 'timeout_action:=zero')
     values = {'masses.payload': PAYLOAD, 'effects.active': ['effort_offset'],
               'effects.effort_offset.lift_2.force': 1.5}
-    from pprs_dynamics.model.model_file import build_model, default_parameters
+    from pprs_dynamics.model.model_file import build_model
+    from pprs_dynamics.model.parameter_file import default_parameters
 
     expected = build_model({**default_parameters(), **values}).drive_forces(ONE).total[0]
     with bench() as running:
