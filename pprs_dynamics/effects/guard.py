@@ -124,6 +124,14 @@ def _sensed(result: Any, _: Any, __: Any, effort: Array, *___: Any) -> Array:
     return _finite(_array(result, effort.shape), (effort,))
 
 
+def _sensor_columns(result: Any, effect: type[DriveEffect], _: Any, effort: Array,
+                    *__: Any) -> Any:
+    columns, wanted = tuple(result), max(1, len(effect.coefficients))
+    if len(columns) != wanted:
+        raise _WrongResultError(f'{len(columns)} arrays, must be {wanted}')
+    return tuple(_finite(_array(column, effort.shape), (effort,)) for column in columns)
+
+
 def _position_error(result: Any, _: Any, __: Any, drives: Sequence[str]) -> Array:
     return _finite(_array(result, (len(drives),)), ())
 
@@ -162,7 +170,7 @@ def _parameters(result: Any, effect: type[CatalogueEffect], *_: Any) -> Mapping[
     return _numbers(result, [p.name for p in effect.linear])
 
 
-def _memory(result: Any, _: Any, effect: CatalogueEffect) -> Any:
+def _memory(result: Any, _: Any, effect: CatalogueEffect, *__: Any) -> Any:
     if isinstance(effect, DriveEffect) and result is not None and (
             not isinstance(result, Mapping) or set(result) != set(effect.drives)):
         raise _WrongResultError(f'{result!r:.80}, must be None or a memory per drive')
@@ -207,7 +215,8 @@ def _block(result: Any, *_: Any) -> Mapping[str, Any]:
 CHECKS: dict[str, Callable[..., Any]] = {
     '__init__': _any, 'from_file': _built, 'to_file': _block,
     'to_coefficients': _coefficients, 'from_coefficients': _parameters,
-    'drive_memory': _any, 'initial_memory': _memory,
-    'columns': _columns, 'force': _force, 'sensed': _sensed, 'position_error': _position_error,
+    'drive_memory': _any, 'begin': _any, 'initial_memory': _memory,
+    'columns': _columns, 'force': _force, 'sensed': _sensed, 'sensor_columns': _sensor_columns,
+    'position_error': _position_error, 'shifts_positions': _any,
     'changed': _robot, 'load': _load, 'apply': _state,
     'trials': _shapes, 'alternatives': _shapes, 'averaged': _averaged}
