@@ -91,7 +91,7 @@ def page() -> str:
         kept = json.loads(file.read_text())
         size = 'Full size'
         if kept['size'] < full:
-            size = (f'Size {kept["size"]:,g} of {full:,g} '
+            size = (f'Size {kept["size"]:,.0f} of {full:,.0f} '
                     f'(`python benchmarks/reliability.py --full {name}`)')
         text.append(words(kept['found']))
         text.append(f'{size}; {kept["cores"]} cores, load of the machine over the last five '
