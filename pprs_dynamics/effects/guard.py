@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Guard of other packages' effects: whatever their code does wrong is an EffectError.
 
 Models, diagnosis and nodes call effects in many places and rely on what they get. The methods of
@@ -180,7 +194,7 @@ def _memory(result: Any, _: Any, effect: CatalogueEffect, *__: Any) -> Any:
 def _robot(result: Any, *_: Any) -> Robot:
     if not isinstance(result, Robot):
         raise _WrongResultError(f'{result!r:.80}, must be a Robot')
-    _finite(result.numbers, (), 'a robot')
+    _finite(result.kernel_parameters.row, (), 'a robot')
     return result
 
 
