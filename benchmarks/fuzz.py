@@ -13,6 +13,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from pprs_dynamics.nodes.conversions import write_trajectory
 BATCH = 20  # messages between two looks at the node: fewer than its queue holds
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')
 EQUAL = 1e-12
+KEPT_EVERY = 20_000  # messages
 
 
 class Watch:
@@ -71,8 +73,11 @@ class Watch:
             self.others(point.positions, point.velocities, point.accelerations)
 
 
-def run(messages: int, seed: int = 0, domain: int | None = None) -> dict[str, Any]:
-    """Send that many messages and return what came of it."""
+def run(
+    messages: int, seed: int = 0, domain: int | None = None,
+    keep: Callable[[int, dict[str, Any]], None] = lambda count, found: None,
+) -> dict[str, Any]:
+    """Send that many messages and return what came of it; `keep` gets it as it grows."""
     rng, model = np.random.default_rng(seed), DriveModel.load()
     watch, expected = Watch(model.limits.efforts), Counter[str]()
     sentinel = valid_motion(rng, 1)
@@ -86,6 +91,24 @@ def run(messages: int, seed: int = 0, domain: int | None = None) -> dict[str, An
             stream.listen(JointState, f'effort/{part}', lambda data: watch.state(data, False))
         stream.connect()
         memory, began, wrong = resident_memory(process), time.monotonic(), 0
+
+        def found() -> dict[str, Any]:
+            sent = sum(expected.values())
+            stream.wait_until(
+                lambda: stream.status['counters']['received'] == sent, 'the counters')
+            counters = stream.status['counters']
+            codes = {code for code in counters if code.isupper()} | set(expected) - {VALID}
+            return {
+                'messages': sent, 'alive': process.poll() is None, 'numbers_seen': watch.numbers,
+                'bad_numbers': watch.bad, 'wrong_answers_after_damage': wrong,
+                'accepted': counters['accepted'], 'accepted_expected': expected[VALID],
+                'miscounted': {code: (counters.get(code, 0), expected[code])
+                               for code in sorted(codes)
+                               if counters.get(code, 0) != expected[code]},
+                'rejected': {code: counters[code] for code in sorted(codes) if code in counters},
+                'seconds': round(time.monotonic() - began, 1),
+                'memory_growth_mb': round(resident_memory(process) - memory, 2)}
+
         for start in range(0, messages, BATCH):
             for _ in range(min(BATCH, messages - start)):
                 code, data = damaged(rng)
@@ -94,22 +117,11 @@ def run(messages: int, seed: int = 0, domain: int | None = None) -> dict[str, An
             expected[VALID] += 1
             stream.publish(sentinel_bytes)
             stream.wait_until(lambda: stream.commands >= expected[VALID], 'the next answer', 60)
-            found = deserialize_message(stream.last_command, Float64MultiArray).data
-            wrong += not np.allclose(found, answer, rtol=0, atol=EQUAL)
-        sent = sum(expected.values())
-        stream.wait_until(lambda: stream.status['counters']['received'] == sent, 'the counters')
-        counters = stream.status['counters']
-        took, grown = time.monotonic() - began, resident_memory(process) - memory
-        alive = process.poll() is None
-    codes = {code for code in counters if code.isupper()} | set(expected) - {VALID}
-    miscounted = {code: (counters.get(code, 0), expected[code]) for code in sorted(codes)
-                  if counters.get(code, 0) != expected[code]}
-    return {
-        'messages': sent, 'alive': alive, 'numbers_seen': watch.numbers, 'bad_numbers': watch.bad,
-        'wrong_answers_after_damage': wrong, 'accepted': counters['accepted'],
-        'accepted_expected': expected[VALID], 'miscounted': miscounted,
-        'rejected': {code: counters[code] for code in sorted(codes) if code in counters},
-        'seconds': round(took, 1), 'memory_growth_mb': round(grown, 2)}
+            answered = deserialize_message(stream.last_command, Float64MultiArray).data
+            wrong += not np.allclose(answered, answer, rtol=0, atol=EQUAL)
+            if start and start % KEPT_EVERY == 0:
+                keep(start, found())
+        return found()
 
 
 def passed(found: dict[str, Any]) -> bool:

@@ -29,6 +29,7 @@ from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.nodes.conversions import write_trajectory
 
 EQUAL = 1e-9
+KEPT_EVERY = 500  # sets
 DRIVES = ('slide_1', 'lift_2')
 
 
@@ -82,8 +83,11 @@ def is_model(values: dict[str, Any]) -> bool:
     return True
 
 
-def run(sets: int, seed: int = 0, domain: int | None = None) -> dict[str, Any]:
-    """Set parameters that often and return what came of it."""
+def run(
+    sets: int, seed: int = 0, domain: int | None = None,
+    keep: Callable[[int, dict[str, Any]], None] = lambda count, found: None,
+) -> dict[str, Any]:
+    """Set parameters that often and return what came of it; `keep` gets it as it grows."""
     rng = np.random.default_rng(seed)
     motion = valid_motion(rng, 1)
     data = bytes(serialize_message(write_trajectory(motion, Time(), [0])))
@@ -135,6 +139,8 @@ def run(sets: int, seed: int = 0, domain: int | None = None) -> dict[str, Any]:
             if old is not None:
                 older = old
             old = new
+            if found['sets'] % KEPT_EVERY == 0:
+                keep(found['sets'], {**found, 'alive': process.poll() is None})
         executor.shutdown()
         caller.destroy_node()
         found['alive'] = process.poll() is None

@@ -2,18 +2,20 @@
 
     python benchmarks/reliability.py [--full] [PART ...]
 
-PARTs are latency, fuzz, storm, soak, restart; all by default. What each found is kept in
-output/reliability, so that parts can be run one by one; the page is written from what is there.
+PARTs are latency, storm, restart, soak, fuzz; all by default. What each found is kept in
+output/reliability, also while it runs, so that parts can be run one by one and a run that is ended
+early is not lost; the page is written from what is there. `--resume` leaves out parts that have
+been run at the size that is asked for.
 """
 
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ import latency
 import parameter_storm
 import restart
 import soak
+from reliability_page import HEAD, RELEASES, SECTIONS
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / 'output' / 'reliability'
@@ -29,11 +32,12 @@ PAGE = ROOT / 'docs' / 'reliability.md'
 # Part: how to run it, and its size in short and in full.
 PARTS: dict[str, tuple[Callable[..., dict[str, Any]], float, float]] = {
     'latency': (latency.run, 10.0, 60.0),
-    'fuzz': (fuzz.run, 100_000, 1_000_000),
     'storm': (parameter_storm.run, 2_000, 10_000),
-    'soak': (soak.run, 5.0, 20.0),
     'restart': (restart.run, 5, 20),
+    'soak': (soak.run, 5.0, 20.0),
+    'fuzz': (fuzz.run, 100_000, 1_000_000),
 }
+KEPT_AS_THEY_GROW = ('storm', 'restart', 'fuzz')
 
 
 def main() -> int:
@@ -42,6 +46,7 @@ def main() -> int:
     parser.add_argument('parts', nargs='*', metavar='PART', help=', '.join(PARTS))
     parser.add_argument('--full', action='store_true', help='the sizes that were asked for')
     parser.add_argument('--write', action='store_true', help='run nothing')
+    parser.add_argument('--resume', action='store_true', help='leave out what has been run')
     arguments = parser.parse_args()
     unknown = set(arguments.parts) - set(PARTS)
     if unknown:
@@ -49,18 +54,28 @@ def main() -> int:
     KEPT.mkdir(parents=True, exist_ok=True)
     for name in () if arguments.write else arguments.parts or PARTS:
         run, short, full = PARTS[name]
-        found = run(full if arguments.full else short)
-        keep(name, full if arguments.full else short, found)
+        size = full if arguments.full else short
+        if arguments.resume and kept_size(name) >= size:
+            continue
+        growing = {'keep': partial(keep, name)} if name in KEPT_AS_THEY_GROW else {}
+        found = run(size, **growing)
+        keep(name, size, found)
         print(f'{name}: {json.dumps(found)}', flush=True)
     PAGE.write_text(page())
     return 0
 
 
 def keep(name: str, size: float, found: dict[str, Any]) -> None:
-    """Keep what a part found, with when and at what load of the machine."""
+    """Keep what a part found, with the load of the machine."""
     (KEPT / f'{name}.json').write_text(json.dumps({
-        'size': size, 'date': datetime.date.today().isoformat(), 'cores': os.cpu_count(),
-        'load': round(os.getloadavg()[1], 2), 'found': found}, indent=1))
+        'size': size, 'cores': os.cpu_count(), 'load': round(os.getloadavg()[1], 2),
+        'found': found}, indent=1))
+
+
+def kept_size(name: str) -> float:
+    """Return the size at which a part has been run; 0 where it has not."""
+    file = KEPT / f'{name}.json'
+    return float(json.loads(file.read_text())['size']) if file.is_file() else 0.0
 
 
 def page() -> str:
@@ -74,66 +89,14 @@ def page() -> str:
             text.append(f'Not run yet: `python benchmarks/reliability.py {name}`.\n')
             continue
         kept = json.loads(file.read_text())
-        size = f'{kept["size"]:g}'
-        text.append(words(kept['found']))
-        text.append(f'Run of {kept["date"]}, size {size}, {kept["cores"]} cores, load of the '
-                    f'machine over the last five minutes {kept["load"]}.')
+        size = 'Full size'
         if kept['size'] < full:
-            text.append(f'The full size is {full:g}: '
-                        f'`python benchmarks/reliability.py --full {name}`.')
-        text.append('')
-    return '\n'.join(text)
-
-
-HEAD = """# How far the feedforward node can be relied on
-
-`make reliability` runs all of this (about 20 minutes) and writes this page; `make
-reliability-full` does it at full size. What stands here was measured, on the date given, on a
-virtual machine that other programs used too: a load over the number of cores means that node and
-client waited for a processor. The tests contain short forms of the last four.
-"""
-
-
-def _latency(found: dict[str, Any]) -> str:
-    return ('\n'.join(latency.rows(found)) + "\n\nThe echo node is what rclpy's tutorials show: "
-            "message objects, rclpy's executor, six zeros. Both ran at the same time, measured in "
-            'turns by one client of one thread.\n')
-
-
-def _fuzz(found: dict[str, Any]) -> str:
-    rejected = ', '.join(f'{code} {count}' for code, count in found['rejected'].items())
-    return (f'{found["messages"]} messages, of which {found["accepted"]} were valid and answered. '
-            f'Rejected: {rejected}. Counted under a wrong code: {len(found["miscounted"])} codes. '
-            f'Numbers that left the node: {found["numbers_seen"]}, not finite or over a limit: '
-            f'{found["bad_numbers"]}. Answers to a known pose that were wrong after damage: '
-            f'{found["wrong_answers_after_damage"]}. Node alive at the end: {found["alive"]}.\n')
-
-
-def _storm(found: dict[str, Any]) -> str:
-    return (f'{found["sets"]} sets of random parameters while streaming, {found["accepted"]} of '
-            f'them accepted. Accepted though no model file may hold them: '
-            f'{found["wrongly_accepted"]}; refused though one may: {found["wrongly_refused"]}; '
-            f'without a reason: {found["refused_without_reason"]}. Of {found["answers"]} answers, '
-            f'{found["wrong_answers"]} were not those of the model that the accepted ones make.\n')
-
-
-def _soak(found: dict[str, Any]) -> str:
-    return (f'{found["minutes"]:g} minutes at {found["rate"]:g} Hz: {found["sent"]} messages sent, '
-            f'{found["answered"]} answered. Resident memory after the first minute '
-            f'{found["memory_mb"]} MB, growth from then on {found["growth_mb"]} MB (goal: below '
-            f'2). Stale at the worst {found["stale"]} times.\n')
-
-
-def _restart(found: dict[str, Any]) -> str:
-    slowest = max(found['start_to_first_command_s'])
-    return (f'Killed with SIGKILL in mid-stream and started again {found["kills"]} times: messages '
-            f'that reached a new node and were not answered: {found["unanswered"]}. From the start '
-            f'of the process to its first command at most {slowest:.2f} s.\n')
-
-
-SECTIONS = {'latency': ('Speed', _latency), 'fuzz': ('Damaged messages', _fuzz),
-            'storm': ('Parameters', _storm), 'soak': ('Endurance', _soak),
-            'restart': ('Restart', _restart)}
+            size = (f'Size {kept["size"]:,.0f} of {full:,.0f} '
+                    f'(`python benchmarks/reliability.py --full {name}`)')
+        text.append(words(kept['found']))
+        text.append(f'{size}; {kept["cores"]} cores, load of the machine over the last five '
+                    f'minutes {kept["load"]}.\n')
+    return '\n'.join([*text, RELEASES])
 
 
 if __name__ == '__main__':

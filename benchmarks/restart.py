@@ -11,6 +11,7 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,11 @@ RATE = 100.0  # [Hz]
 ENOUGH = 50  # answers before the next kill
 
 
-def run(times: int, domain: int | None = None) -> dict[str, Any]:
-    """Kill that often and return what came of it."""
+def run(
+    times: int, domain: int | None = None,
+    keep: Callable[[int, dict[str, Any]], None] = lambda count, found: None,
+) -> dict[str, Any]:
+    """Kill that often and return what came of it; `keep` gets it as it grows."""
     holder = None
     if domain is None:
         domain, holder = reserve_domain()
@@ -31,7 +35,7 @@ def run(times: int, domain: int | None = None) -> dict[str, Any]:
     data, starts, unanswered = trajectory(1), [], 0
     with tempfile.TemporaryDirectory() as folder:
         stream = Stream()
-        for _ in range(times):
+        for kills in range(1, times + 1):
             stream.commands, stream.status = 0, {}
             began = due = time.monotonic()
             with node_process(feedforward(), domain, Path(folder) / 'log') as process:
@@ -52,10 +56,15 @@ def run(times: int, domain: int | None = None) -> dict[str, Any]:
                 process.wait()
             while stream.spin(0.1):
                 pass
+            keep(kills, _found(kills, unanswered, starts))
         stream.close()
     if holder is not None:
         holder.close()
-    return {'kills': times, 'unanswered': unanswered,
+    return _found(times, unanswered, starts)
+
+
+def _found(kills: int, unanswered: int, starts: list[float]) -> dict[str, Any]:
+    return {'kills': kills, 'unanswered': unanswered,
             'start_to_first_command_s': [round(each, 2) for each in starts]}
 
 

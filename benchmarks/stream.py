@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 import rclpy
 from rclpy.context import Context
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
@@ -27,6 +26,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ('test', 'demo')]
 from ros_processes import environment, executable, node_process, reserve_domain  # noqa: E402
+
+from pprs_dynamics.nodes.rclpy_internals import WaitSet, take  # noqa: E402
 
 RELIABLE = QoSProfile(depth=1000)
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -53,7 +54,7 @@ class Stream:
         self.publisher = self.node.create_publisher(
             MultiDOFJointTrajectory, f'{node}/trajectory', RELIABLE)
         self._listeners: list[tuple[Any, Callable[[bytes], None]]] = []
-        self._wait_set: Any = None
+        self._wait_set = WaitSet(self.context)
         self.commands = 0
         self.last_command = b''
         self.answered_at: list[float] = []
@@ -70,8 +71,6 @@ class Stream:
         subscription = self.node.create_subscription(
             kind, f'{self.target}/{topic}', lambda message: None, qos, raw=True)
         self._listeners.append((subscription, callback))
-        self._wait_set = rclpy_implementation.WaitSet(
-            len(self._listeners), 0, 0, 0, 0, 0, self.context.handle)
 
     def close(self) -> None:
         """Leave the graph."""
@@ -92,15 +91,12 @@ class Stream:
 
     def spin(self, timeout: float) -> bool:
         """Take what has arrived, waiting for a time [s] at most; False where nothing came."""
-        wait_set = self._wait_set
-        wait_set.clear_entities()
-        for listener, _ in self._listeners:
-            wait_set.add_subscription(listener.handle)
-        wait_set.wait(max(1, round(timeout * 1e9)))
-        ready = wait_set.get_ready_entities('subscription')
-        for listener, callback in self._listeners:
-            if listener.handle.pointer in ready:
-                while (taken := listener.handle.take_message(listener.msg_type, True)) is not None:
+        subscriptions = [subscription for subscription, _ in self._listeners]
+        self._wait_set.wait(subscriptions, timeout=max(1, round(timeout * 1e9)))
+        ready = self._wait_set.ready('subscription', subscriptions)
+        for subscription, callback in self._listeners:
+            if subscription in ready:
+                while (taken := take(subscription)) is not None:
                     callback(taken[0])
         return bool(ready)
 

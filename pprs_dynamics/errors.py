@@ -174,6 +174,22 @@ class LimitError(PprsError, ValueError):
             f'sample {sample}: {drive} needs {force:.6g} N, limits.effort allows {limit:.6g} N')
 
 
+class EffectError(PprsError, RuntimeError):
+    """An effect of another package failed, or returned what it must not.
+
+    Parameters
+    ----------
+    effect : str
+        Its name.
+    found : str
+        Which method did what.
+    """
+
+    def __init__(self, effect: str, found: str) -> None:
+        self.effect, self.found = effect, found
+        super().__init__(f'effect {effect}: {found}')
+
+
 class MissingLibraryError(PprsError, ImportError):
     """An optional library is not installed."""
 

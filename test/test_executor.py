@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,6 +15,8 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from pprs_dynamics.nodes import executor as executors
+from pprs_dynamics.nodes import rclpy_internals
 from pprs_dynamics.nodes.executor import PromptExecutor
 
 pytestmark = pytest.mark.nodes
@@ -20,8 +24,25 @@ pytestmark = pytest.mark.nodes
 PATIENCE = 10.0  # [s]
 
 
-@pytest.fixture
-def spun() -> Iterator[tuple[Node, PromptExecutor]]:
+@pytest.fixture(params=['as known', 'names missing', 'WaitSet changed', 'Subscription changed',
+                        'Timer changed'])
+def spun(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[tuple[Node, PromptExecutor]]:
+    """A node and its executor, with the rclpy that is known and with ones that are not."""
+    if request.param == 'names missing':
+        monkeypatch.setitem(rclpy_internals.NAMES, 'WaitSet', ('renamed',))
+    elif request.param == 'WaitSet changed':
+        known = rclpy_internals.rclpy_implementation
+        monkeypatch.setattr(rclpy_internals, 'rclpy_implementation', SimpleNamespace(
+            **{**vars(known), 'WaitSet': type('WaitSet', (known.WaitSet,), {
+                'wait': lambda self, timeout, more: None})}))
+    elif request.param == 'Subscription changed':
+        monkeypatch.setattr(executors, 'take', lambda _: rclpy_internals.take(
+            SimpleNamespace(handle=nullcontext())))
+    elif request.param == 'Timer changed':
+        monkeypatch.setattr(executors, 'call_if_due', lambda _: rclpy_internals.call_if_due(
+            SimpleNamespace(handle=nullcontext())))
     context = Context()
     rclpy.init(context=context)
     node, executor = Node('spun', context=context), PromptExecutor(context=context)

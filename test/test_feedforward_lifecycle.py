@@ -95,6 +95,22 @@ def test_a_supervisor_leads_it_through_its_states(
     assert node.wait_for_status(code='FINALIZED')
 
 
+def test_a_transition_that_rclpy_raises_at_is_refused(
+    supervised: tuple[FeedforwardBench, Supervisor],
+) -> None:
+    node, supervisor = supervised
+    service, = (each for each in node.node.services if each.srv_name.endswith('/change_state'))
+
+    def raises(request: ChangeState.Request, response: ChangeState.Response) -> None:
+        raise RuntimeError('Transition is not registered.')
+
+    # As rclpy of Jazzy does at an activation before the configuration.
+    allowed, service.callback = service.callback, node.node._refusing(raises)
+    assert not supervisor.change(Transition.TRANSITION_ACTIVATE)
+    service.callback = allowed
+    assert supervisor.change(Transition.TRANSITION_CONFIGURE)
+
+
 def held(motion: PlatformMotion) -> np.ndarray:
     """Return the forces that hold the last pose."""
     rest = PlatformMotion.at_rest(motion.position[-1:], motion.orientation[-1:])

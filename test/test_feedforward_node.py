@@ -180,7 +180,8 @@ DAMAGES: list[tuple[str, Callable[[MultiDOFJointTrajectory], None]]] = [
 
 
 def test_every_code_of_the_interface_is_provoked_here() -> None:
-    assert {code for code, _ in DAMAGES} == set(CODES)
+    # EFFECT is no message's fault: test_failing_effects.py
+    assert {code for code, _ in DAMAGES} == set(CODES) - {'EFFECT'}
 
 
 def test_damaged_messages_are_counted_explained_silent_and_survived(

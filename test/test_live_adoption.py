@@ -43,6 +43,7 @@ BURST = 20  # messages that go out at once
 # Samples that may be without an answer yet: those from which the node learns its step, half its
 # window, and three bursts on the way.
 BEHIND = 50 + 30 + 3 * BURST
+QUEUED = 3 * BURST  # less than the node's queue holds
 SPAN = 0.8  # [s], of the running error
 PATIENCE = 90.0  # [s], on a busy machine, where a node's first answer may take long
 
@@ -102,14 +103,21 @@ class Live:
             self.publisher.publish(message)
             # No faster than the node takes them: its queue is finite.
             if row % BURST == BURST - 1:
-                assert self.bench.spin_until(
-                    lambda row=row: len(self.judged) > row - BEHIND, PATIENCE)
+                assert self.bench.spin_until(lambda row=row: self.taken(row), PATIENCE)
         self.sent += count
         before = -1
         while len(self.judged) > before:
             before = len(self.judged)
             self.bench.spin_for(0.3)
         return float(np.sqrt(np.mean(np.square(self.error[-1].data))))
+
+    def taken(self, row: int) -> bool:
+        """Return whether the node has taken so many samples that its queue has room."""
+        if row > BEHIND:
+            return len(self.judged) > row - BEHIND
+        # Before the first answers only its counters tell, once a second.
+        received: int = self.bench.status[-1]['counters']['received']
+        return received > row - QUEUED
 
     def set(self, node: str, parameters: list[Parameter]) -> list[Any]:
         """Set parameters of a node, one after the other, and return its answers."""

@@ -33,10 +33,10 @@ OFFSET = 0.5  # [N]
 class MonitorBench:
     """The node, what it says, and a robot whose efforts the model explains."""
 
-    def __init__(self, running: Bench) -> None:
+    def __init__(self, running: Bench, **values: object) -> None:
         self.bench = running
         self.node = running.add(MonitorNode, parameter_overrides=[
-            Parameter('error_span', value=0.5)])
+            Parameter(name, value=value) for name, value in {'error_span': 0.5, **values}.items()])
         self.model_effort = running.listen(JointState, '/monitor/model_effort', 1000)
         self.residual = running.listen(JointState, '/monitor/residual', 1000)
         self.error = running.listen(Float64MultiArray, '/monitor/error', 1000)

@@ -38,6 +38,7 @@ from pprs_dynamics.effects.effort_offset import EffortOffset
 from pprs_dynamics.effects.external_wrench import ExternalWrench
 from pprs_dynamics.effects.force_ripple import ForceRipple
 from pprs_dynamics.effects.friction_drift import FrictionDrift
+from pprs_dynamics.effects.guard import guard
 from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.hysteresis import Hysteresis
 from pprs_dynamics.effects.load_friction import LoadFriction
@@ -148,6 +149,7 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
             f'its name {effect.name!r} must be one word of letters, digits and _')
     if effect.name in known or effect.name in RESERVED:
         raise _UnusableEffectError(f'the name {effect.name} is taken')
+    guard(effect)
     return effect
 
 

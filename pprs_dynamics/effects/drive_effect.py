@@ -129,6 +129,14 @@ class DriveEffect(CatalogueEffect):
                 self.begin(of_drive, start)
         return memory
 
+    def check_memory(self, memories: Mapping[str, Any]) -> None:
+        """Raise ModelError where memories, by effect, are not those of these drives."""
+        super().check_memory(memories)
+        memory = memories[self.name]
+        if memory is not None and set(memory) != set(self.drives):
+            raise ModelError('state', sorted(memory), f'come from a model with this very '
+                             f'{self.name}')
+
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""
         force = np.zeros_like(state.velocity)

@@ -31,6 +31,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.errors import EffectError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.state import DriveStates
 from pprs_dynamics.model.keys import Key
@@ -80,8 +81,21 @@ class ModelState:
         return any(memory is not None for memory in self.memories.values())
 
     def copy(self) -> ModelState:
-        """Return an independent copy, to look ahead without advancing this one."""
-        return ModelState(copy.deepcopy(self.memories))
+        """Return an independent copy, to look ahead without advancing this one.
+
+        Raises
+        ------
+        EffectError
+            Where an effect keeps what cannot be copied.
+        """
+        copied = {}
+        for name, memory in self.memories.items():
+            try:
+                copied[name] = copy.deepcopy(memory)
+            except Exception as error:  # another package's effect may keep anything
+                raise EffectError(name, 'its memory cannot be copied '
+                                  f'({type(error).__name__}: {error})') from error
+        return ModelState(copied)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,12 +157,25 @@ class ForceModel(ABC):
         return ModelState({effect.name: effect.initial_memory(start) for effect in self.effects})
 
     def continued_state(self, model: Self, state: ModelState) -> ModelState:
-        """Return a state that goes on from another model's for the effects that both have."""
-        fresh = self.initial_state()
+        """Return a state that goes on from another model's for the effects that both have.
+
+        The other state must not be used any more: memories are handed over, not copied.
+        """
+        before = {effect.name: effect for effect in model.effects
+                  if isinstance(effect, CatalogueEffect)}
+        continued = self.initial_state()
         for effect in self.effects:
-            if effect in model.effects:
-                fresh.memories[effect.name] = copy.deepcopy(state.memories[effect.name])
-        return fresh
+            other = before.get(effect.name)
+            # By what files say: attributes of another package's effect may be of any type.
+            if other is not None and isinstance(effect, CatalogueEffect) and (
+                    effect.to_file() == other.to_file()):
+                continued.memories[effect.name] = state.memories[effect.name]
+        return continued
+
+    def without(self, effect: str) -> Self:
+        """Return the model without the effect of that name."""
+        return replace(self, effects=tuple(
+            each for each in self.effects if each.name != effect))
 
     def measured(self, forces: F, state: ModelState | None = None) -> F:
         """Return the measured forces where the drives apply `forces`.

@@ -36,10 +36,12 @@ def prepare(model: DriveModel) -> None:
     """Evaluate a model once, both ways, alone and in a batch.
 
     A robot that cannot be at the home pose refuses it, after what is needed has been compiled.
+    Effects that fail are told of when they are asked for an answer.
     """
     home = PlatformMotion.at_rest(np.tile([0.0, 0.0, HEIGHT], (SAMPLES, 1)),
                                   np.tile([0.0, 0.0, 0.0, 1.0], (SAMPLES, 1)))
     with suppress(PprsError):
+        model = model.sound_at(home)
         forces = model.drive_forces(home)
         model.drive_forces(home[:1])
         position = forces.mechanism.position

@@ -11,7 +11,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.pose_spline import load_splines
-from pprs_dynamics.model.drive_model import RIGID_BODY, DriveForces, DriveModel
+from pprs_dynamics.model.drive_model import RIGID_BODY, DriveForces, DriveModel, ModelState
 from pprs_dynamics.model.limits import Limits
 from pprs_dynamics.nodes.conversions import NANOSECONDS
 from pprs_dynamics.nodes.feedforward_settings import CLAMP
@@ -55,16 +55,22 @@ class Feedforward:
     """
 
     def __init__(self, model: DriveModel, own: Mapping[str, Any]) -> None:
-        self._model, self._memory = model, model.initial_state()
+        self._model = model
+        self._memory: ModelState | None = None
+        self._remembers = False
+        # The model that remembered last, and what.
+        self._before: tuple[DriveModel, ModelState] | None = None
         self._epoch: int | None = None
         self._last: TrajectoryRequest | None = None
         self.use(model, own)
 
     def use(self, model: DriveModel, own: Mapping[str, Any]) -> None:
         """Go on with another model; effects that both have keep their memory."""
-        self._memory = model.continued_state(self._model, self._memory)
+        if self._memory is not None:
+            self._before = self._model, self._memory
+        # Made with the next answer, which is refused where an effect fails at it.
+        self._memory = None
         self._model, self._scale = model, own['feedforward_scale']
-        self._remembers = self._memory.has_memory
         if own['missing_derivatives'] == SPLINE:
             load_splines()
         self._clamps = own['limit_policy'] == CLAMP
@@ -86,25 +92,34 @@ class Feedforward:
 
         Raises
         ------
-        Rejection, WorkspaceError, SingularityError, LimitError
+        Rejection, WorkspaceError, SingularityError, LimitError, EffectError
             Where nothing may; the memory is then what it was.
         """
+        memory = self._memory or self._made_memory()
         if not self._remembers:
-            forces = self._model.drive_forces(request.motion, self._memory)
+            forces = self._model.drive_forces(request.motion, memory)
             answer = self._checked(request, forces)
         else:
             # Memory advances with what is executed, the first point, once that is accepted.
-            motion, ahead = self._timed(request), self._memory.copy()
+            motion, ahead = self._timed(request), memory.copy()
             answer = self._checked(request, self._model.drive_forces(motion, ahead))
             if len(motion) > 1:
-                ahead = self._memory
+                ahead = memory.copy()
                 self._model.drive_forces(motion[:1], ahead)
             self._memory = ahead
         self._last = request
         return answer
 
+    def _made_memory(self) -> ModelState:
+        self._memory = memory = (self._model.continued_state(*self._before) if self._before
+                                 else self._model.initial_state())
+        self._remembers = memory.has_memory
+        return memory
+
     def hold(self, gravity: bool) -> Answer:
         """Return what goes out to hold the last accepted pose at rest, or zeros.
+
+        Effects of other packages that fail are left out: a drive must be held without them, too.
 
         Raises
         ------
@@ -116,7 +131,7 @@ class Feedforward:
         last = self._last.motion
         # The forces at rest, not those of the way there: no memory of it.
         motion = PlatformMotion.at_rest(last.position[-1:], last.orientation[-1:]).with_time([0.0])
-        forces = self._model.drive_forces(motion)
+        forces = self._model.sound_at(motion).drive_forces(motion)
         effort = self._limits.clamped(self._scale * forces.total) if gravity else (
             np.zeros_like(forces.total))
         if not np.all(np.isfinite(effort)):

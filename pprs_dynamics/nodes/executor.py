@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import signal
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
-from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.guard_condition import GuardCondition
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.subscription import Subscription
+from rclpy.task import Future
 from rclpy.timer import Timer
+
+from pprs_dynamics.nodes.rclpy_internals import (
+    InternalsChangedError,
+    WaitSet,
+    call_if_due,
+    missing,
+    take,
+)
 
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
 PATIENCE = 1.0  # [s] in which a node ends by itself
@@ -29,32 +40,50 @@ class PromptExecutor(SingleThreadedExecutor):
     rclpy builds a task, a coroutine and a new wait set of every entity and every event handler
     for each message, which costs more than the model. Here messages and timers are served at
     once, and only services and guard conditions go that way. Event handlers, which tell of QoS
-    that does not fit, are looked at once a second.
+    that does not fit, are looked at once a second. With an rclpy whose internals have changed,
+    everything goes rclpy's way.
     """
 
     def __init__(self, **options: Any) -> None:
+        # Triggered where entities come or go, or by `stop`: nothing to serve in either case.
+        self._waker = GuardCondition(None, None, options.get('context'))
+        self._stopped: Future[None] = Future()
+        self._takes_info: WeakKeyDictionary[Subscription, bool] = WeakKeyDictionary()
         super().__init__(**options)
-        self._stopped = False
-        self._wait_set: Any = None
-        self._sizes: tuple[int, ...] = ()
+
+    def wake(self) -> None:
+        """Look anew at what there is to wait for."""
+        super().wake()
+        self._waker.trigger()
 
     def stop(self) -> None:
         """End `spin` after the present callback; from any thread."""
-        self._stopped = True
+        self._stopped.set_result(None)
         self.wake()
 
     def spin(self) -> None:
         """Execute callbacks until `stop` or shutdown."""
-        rest_due = 0.0
-        while not self._stopped and self._context.ok() and not self._is_shutdown:
+        reason = f'{", ".join(names)} missing' if (names := missing()) else ''
+        if not reason:
+            try:
+                self._spin_promptly()
+            except InternalsChangedError as error:
+                reason = str(error)
+        if reason:
+            get_logger('executor').warning(
+                f'this release of rclpy is not known ({reason}): its own executor is used, which '
+                'answers more slowly')
+            self.spin_until_future_complete(self._stopped)
+
+    def _spin_promptly(self) -> None:
+        rest_due, wait_set = 0.0, WaitSet(self.context)
+        while not self._stopped.done() and self.context.ok():
             nodes = self.get_nodes()
             subscriptions = [each for node in nodes for each in node.subscriptions]
             timers = [each for node in nodes for each in node.timers]
-            others = self._wait(nodes, subscriptions, timers)
-            messages = self._wait_set.get_ready_entities('subscription')
-            for subscription in subscriptions:
-                if subscription.handle.pointer in messages:
-                    self._take(subscription)
+            others = self._wait(wait_set, nodes, subscriptions, timers)
+            for subscription in wait_set.ready('subscription', subscriptions):
+                self._take(subscription)
             for timer in timers:
                 self._fire(timer)
             if others or time.monotonic() > rest_due:
@@ -62,58 +91,41 @@ class PromptExecutor(SingleThreadedExecutor):
                 self.spin_once(timeout_sec=0)
 
     def _wait(
-        self, nodes: list[Node], subscriptions: list[Subscription], timers: list[Timer],
+        self, wait_set: WaitSet, nodes: list[Node], subscriptions: list[Subscription],
+        timers: list[Timer],
     ) -> bool:
         """Wait for anything, and return whether it is neither a message nor a timer."""
-        # Woken where entities come or go, or by `stop`: nothing to serve in either case.
-        wakers = [each.handle for each in (self._guard, self._sigint_gc) if each is not None]
-        guards = [each.handle for node in nodes for each in node.guards]
-        clients = [each.handle for node in nodes for each in node.clients]
-        services = [each.handle for node in nodes for each in node.services]
-        sizes = (len(subscriptions), len(wakers) + len(guards), len(timers), len(clients),
-                 len(services), 0)
-        if sizes != self._sizes:
-            self._wait_set = rclpy_implementation.WaitSet(*sizes, self._context.handle)
-            self._sizes = sizes
-        wait_set = self._wait_set
-        wait_set.clear_entities()
-        for subscription in subscriptions:
-            wait_set.add_subscription(subscription.handle)
-        for timer in timers:
-            wait_set.add_timer(timer.handle)
-        for add, handles in ((wait_set.add_guard_condition, wakers),
-                             (wait_set.add_guard_condition, guards),
-                             (wait_set.add_client, clients), (wait_set.add_service, services)):
-            for handle in handles:
-                add(handle)
-        wait_set.wait(-1)
-        if not self._context.ok():
+        guards = [each for node in nodes for each in node.guards]
+        clients = [each for node in nodes for each in node.clients]
+        services = [each for node in nodes for each in node.services]
+        wait_set.wait(subscriptions, timers, [self._waker, *guards], clients, services)
+        if not self.context.ok():
             raise ExternalShutdownException
-        if services and wait_set.get_ready_entities('service'):
-            return True
-        if clients and wait_set.get_ready_entities('client'):
-            return True
-        ready = wait_set.get_ready_entities('guard_condition') if guards else ()
-        return any(handle.pointer in ready for handle in guards)
+        return bool(wait_set.ready('service', services) or wait_set.ready('client', clients)
+                    or wait_set.ready('guard_condition', guards))
 
     def _take(self, subscription: Subscription) -> None:
-        wants_info = subscription._callback_type is Subscription.CallbackType.WithMessageInfo
+        wants_info = self._takes_info.get(subscription)
+        if wants_info is None:
+            wants_info = self._takes_info[subscription] = _takes_two(subscription.callback)
         for _ in range(MESSAGES_AT_ONCE):
-            with subscription.handle:
-                taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            taken = take(subscription)
             if taken is None:
                 return
             subscription.callback(*taken[:2 if wants_info else 1])
 
     def _fire(self, timer: Timer) -> None:
-        try:
-            with timer.handle:
-                if not timer.handle.is_timer_ready():
-                    return
-                timer.handle.call_timer()
-        except InvalidHandle:
-            return  # destroyed by what was served before
-        timer.callback()
+        if call_if_due(timer):
+            timer.callback()
+
+
+def _takes_two(callback: Callable[..., None]) -> bool:
+    """Return whether a callback takes more than the message, by the rule of rclpy."""
+    try:
+        inspect.signature(callback).bind(None)
+    except TypeError:
+        return True
+    return False
 
 
 class StopSignals:

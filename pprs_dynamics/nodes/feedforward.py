@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
@@ -19,6 +19,7 @@ from pprs_dynamics.nodes import answer_cdr
 from pprs_dynamics.nodes.answer import Answer, Feedforward
 from pprs_dynamics.nodes.conversions import NANOSECONDS
 from pprs_dynamics.nodes.feedforward_settings import HOLD_GRAVITY, PARAMETERS, SILENT
+from pprs_dynamics.nodes.managed_node import ManagedNode
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.nodes.parameters import declare_own
 from pprs_dynamics.nodes.provenance import files_given, fingerprint
@@ -34,22 +35,21 @@ MARGINS_PERIOD = 0.01
 LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
 
 
-class FeedforwardNode(ExplainsRefusals, LifecycleNode):
+class FeedforwardNode(ExplainsRefusals, ManagedNode):
     """Answers every valid trajectory with friction-compensated drive forces.
 
     A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
-    reason stands in `~/status` and in the log. When commands go stale, and when the node is
-    deactivated or ended, `timeout_action` is done once.
+    reason stands in `~/status` and in the log. When commands go stale, when an effect of another
+    package fails, and when the node is deactivated or ended, `timeout_action` is done once.
     """
 
     def __init__(self, **options: Any) -> None:
-        LifecycleNode.__init__(
+        ManagedNode.__init__(
             self, 'feedforward', allow_undeclared_parameters=True, **options)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._subscription: Any = None
         self._watchdog: CommandWatchdog | None = None
-        self._active = False
         self._failure: Exception | None = None
         own = declare_own(self, PARAMETERS)
         self._settings = ModelParameters(self, PARAMETERS, self._use_settings)
@@ -95,7 +95,6 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer messages from now on."""
-        self._active = True
         self._status.report('OK', 'WAITING', 'waiting for the first message')
         model = self._settings.model
         self.get_logger().info(
@@ -106,7 +105,6 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer nothing any more, with the timeout's action as the last word."""
         self._last_word()
-        self._active = False
         self._status.report('OK', 'INACTIVE', 'waiting to be activated')
         return super().on_deactivate(state)
 
@@ -119,7 +117,6 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End for good; the process goes on telling so until it is stopped."""
         self._last_word()
-        self._active = False
         self._destroy_topics()
         self._status.report('OK', 'FINALIZED', 'shut down')
         return super().on_shutdown(state)
@@ -172,7 +169,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
 
     def _on_trajectory(self, data: bytes, info: dict[str, int]) -> None:
         began = time.perf_counter()
-        if not self._active or self._watchdog is None:
+        if self.state != 'active' or self._watchdog is None:
             return
         self._counters['received'] += 1
         own, now = self._settings.own, self.get_clock().now().nanoseconds
@@ -232,8 +229,14 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
-        self._status.report('ERROR', rejection.code, rejection.text)
-        self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
+        text, watchdog = rejection.text, self._watchdog
+        if rejection.code == 'EFFECT' and watchdog is not None and watchdog.fresh:
+            # Not the message is wrong but the model: waiting for a better one would help nothing.
+            watchdog.stop()
+            self._counters['stale'] += 1
+            text = f'{text}; {self._do_timeout_action()}'
+        self._status.report('ERROR', rejection.code, text)
+        self.get_logger().warning(f'rejected, {rejection.code}: {text}', throttle_duration_sec=1.0)
 
     # --- stale commands -------------------------------------------------------------------------
 
@@ -267,7 +270,10 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
             self._joint_command.publish(answer_cdr.joint_state(
                 self.get_clock().now().nanoseconds, held.effort[0],
                 held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
-        return 'the last pose is held at rest' if action == HOLD_GRAVITY else 'forces are zero'
+        if action != HOLD_GRAVITY:
+            return 'forces are zero'
+        failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
+        return f'the last pose is held at rest{", without " if failed else ""}{", ".join(failed)}'
 
     # --- status ---------------------------------------------------------------------------------
 
@@ -282,7 +288,7 @@ class FeedforwardNode(ExplainsRefusals, LifecycleNode):
         self._counted = (accepted, now)
         threshold = self._settings.own['lag_warning']
         self._status.facts.update(
-            state=self._state_machine.current_state[1],
+            state=self.state,
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
             lagging=bool(threshold and accepted > before and self._lag.median > threshold),

@@ -61,8 +61,8 @@ class ModelParameters:
 
     Raises
     ------
-    ModelError
-        Where the parameters at start are no model.
+    ModelError, EffectError
+        Where the parameters at start are no model, or an effect of another package cannot begin.
     """
 
     def __init__(
@@ -85,7 +85,9 @@ class ModelParameters:
     def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[DriveModel, dict[str, Any]]:
         values = current_values(self._node, changes)
         own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
-        return model_from(values), own
+        model = model_from(values)
+        model.initial_state()  # an effect that cannot even begin is refused
+        return model, own
 
     def check(self, changes: list[Parameter]) -> SetParametersResult:
         """Return whether the parameters would be valid with some of them changed, and why not."""

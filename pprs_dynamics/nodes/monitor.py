@@ -8,7 +8,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.errors import EffectError, PprsError
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
@@ -38,6 +38,7 @@ class MonitorNode(ExplainsRefusals):
         prepare(self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])
+        self._begins_anew = self._cannot_begin = False
         self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}
         self._origin: int | None = None
         self._status = StatusReporter(self, {}, self._counters)
@@ -50,7 +51,7 @@ class MonitorNode(ExplainsRefusals):
         self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
 
     def _use(self) -> None:
-        self._comparison.use_model(self._settings.model)
+        self._begins_anew = True
 
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
@@ -61,6 +62,8 @@ class MonitorNode(ExplainsRefusals):
         except Rejection as rejection:
             self._reject(rejection)
             return
+        if self._cannot_begin:
+            return  # samples would pile up
         stamp = conversions.nanoseconds(message.header.stamp)
         if self._origin is None:
             self._origin = stamp
@@ -69,8 +72,14 @@ class MonitorNode(ExplainsRefusals):
 
     def _judge(self) -> None:
         try:
+            if self._begins_anew:
+                self._cannot_begin = True
+                self._comparison.use_model(self._settings.model)
+                self._begins_anew = self._cannot_begin = False
             compared = self._comparison.evaluate()
         except PprsError as error:
+            # An effect that failed may have left its memory half advanced.
+            self._begins_anew = self._begins_anew or isinstance(error, EffectError)
             self._reject(Rejection.of(error))
             return
         self._counters['gaps'] = self._comparison.gaps

@@ -15,9 +15,11 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import KEYS, LARGEST, Key, is_axis
+from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, LARGEST, NODE_KEYS, Key, is_axis
 from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.model.parameter_values import is_known
+from pprs_dynamics.nodes.provenance import names_given
+from pprs_dynamics.nodes.rclpy_internals import parameter_overrides
 
 ACTIVE = 'effects.active'
 LARGEST_INTEGER = 2**63 - 1
@@ -157,8 +159,7 @@ def refuse_unknown(node: Node) -> None:
 
 def overrides(node: Node) -> dict[str, Any]:
     """Return what was given in files and on the command line, None for an empty list."""
-    # rclpy offers no public way to see overrides of names that are not declared.
-    return {name: parameter.value for name, parameter in node._parameter_overrides.items()}
+    return parameter_overrides(node, lambda: {*KEYS, *AXIS_KEYS, *NODE_KEYS, *names_given()})
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:

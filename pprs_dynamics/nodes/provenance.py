@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.model.bounded_yaml import read_text
+from pprs_dynamics.model.bounded_yaml import parse, read_text
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.plain_text import displayed
 
 OPTION = '--params-file'
+BLOCK = 'ros__parameters.'
 
 
 def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
@@ -39,6 +41,24 @@ def check_files(arguments: Sequence[str]) -> None:
 
 def _paths(arguments: Sequence[str]) -> list[Path]:
     return [Path(value) for option, value in pairwise(arguments) if option == OPTION]
+
+
+def names_given(arguments: Sequence[str] | None = None) -> list[str]:
+    """Return the names of parameters on a command line and in the files that it names."""
+    arguments = sys.argv if arguments is None else arguments
+    names = [name.partition(BLOCK)[2]
+             for path in _paths(arguments) if path.is_file()
+             for name in _flat(parse(read_text(path), path)) if BLOCK in name]
+    return names + [value.partition(':=')[0].rpartition(':')[2]
+                    for option, value in pairwise(arguments) if option in ('-p', '--param')]
+
+
+def _flat(tree: Mapping[str, Any]) -> Iterator[str]:
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from (f'{name}.{rest}' for rest in _flat(value))
+        else:
+            yield str(name)
 
 
 def fingerprint(model: DriveModel) -> str:

@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.nodes.parameters import overrides
 
 # Reliable, and deep enough that a listener that stalls for a tenth of a second at 1 kHz gets
 # every message: each one is answered.
@@ -56,8 +57,8 @@ def _overridable(node: Node, topic: str, create: Callable[[QoSOverridingOptions]
             AssertionError) as error:
         name = f'qos_overrides.{node.resolve_topic_name(topic)}'
         prefix = f'{name}.'
-        given = {key.removeprefix(prefix): value.value
-                 for key, value in node._parameter_overrides.items() if key.startswith(prefix)}
+        given = {key.removeprefix(prefix): value
+                 for key, value in overrides(node).items() if key.startswith(prefix)}
         raise ModelError(name, given, 'hold history: keep_last or keep_all, a depth from 0 on, '
                          'reliability: reliable or best_effort, and durability: volatile or '
                          f'transient_local ({error})') from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pprs_dynamics.errors import (
     ConvergenceError,
+    EffectError,
     LimitError,
     MotionError,
     PprsError,
@@ -12,7 +13,7 @@ from pprs_dynamics.errors import (
 )
 
 CODES = ('EMPTY', 'NAMES', 'FRAME', 'SIZE', 'NON_FINITE', 'QUATERNION', 'TIME', 'WORKSPACE',
-         'SINGULAR', 'LIMIT', 'OUTPUT')
+         'SINGULAR', 'LIMIT', 'OUTPUT', 'EFFECT')
 
 _KINDS = {'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
 
@@ -45,4 +46,6 @@ class Rejection(PprsError):
             return cls('WORKSPACE', str(error))
         if isinstance(error, LimitError):
             return cls('LIMIT', str(error))
+        if isinstance(error, EffectError):
+            return cls('EFFECT', str(error))
         raise error

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -38,7 +37,7 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except PprsError as error:
         return _complain(str(error))
-    except RCLError as error:
+    except RuntimeError as error:  # the public base of rclpy's own
         # An unreadable parameter file, or arguments that are none.
         return _complain(' '.join(str(error).split()))
     node = None

@@ -10,7 +10,6 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from rclpy._rclpy_pybind11 import RMWError
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -40,7 +39,7 @@ def message_in(data: bytes, kind: type) -> Any:
     """
     try:
         message = deserialize_message(data, kind) if is_whole(data, kind) else None
-    except (RMWError, UnicodeDecodeError):
+    except (RuntimeError, UnicodeDecodeError):  # the former is the public base of rclpy's own
         message = None
     if message is None:
         package = kind.__module__.partition('.')[0]

@@ -1,0 +1,88 @@
+"""Words of docs/reliability.md, which `reliability.py` writes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import latency
+
+HEAD = """# How far the feedforward node can be relied on
+
+`make reliability` runs all of this (about 20 minutes) and writes this page; `make
+reliability-full` does it at full size (an hour and more). What stands here was measured with
+Kilted on a virtual machine that other programs used too: a load over the number of cores means
+that node and client waited for a processor. The tests contain short forms of all but the first.
+"""
+
+RELEASES = """## Releases of ROS 2
+
+Run with the wheels of PyPI, Python 3.11 and Fast DDS:
+
+| release | rclpy | rmw_fastrtps_cpp | what was run |
+|---|---|---|---|
+| Kilted | 9.1.2 | 9.3.3 | every test, and all of the above |
+| Jazzy | 7.1.6 | 8.4.3 | the tests of the nodes over DDS; not those of `colcon` and of adoption \
+in closed loop, nor the above |
+
+Neither was run from a distribution's packages, nor with another middleware.
+
+Names of rclpy that are not public stand in `pprs_dynamics/nodes/rclpy_internals.py` and nowhere
+else: `rclpy_implementation.WaitSet` with what it waits for and takes, and
+`Node._parameter_overrides`. Both releases have them, and so has the source of rclpy 8.0.0. Where
+one is missing, or takes other arguments, rclpy's own executor serves the node, which says so in
+the log and answers more slowly; and parameters are asked for one by one, by the names in the
+model's table, the parameter files and the command line. `test/test_rclpy_internals.py` and
+`test/test_executor.py` take the names away and talk to the node.
+"""
+
+
+def _latency(found: dict[str, Any]) -> str:
+    return ('\n'.join(latency.rows(found)) + '\n\nThe echo node is what rclpy\'s tutorials show: '
+            'message objects, rclpy\'s executor, six zeros. Both ran at the same time, measured in '
+            'turns by one client of one thread.\n')
+
+
+def _fuzz(found: dict[str, Any]) -> str:
+    rejected = ', '.join(f'{code} {count:,}' for code, count in found['rejected'].items())
+    return (f'{found["messages"]:,} messages, of which {found["accepted"]:,} were valid and '
+            f'answered. Rejected: {rejected}. Counted under a wrong code: '
+            f'{len(found["miscounted"])} codes. Numbers that left the node: '
+            f'{found["numbers_seen"]:,}, not finite or over a limit: {found["bad_numbers"]}. '
+            f'Answers to a known pose that were wrong after damage: '
+            f'{found["wrong_answers_after_damage"]}. Node alive at the end: {found["alive"]}. '
+            f'Resident memory grew by {found["memory_growth_mb"]:.0f} MB, in steps with the '
+            'messages of 10 000 points (1.8 MB, one in 5000) among bursts of others. What keeps '
+            'it has not been found: without these 100 000 messages make it grow by 1.6 MB, and a '
+            'stream of nothing but these, valid or damaged, by 18 to 32 MB, all of it with the '
+            'first forty.\n')
+
+
+def _storm(found: dict[str, Any]) -> str:
+    return (f'{found["sets"]:,} sets of random parameters while streaming, '
+            f'{found["accepted"]:,} of them accepted. Accepted though no model file may hold them: '
+            f'{found["wrongly_accepted"]}; refused though one may: {found["wrongly_refused"]}; '
+            f'without a reason: {found["refused_without_reason"]}. Of {found["answers"]:,} '
+            f'answers, {found["wrong_answers"]} were not those of the model that the accepted '
+            'ones make.\n')
+
+
+def _soak(found: dict[str, Any]) -> str:
+    return (f'{found["minutes"]:g} minutes at {found["rate"]:g} Hz: {found["sent"]:,} messages '
+            f'sent, {found["answered"]:,} answered. Resident memory after the first minute '
+            f'{found["memory_mb"]} MB, growth from then on {found["growth_mb"]} MB (goal: below '
+            f'2). Longest wait of a message for the node {found["lag"]["max"]:.2f} s; commands '
+            f'went stale {found["stale"]} times, once as the stream ended.\n')
+
+
+def _restart(found: dict[str, Any]) -> str:
+    slowest = max(found['start_to_first_command_s'])
+    return (f'Killed with SIGKILL in mid-stream and started again {found["kills"]} times: messages '
+            f'that reached a new node and were not answered: {found["unanswered"]}. From the start '
+            f'of the process to its first command at most {slowest:.2f} s.\n')
+
+
+SECTIONS: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
+    'latency': ('Speed', _latency), 'fuzz': ('Damaged messages', _fuzz),
+    'storm': ('Parameters', _storm), 'soak': ('Endurance', _soak),
+    'restart': ('Restart', _restart)}
