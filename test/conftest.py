@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
 
 import pytest
@@ -14,6 +15,9 @@ use_one_thread()
 _DOMAIN, _HOLDER = reserve_domain()
 os.environ.update({name: value for name, value in environment(_DOMAIN).items()
                    if name.startswith('ROS_')})
+# What tests keep is theirs.
+_CACHE = tempfile.TemporaryDirectory()
+os.environ['XDG_CACHE_HOME'] = _CACHE.name
 
 
 @pytest.fixture(scope='session')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,11 @@ from browser import find_browser, render
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.commands.diagnosis_cache import diagnosis_key, kept_diagnosis
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.prescribed import PrescribedPlant
@@ -104,12 +107,31 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     assert all(isinstance(one, str) for one in result['warnings'])
 
 
-def test_the_terminal_says_what_why_and_how_to_confirm(folder: Path) -> None:
-    shown = ' '.join((folder / 'stdout.txt').read_text().replace('│', ' ').split())
-    for part in (f'The model lacks {HIDDEN} on', 'which took no part in the fit', 'cause',
-                 'confirm', 'Candidates for the first place', f'pprs adopt {HIDDEN}',
-                 'page: page.html'):
+def test_the_terminal_says_verdict_fall_and_the_next_command_in_25_lines(folder: Path) -> None:
+    text = (folder / 'stdout.txt').read_text()
+    assert len(text.strip().splitlines()) <= 25
+    shown = ' '.join(text.replace('│', ' ').split())
+    for part in (f'The model lacks {HIDDEN} on', 'the error falls from', 'Runner-up',
+                 f"pprs adopt {HIDDEN} run.csv --validate '<b>other<b>.mcap' --output "
+                 f'with_{HIDDEN}.yaml', 'page: page.html'):
         assert part in shown
+
+
+def test_adopt_after_diagnose_need_not_diagnose_again(folder: Path) -> None:
+    """With what `diagnose` kept; and not once a recording or the model is another."""
+    shutil.copy(folder / 'run.csv', folder / 'copy.csv')
+    assert kept_diagnosis(diagnosis_key(DriveModel.load(), [str(folder / 'copy.csv')], None)), (
+        'the contents count, not the name')
+    other = build_model({**DriveModel.load().values, 'masses.payload': 1.001})
+    assert kept_diagnosis(diagnosis_key(other, [str(folder / 'run.csv')], None)) is None
+    with (folder / 'copy.csv').open('a') as file:
+        file.write('\n')
+    assert kept_diagnosis(
+        diagnosis_key(DriveModel.load(), [str(folder / 'copy.csv')], None)) is None
+    done = pprs('adopt', HIDDEN, 'run.csv', '--validate', '<b>other<b>.mcap', '--output',
+                'adopted.yaml', cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.strip().splitlines()) <= 25
 
 
 MISTAKES = {
@@ -149,10 +171,9 @@ def test_a_browser_draws_the_page_without_complaints(
     assert '<b>other' not in text
     seen = render(folder / 'page.html', tmp_path / 'page.png', width)
     assert seen.console == []
-    # The effect, the fall, the contribution, the candidates, each drive before and after.
-    figures = text.count('class="plotly-graph-div"')
-    assert figures == 4 + len(DRIVES)
-    assert seen.document.count('class="main-svg"') >= figures
+    # The first picture is in view; cards, candidates, contributions and drives are in folds.
+    assert text.count('class="plot"') == 5 + len(DRIVES)
+    assert 'class="main-svg"' in seen.document
     picture = matplotlib.image.imread(seen.picture)
     assert picture.shape[1] == width
     pixels = picture[..., :3]

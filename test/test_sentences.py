@@ -16,6 +16,7 @@ from made_up_diagnosis import (
     found_effect,
     made_up_diagnosis,
     made_up_residuals,
+    ranked_sets,
     statement,
     within_model_error,
 )
@@ -23,9 +24,16 @@ from rich.console import Console
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
+from pprs_dynamics.diagnosis.found_effects import RankedSet
 from pprs_dynamics.diagnosis.partial import partial_residual
-from pprs_dynamics.diagnosis.quantities import name_drives, with_uncertainty
-from pprs_dynamics.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.diagnosis.quantities import (
+    change,
+    name_drives,
+    percent,
+    with_uncertainty,
+)
+from pprs_dynamics.diagnosis.rivals import RivalEffect
+from pprs_dynamics.diagnosis.sentences import GivenFiles, set_rows, word_diagnosis
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.mechanism.robot import DRIVES
@@ -221,17 +229,28 @@ def test_drives_are_named_together_where_they_are_all() -> None:
     assert name_drives(('axis',), ('axis',)) == 'axis'
 
 
+def printed(diagnosis: Diagnosis, width: int, details: bool) -> str:
+    file = io.StringIO()
+    Console(file=file, width=width).print(diagnosis_view(
+        diagnosis, word_diagnosis(diagnosis), details))
+    return file.getvalue()
+
+
+def in_one_line(text: str) -> str:
+    return re.sub(r'[\s│]+', ' ', text)
+
+
 @pytest.mark.parametrize('width', [80, 120])
 @pytest.mark.parametrize('make', [one_effect, ambiguous, unknown, everything])
-def test_the_terminal_shows_everything_within_its_width(make: Any, width: int) -> None:
+def test_with_details_the_terminal_shows_everything_within_its_width(
+    make: Any, width: int,
+) -> None:
     diagnosis = make()
     words = word_diagnosis(diagnosis)
-    file = io.StringIO()
-    Console(file=file, width=width).print(diagnosis_view(diagnosis, words))
-    text = file.getvalue()
+    text = printed(diagnosis, width, details=True)
     assert max(map(len, text.splitlines())) <= width
     assert '…' not in text, 'nothing is cut off'
-    shown = re.sub(r'[\s│]+', ' ', text)
+    shown = in_one_line(text)
     for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
                      *words.within_model_error, *words.warnings):
         assert sentence in shown
@@ -239,6 +258,80 @@ def test_the_terminal_shows_everything_within_its_width(make: Any, width: int) -
         for sentence in (finding.what, finding.why, finding.cause, finding.confirm,
                          *finding.remarks):
             assert sentence in shown
+
+
+@pytest.mark.parametrize('make', [one_effect, ambiguous, unknown, everything])
+def test_verdict_fall_and_next_step_fit_25_lines_of_80_columns(make: Any) -> None:
+    diagnosis = replace(make(), sets=ranked_sets('coulomb_friction', 'hysteresis'))
+    words = word_diagnosis(diagnosis)
+    text = printed(diagnosis, 80, details=False)
+    # With those that the command prints: a finding of a recording, and the name of the page.
+    assert len(text.splitlines()) <= 22
+    for part in (words.headline, words.following, words.command,
+                 'Runner-up hysteresis on lift_2, cost +7'):
+        assert part in in_one_line(text)
+
+
+def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
+    diagnosis = one_effect(sets=(
+        *ranked_sets('coulomb_friction', 'hysteresis'),
+        RankedSet((), 120.4), RankedSet((('unknown, position', ('lift_2',)),), 130.0)))
+    assert set_rows(diagnosis) == [
+        ('coulomb_friction on lift_2', 'the best'), ('hysteresis on lift_2', '+7'),
+        ('nothing missing', '+120'), ('a pattern depending on position on lift_2', '+130')]
+    page = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a'])
+    assert '>hysteresis on lift_2</td>' in page.html()
+
+
+def test_one_pattern_on_all_drives_is_one_finding() -> None:
+    line = tuple(statement(drive, 'frequency', 'line', (7.0, 7.1)) for drive in DRIVES)
+    words = word_diagnosis(made_up_diagnosis('unknown', depends_on=line))
+    assert [finding.title for finding in words.unexplained] == [
+        'unknown on slide_1, slide_2, slide_3, lift_1, lift_2 and lift_3, at one frequency']
+    assert 'place' not in words.headline
+
+
+def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:
+    found = found_effect('external_wrench', None)
+    rival = RivalEffect('base_tilt', found.effect, None, found.parameters, 0.0521, 3.24,
+                        found.force, made_up_residuals().error)
+    words = word_diagnosis(ambiguous(), rivals=(rival,))
+    said, = words.rivals
+    assert 'In place of base_tilt, external_wrench would explain' in said.what
+    assert '0.600 ± 0.020 N' in said.what
+    assert '0.0521 N' in said.why
+    assert '3.2 above the best' in said.why
+    assert said.confirm[1:-1] == CATALOGUE['external_wrench'].card.confirm[1:]
+    html = diagnosis_page(ambiguous(), words, made_up_residuals(), ['a'], (), (rival,)).html()
+    card = html[html.index('<h3>or external_wrench'):]
+    assert 'class="plot"' in card[:card.index('</section>')]
+
+
+def test_commands_hold_the_real_names_as_a_shell_takes_them() -> None:
+    files = GivenFiles(('my run.mcap', 'b.csv'), ('held.csv',), 'robot.yaml')
+    words = word_diagnosis(one_effect(), files)
+    assert words.command == (
+        "pprs adopt coulomb_friction 'my run.mcap' b.csv --validate held.csv --model robot.yaml "
+        '--output with_coulomb_friction.yaml')
+    assert word_diagnosis(ambiguous(), files).command == (
+        "pprs next-experiment 'my run.mcap' b.csv --model robot.yaml --output next.csv")
+
+
+@pytest.mark.parametrize(('before', 'after', 'said'), [
+    (0.25, 0.051, 'falls from 0.25 N to 0.051 N'),
+    (0.86512, 0.86488, 'falls from 0.8651 N to 0.8649 N'),
+    (0.865, 0.868, 'does not fall (0.865 N before, 0.868 N after)'),
+    (1234.5, 12.3, 'falls from 1234 N to 12.3 N')])
+def test_an_error_falls_by_digits_that_show_it_or_not_at_all(
+    before: float, after: float, said: str,
+) -> None:
+    assert change(before, after) == said
+
+
+@pytest.mark.parametrize(('share', 'text'), [
+    (1.3, '130%'), (0.41, '41%'), (0.0123, '1.2%'), (0.0995, '10%'), (float('nan'), 'none')])
+def test_shares_are_read_without_powers_of_ten(share: float, text: str) -> None:
+    assert percent(share) == text
 
 
 def test_the_steps_of_the_error_end_where_comparisons_do() -> None:

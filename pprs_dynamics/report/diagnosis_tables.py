@@ -25,6 +25,7 @@ from pprs_dynamics.diagnosis.sentences import (
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give
+WIDTH = 80  # characters of a line of values that is shown without --details
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 
@@ -40,16 +41,17 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     if diagnosis.effects:
         yield _plain_table(('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
                            _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
-        values = _joined(fitted_values(diagnosis))
-        for effect, drive, text in values[:MOST_LISTED]:
-            yield f'  {escape(f"{effect} on {drive}" if drive else effect)}: {escape(text)}'
-        if len(values) > MOST_LISTED:
-            yield f'  … and values of {len(values) - MOST_LISTED} more'
+        lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
+                 for effect, drive, text in _joined(fitted_values(diagnosis))]
+        shown = [line for line in lines if len(line) <= WIDTH][:MOST_LISTED]
+        yield from map(escape, shown)
+        if len(lines) > len(shown):
+            yield f'  … values of {len(lines) - len(shown)} more: --details'
     if len(diagnosis.sets) > 1:
         text, cost = set_rows(diagnosis)[1]
         yield f'[bold]Runner-up[/] {escape(text)}, cost {cost}'
-    for line in words.within_model_error[:1]:
-        yield escape(line)
+    if words.within_model_error:
+        yield f'Within the model error of what was found: {len(words.within_model_error)} more'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0])}'
     yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
