@@ -23,7 +23,7 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
     # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
     exact = isinstance(candidate, EffectCandidate) and not candidate.effect.idealised
-    share = decisions.own_form_share if exact else decisions.form_share
+    share = decisions.exact_share if exact else decisions.form_share
     drives = {d for block in candidate.blocks for d in block.rows}
     allowed, names = 0.0, []
     for other in found.effects:
@@ -37,18 +37,20 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
         if isinstance(effect, CatalogueEffect) and effect.idealised:
             allowed += share ** 2 * _square_of_part(regression, found, effect.name, drives)
             names.append(effect.name)
-    own = decisions.own_form_share ** 2 * _own_friction(design, regression, found, drives)
+    own = 0.0 if exact else decisions.own_form_share ** 2 * _own_friction(
+        design, regression, found, drives)
     if own > allowed:
         names = ["the model's own friction"]
-    square = beyond_others(found, candidate)
+    square = beyond_others(regression, found, candidate)
     return float(np.sqrt(square / max(allowed + own, 1e-300))), tuple(names)
 
 
-def beyond_others(found: CandidateSet, candidate: Candidate) -> float:
+def beyond_others(regression: Regression, found: CandidateSet, candidate: Candidate) -> float:
     """Return the whitened square of what no refit of the others makes good."""
     free = [block for block in candidate.blocks if not block.is_fixed]
     if not free:
-        return np.inf
+        return sum(whitened_square(regression, found, block, set(block.rows))
+                   for block in candidate.blocks)
     index = np.concatenate([np.arange(place.start, place.stop) for place in (
         found.fit.places[block] for block in free)])
     c = found.fit.coefficients[index]

@@ -28,8 +28,11 @@ class Decisions:
         0.1, '1', 'share of the force of an idealised effect that its lack of fit may leave',
         'forms of friction and springs in the literature differ by 5 to 15 %')
     own_form_share: float = _number(
-        0.02, '1', "the same for the model's own friction, and for what looks like an exact effect",
+        0.02, '1', "the same for the model's own friction",
         'load-dependent friction is computed from frictionless loads, 1 to 2 % off')
+    exact_share: float = _number(
+        0.02, '1', 'share of an idealised effect that its lack of fit may put into an exact one',
+        'masses, gravity and sensors are exact: little else looks like them')
     rival_margin: float = _number(
         10.0, 'deviance', 'how near a set must come to the best to be told as its rival',
         'odds of 150 to 1')
