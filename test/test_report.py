@@ -10,7 +10,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
-from browser import find_browser, render
+from browser import Seen, chromium, needs_browser
 from ros_processes import executable
 
 from pprs_dynamics.measurement.recording import read_recording, write_recording
@@ -18,9 +18,6 @@ from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.report.comparison_figures import thinned, worst_spans
 from pprs_dynamics.report.page import Page
 from pprs_dynamics.residuals.residuals import Residuals
-
-needs_browser = pytest.mark.skipif(
-    find_browser() is None, reason='no Chromium on PATH to look at the page with')
 
 
 def pprs(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -115,12 +112,13 @@ def test_the_page_needs_no_network_and_escapes_names(folder: Path) -> None:
 def test_a_browser_draws_the_page_without_complaints(
     folder: Path, tmp_path: Path, name: str,
 ) -> None:
-    seen = render(folder / name, tmp_path / 'page.png')
-    assert seen.console == []
-    # Those in view are drawn, those in folds are not.
-    assert (folder / name).read_text().count('class="plot"') >= 1
-    assert 'class="main-svg"' in seen.document
-    picture = matplotlib.image.imread(seen.picture)
+    with chromium() as browser:
+        seen = Seen(browser, folder / name, viewport={'width': 1280, 'height': 1600})
+        assert seen.unfold() >= 1
+        assert seen.complaints == []
+        seen.tab.evaluate('scrollTo(0, 0)')
+        seen.tab.screenshot(path=tmp_path / 'page.png')
+    picture = matplotlib.image.imread(tmp_path / 'page.png')
     assert picture.shape[:2] == (1600, 1280)
     # Text and curves: dark and coloured pixels, on a page mostly white.
     pixels = picture[..., :3]

@@ -21,7 +21,8 @@ from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.parameter_file import read_parameters
 from pprs_dynamics.regression.base_columns import KnownNumber
-from pprs_dynamics.regression.design import Design, sensitivities_of
+from pprs_dynamics.regression.collecting import sensitivities_of
+from pprs_dynamics.regression.design import Design
 from pprs_dynamics.selection.decisions import DECISIONS
 from pprs_dynamics.selection.search import Search
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -19,12 +20,13 @@ EXAMPLE = PROJECT / 'docs' / 'example_effect'
 PAPER = PROJECT / 'config' / 'paper.yaml'
 
 
-def python(code: str, packages: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+def python(code: str, packages: Path, *arguments: object, limit: float = 60,
+           ) -> subprocess.CompletedProcess[str]:
     """Run code in a new process that finds `packages`, too."""
     path = os.pathsep.join(filter(None, (str(packages), os.environ.get('PYTHONPATH'))))
     return subprocess.run(
         [sys.executable, '-c', code, *map(str, arguments)], capture_output=True, text=True,
-        timeout=60, env={**os.environ, 'PYTHONPATH': path}, cwd=packages)
+        timeout=limit, env={**os.environ, 'PYTHONPATH': path}, cwd=packages)
 
 
 @pytest.fixture(scope='module')
@@ -179,3 +181,39 @@ def test_a_broken_effect_is_left_out_with_one_clear_warning_and_the_others_stay(
         assert reason in line
     assert any('second_of_that_name' in line and 'mine is taken' in line for line in told)
     assert 'Traceback' not in done.stderr
+
+
+FIND_FILTER = """
+import sys, json
+import numpy as np
+from pprs_dynamics import DriveModel
+from pprs_dynamics.adoption.adopt import adopt
+from pprs_dynamics.adoption.request import EffectRequest
+from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.model.model_file import build_model
+given = DriveModel.load(sys.argv[1])
+true = build_model({**given.values, 'effects.active': ['effort_filter'],
+                    **{f'effects.effort_filter.{d}.time': 0.03 for d in DRIVES}})
+time = np.arange(5000) * 0.002
+forces = true.drive_forces(Excitation().motion(time).with_time(time))
+effort = true.measured(forces).total
+effort = effort + 0.05 * np.random.default_rng(0).normal(size=effort.shape)
+recording = Recording.from_arrays('made', time, forces.mechanism.position, effort=effort)
+found = diagnose(given, [recording])
+answer = adopt(given, EffectRequest.of('effort_filter'), [recording], diagnosis=found)
+print(json.dumps({'found': found.to_json(), 'adopted': answer.to_json()}))
+"""
+
+
+def test_a_sensor_effect_of_another_package_that_bends_columns_is_found_and_adopted(
+        installed: Path, tmp_path: Path) -> None:
+    done = python(FIND_FILTER, installed, model_file(tmp_path, {}), limit=200)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert [one['name'] for one in said['found']['effects']] == ['effort_filter']
+    times = [one['value'] for one in said['found']['effects'][0]['parameters'].values()]
+    assert times == pytest.approx([0.03] * 6, rel=0.1)
+    assert said['adopted']['adopted'], said['adopted']['reason']

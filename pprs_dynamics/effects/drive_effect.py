@@ -178,7 +178,7 @@ class MeasurementEffect(DriveEffect):
         return tuple(np.zeros_like(drive.velocity) for _ in cls.coefficients)
 
     @classmethod
-    def sensor_columns(cls, effort: Array, time: Array | None, **shape: float,
+    def sensor_columns(cls, effort: Array, time: Array | None, /, **shape: float,
                        ) -> tuple[Array, ...]:
         """Return what the sensor adds to an effort per coefficient, (N,) each.
 

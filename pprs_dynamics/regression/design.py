@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -31,10 +30,7 @@ from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.model.axis_model import AxisModel
-from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.force_model import ForceModel, Forces
-from pprs_dynamics.regression.axis_sensitivities import AxisSensitivities
+from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.regression.base_columns import (
     BaseColumn,
     KnownNumber,
@@ -43,7 +39,7 @@ from pprs_dynamics.regression.base_columns import (
     ReversalShape,
     present_values,
 )
-from pprs_dynamics.regression.platform_sensitivities import PlatformSensitivities
+from pprs_dynamics.regression.collecting import ColumnCollector, sensitivities_of, stacked_columns
 from pprs_dynamics.regression.sensitivities import (
     BARE,
     HOMING,
@@ -51,7 +47,6 @@ from pprs_dynamics.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
-    Sensitivities,
     reversal_columns,
 )
 from pprs_dynamics.regression.terms import FullRate, Point, Term
@@ -59,7 +54,6 @@ from pprs_dynamics.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.residuals.residuals import Residuals
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
-COLUMN = 'column '
 FREE = 1e-6  # prior precision of what is not known beforehand
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
@@ -146,11 +140,11 @@ class Design:
                 if progress is not None:
                     progress((k + done / total) / len(reconstructions))
 
-            collector = _Collector(sensitivities)
+            collector = ColumnCollector(sensitivities)
             tables.append(treated_table(model, reconstruction, report, collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
-        stacked = _stacked(tables, len(model.drives))
+        stacked = stacked_columns(tables, len(model.drives))
         residuals = join_tables(model.drives, tables)
         count = len(model.drives)
         structure = tuple(
@@ -335,8 +329,8 @@ class Design:
 
     def friction(self) -> ActiveFriction | AxisFriction | None:
         """Return the friction that the model has in its drives."""
-        return next((e for e in self.model.effects
-                     if isinstance(e, (ActiveFriction, AxisFriction))), None)
+        own = (ActiveFriction, AxisFriction)
+        return next((effect for effect in self.model.effects if isinstance(effect, own)), None)
 
 
 def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
@@ -351,47 +345,3 @@ def _rows(column: Array) -> dict[int, Array]:
 
 def _by_drive(columns: Array, count: int) -> dict[int, Array]:
     return {d: columns[:, d] for d in range(count)}
-
-
-def _stacked(tables: list[dict[str, Array]], count: int) -> dict[str, Array]:
-    """Take the columns out of tables, (k, D, M) each by name."""
-    stacked: dict[str, Array] = {}
-    for name in [name for name in tables[0] if name.startswith(COLUMN)]:
-        flat = np.concatenate([table.pop(name) for table in tables])
-        stacked[name.removeprefix(COLUMN)] = flat.reshape(len(flat), -1, count).transpose(1, 2, 0)
-    return stacked
-
-
-def sensitivities_of(model: ForceModel, given: ForceModel) -> Sensitivities:
-    """Return the sensitivities of a model of either kind."""
-    if isinstance(model, AxisModel):
-        return AxisSensitivities(model, given)
-    assert isinstance(model, DriveModel)
-    return PlatformSensitivities(model, given)
-
-
-class _Collector:
-    """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
-
-    def __init__(self, sensitivities: Sensitivities) -> None:
-        self.sensitivities = sensitivities
-        self.sensors = [effect.name for effect in sensitivities.model.effects
-                        if isinstance(effect, MeasurementEffect)]
-        self.kept: list[tuple[Array, ...]] = []
-
-    def __call__(self, forces: Forces) -> dict[str, Array]:
-        s: Any = forces.mechanism
-        effort = forces.total - sum((forces.parts[name] for name in self.sensors),
-                                    np.zeros_like(forces.total))
-        self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
-        return {COLUMN + name: column.transpose(1, 0, 2).reshape(len(s.velocity), -1)
-                for name, column in self.sensitivities.columns(forces).items()}
-
-    def full_rate(self, reconstruction: Reconstruction) -> FullRate:
-        """Return what the drives did, with positions as the mechanism has them."""
-        velocity, acceleration, direction, load, effort = (
-            np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
-        return FullRate(
-            reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
-            effort, reconstruction.effort, reconstruction.segments, reconstruction.treat,
-            reconstruction.start)

@@ -198,10 +198,10 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
                          fillcolor=MARK, opacity=0.3, line_width=0)
     figure.update_layout(
         height=300, margin=MARGIN, legend=LEGEND, hovermode='x unified',
-        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'ticksuffix': ' Hz',
+        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
                'showticksuffix': 'last'},
         yaxis={'type': 'log', 'title': f'{what} on {statement.drive} [N²/Hz]',
-               'exponentformat': 'power'})
+               'exponentformat': 'e', 'dtick': 1})
     return figure
 
 
@@ -260,9 +260,9 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
                 hovertemplate='%{y:.3g} N²/Hz'))
     figure.update_layout(
         height=360, margin=MARGIN, legend=LEGEND, hovermode='x unified',
-        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'ticksuffix': ' Hz',
+        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
                'showticksuffix': 'last'},
-        yaxis={'type': 'log', 'title': 'power [N²/Hz]', 'exponentformat': 'power'})
+        yaxis={'type': 'log', 'title': 'power [N²/Hz]', 'exponentformat': 'e', 'dtick': 1})
     return figure
 
 

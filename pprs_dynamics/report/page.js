@@ -82,7 +82,7 @@
     const others = () => plots.filter((one) => one !== plot && one.dataset.time !== undefined
                                       && one.dataset.drawn !== undefined);
     plot.on('plotly_relayout', (change) => {
-      const key = Object.keys(change).find((name) => /^xaxis\d*\.(range\[0\]|autorange)$/.test(name));
+      const key = Object.keys(change).find((name) => /^xaxis\d*\.(range(\[0\])?|autorange)$/.test(name));
       if (!key) return;
       const now = key.endsWith('autorange') ? null : [...plot.layout.xaxis.range];
       if (String(now) === String(span)) return;
