@@ -45,8 +45,8 @@ setup(
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
-                 'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2', 'types-PyYAML', 'scipy-stubs',
-                 'colcon-common-extensions', 'colcon-ros',
+                 'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
+                 'types-PyYAML', 'scipy-stubs', 'colcon-common-extensions', 'colcon-ros',
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.
                  'setuptools<80'],
     },

@@ -33,7 +33,7 @@ from pprs_dynamics.diagnosis.quantities import (
     with_uncertainty,
 )
 from pprs_dynamics.diagnosis.rivals import RivalEffect
-from pprs_dynamics.diagnosis.sentences import GivenFiles, set_rows, word_diagnosis
+from pprs_dynamics.diagnosis.sentences import GivenFiles, runner_up, set_rows, word_diagnosis
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.mechanism.robot import DRIVES
@@ -268,7 +268,7 @@ def test_verdict_fall_and_next_step_fit_25_lines_of_80_columns(make: Any) -> Non
     # With those that the command prints: a finding of a recording, and the name of the page.
     assert len(text.splitlines()) <= 22
     for part in (words.headline, words.following, words.command,
-                 'Runner-up hysteresis on lift_2, cost +7'):
+                 'Runner-up hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'):
         assert part in in_one_line(text)
 
 
@@ -281,6 +281,18 @@ def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
         ('nothing missing', '+120'), ('a pattern depending on position on lift_2', '+130')]
     page = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a'])
     assert '>hysteresis on lift_2</td>' in page.html()
+
+
+@pytest.mark.parametrize(('second', 'said'), [
+    (('hysteresis',), 'hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'),
+    (('coulomb_friction', 'hysteresis'), 'hysteresis on lift_2 as well, cost +7'),
+    ((), 'without coulomb_friction on lift_2, cost +7')])
+def test_the_runner_up_is_told_by_what_it_has_instead(second: tuple[str, ...], said: str) -> None:
+    best, = ranked_sets('coulomb_friction')
+    diagnosis = one_effect(sets=(best, RankedSet(
+        tuple((name, ('lift_2',)) for name in second), 7.0)))
+    assert runner_up(diagnosis) == said
+    assert runner_up(one_effect()) == ''
 
 
 def test_one_pattern_on_all_drives_is_one_finding() -> None:

@@ -171,6 +171,20 @@ def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
              'the best' if one.cost <= 0 else f'+{plain(one.cost, 2)}') for one in diagnosis.sets]
 
 
+def runner_up(diagnosis: Diagnosis) -> str:
+    """Return how the second best set differs from the best, with its cost; '' for none."""
+    if len(diagnosis.sets) < 2:
+        return ''
+    every = diagnosis.residuals.drives
+    best, second = ([with_drives(_plain_name(name), drives, every) for name, drives in one.names]
+                    for one in diagnosis.sets[:2])
+    missing = listed([one for one in best if one not in second])
+    instead = listed([one for one in second if one not in best])
+    words = (f'{instead} instead of {missing}' if missing and instead
+             else f'{instead} as well' if instead else f'without {missing}')
+    return f'{words}, cost +{plain(diagnosis.sets[1].cost, 2)}'
+
+
 def _plain_name(name: str) -> str:
     unknown, comma, variable = name.partition(', ')
     return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
@@ -189,7 +203,7 @@ def with_drives(name: str, drives: tuple[str, ...] | None, every: tuple[str, ...
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    held = [one for one in diagnosis.effects if _holds(one)]
+    held = [one for one in diagnosis.effects if holds(one)]
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
@@ -222,7 +236,7 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 def _doubted(diagnosis: Diagnosis) -> list[str]:
     """Return effects that held-out data do not confirm."""
-    return [one.name for one in diagnosis.effects if not _holds(one)]
+    return [one.name for one in diagnosis.effects if not holds(one)]
 
 
 def _doubt(diagnosis: Diagnosis) -> str:
@@ -232,7 +246,8 @@ def _doubt(diagnosis: Diagnosis) -> str:
         'held-out data.')
 
 
-def _holds(found: FoundEffect) -> bool:
+def holds(found: FoundEffect) -> bool:
+    """Return whether held-out data confirm an effect."""
     return found.held_out_after < found.held_out_before
 
 
@@ -249,7 +264,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card
     title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
-    lacks = f'The model lacks {title}' if _holds(found) else (
+    lacks = f'The model lacks {title}' if holds(found) else (
         f'Fitted, but not confirmed: {title}')
     what = f'{lacks}: {_parameters(diagnosis, found)}'
     if issubclass(found.effect, MeasurementEffect):
@@ -311,7 +326,7 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
     held_out += change(found.held_out_before, found.held_out_after)
-    held_out += '' if _holds(found) else ': do not adopt it'
+    held_out += '' if holds(found) else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')

@@ -13,6 +13,7 @@ from pprs_dynamics.diagnosis.sentences import (
     Finding,
     Sentences,
     fitted_values,
+    holds,
     set_rows,
     unexplained_groups,
 )
@@ -99,13 +100,15 @@ def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> Non
 
 def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
     """Add the one picture that shows what was found."""
-    if diagnosis.depends_on and not diagnosis.effects:
-        statement = diagnosis.depends_on[0]
+    if diagnosis.depends_on:
+        statement = max(diagnosis.depends_on, key=lambda one: one.mean_square)
         picture = figures.unknown_picture(diagnosis, statement)
         if picture is not None:
             page.figure(picture, f'What no effect explains, on {statement.drive}.')
-    elif diagnosis.effects:
-        page.figure(*figures.effect_pictures(diagnosis, diagnosis.effects[0])[0])
+            return
+    shown = sorted(diagnosis.effects, key=lambda one: not holds(one))
+    if shown:
+        page.figure(*figures.effect_pictures(diagnosis, shown[0])[0])
 
 
 def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,

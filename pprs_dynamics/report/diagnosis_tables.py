@@ -20,6 +20,7 @@ from pprs_dynamics.diagnosis.sentences import (
     FittedValue,
     Sentences,
     fitted_values,
+    runner_up,
     set_rows,
 )
 
@@ -47,13 +48,12 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield from map(escape, shown)
         if len(lines) > len(shown):
             yield f'  … values of {len(lines) - len(shown)} more: --details'
-    if len(diagnosis.sets) > 1:
-        text, cost = set_rows(diagnosis)[1]
-        yield f'[bold]Runner-up[/] {escape(text)}, cost {cost}'
+    if second := runner_up(diagnosis):
+        yield f'[bold]Runner-up[/] {escape(second)}'
     if words.within_model_error:
         yield f'Within the model error of what was found: {len(words.within_model_error)} more'
     if words.warnings:
-        yield f'[yellow]![/] {escape(words.warnings[0])}'
+        yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
     yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
     if words.command:
         yield f'  [bold cyan]{escape(words.command)}[/]'

@@ -27,7 +27,9 @@ def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
 
     columns = (TextColumn('{task.description}', markup=False), BarColumn(),
                TextColumn('{task.percentage:3.0f} %'), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    # In a file or a pipe it would leave an empty line.
+    with Progress(*columns, console=console, transient=True,
+                  disable=not console.is_terminal) as bar:
         task, stage, furthest = None, '', 0.0
 
         def advance(what: str, share: float) -> None:
