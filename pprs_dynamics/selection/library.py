@@ -70,14 +70,19 @@ class DriveLibrary:
     def __init__(self, design: Design, regression: Regression, d: int) -> None:
         self.regression, self.d = regression, d
         self.series = regression.series[d]
-        self.trials: dict[str, int] = {}
-        self.terms: list[Term] = []
-        for effect in searched_in_drives(design):
-            if design.acts_on(effect, d) and not _is_felt_everywhere(effect):
-                shapes = effect.trials(design.covered[d])
-                self.trials[effect.name] = len(shapes)
-                self.terms += design.trial_terms(effect, d, shapes)
+        self.design = design
+        self.effects = [effect for effect in searched_in_drives(design)
+                        if design.acts_on(effect, d) and not _is_felt_everywhere(effect)]
+        self.trials = {effect.name: len(effect.trials(design.covered[d]))
+                       for effect in self.effects}
         self._crosses: dict[Block, Array] = {}
+
+    @cached_property
+    def terms(self) -> list[Term]:
+        """Every effect in every shape tried; computed when a scan asks for them."""
+        covered = self.design.covered[self.d]
+        return [term for effect in self.effects for term in self.design.trial_terms(
+            effect, self.d, effect.trials(covered))]
 
     @cached_property
     def rows(self) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.parallel import each
 from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.selection.candidates import (
@@ -152,11 +153,14 @@ class Search(FittedSets):
         library, fit = self.library, base.fit
         taken = {(c.effect, placement.drive) for c in base.effects for placement in c.placements}
         found: dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]] = {}
-        for d, local in library.local.items() if drive is None else [(drive, library.local[drive])]:
-            for offer in local.offers(fit).values():
+        drives = tuple(library.local) if drive is None else (drive,)
+        offered = each(lambda d: library.local[d].offers(fit), drives)
+        for d, offers in zip(drives, offered, strict=True):
+            for offer in offers.values():
                 effect = offer.term.effect
                 if (effect, d) not in taken:
-                    price = library.prices.of_placement(effect, local.trials[effect.name])
+                    price = library.prices.of_placement(
+                        effect, library.local[d].trials[effect.name])
                     found.setdefault(effect, []).append(
                         (offer.gain - price, partial(library.full, offer)))
         best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}

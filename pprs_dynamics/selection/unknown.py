@@ -13,6 +13,7 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.parallel import each
 from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.regression.normal_equations import Block, term_gains
 from pprs_dynamics.residuals.bins import LEAST_SHARE
@@ -297,8 +298,9 @@ class PatternLibrary:
 def best_patterns(libraries: Sequence[PatternLibrary], fit: JointFit, count: int,
                   ) -> list[UnknownCandidate]:
     """Return the best patterns of any drive at the noise of a fit, their limits refined."""
-    found = [(candidate, gain, library) for library in libraries
-             for candidate, gain in library.proposals(fit, count)]
+    proposed = each(lambda library: library.proposals(fit, count), libraries)
+    found = [(candidate, gain, library) for library, offers in zip(
+        libraries, proposed, strict=True) for candidate, gain in offers]
     found.sort(key=lambda one: -one[1])
     return [library.on_more_drives(library.refined(candidate, fit), fit)
             for candidate, gain, library in found[:count] if gain > 0]
