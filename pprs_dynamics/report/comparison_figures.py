@@ -25,7 +25,7 @@ MAP_CELLS = 20
 FINE_BINS = 24
 VARIABLES = ('velocity', 'position', 'acceleration', 'load', 'rod_angle', 'time', 'platform_x',
              'platform_y', 'platform_z', 'platform_tilt', 'platform_turn')
-MARGIN = {'l': 55, 'r': 15, 't': 30, 'b': 40}
+MARGIN = {'l': 70, 'r': 15, 't': 30, 'b': 40}
 LEGEND = {'orientation': 'h', 'y': 1.02, 'x': 0.0, 'yanchor': 'bottom', 'xanchor': 'left'}
 # The unit stands at the last tick and in what the cursor shows.
 SECONDS = {'ticksuffix': ' s', 'showticksuffix': 'last', 'hoverformat': '.3f'}

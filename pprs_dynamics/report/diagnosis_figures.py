@@ -103,7 +103,8 @@ def effect_pictures(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
             go.Scatter(x=factor * middle, y=part.fitted, mode='lines', name=found.name,
                        hovertemplate=IN_NEWTONS, line={'color': MODEL, 'width': 2})])
         figure.update_layout(height=320, margin=MARGIN, legend=LEGEND, xaxis_title=label,
-                             hovermode='x unified', yaxis_title=f'force on {drive} [N]')
+                             hovermode='x unified', yaxis={
+                                 'title': f'force on {drive} [N]', 'rangemode': 'tozero'})
         figures.append((figure, f'{found.name} on {drive}: means over bins with two standard '
                         'deviations, and the fitted effect.'))
     time = residuals.time[part.span]
@@ -114,7 +115,7 @@ def effect_pictures(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
                                             (found.name, part.force, MODEL, 2.0))])
     figure.update_layout(height=320, margin=MARGIN, legend=LEGEND, hovermode='x unified',
                          xaxis={'title': 'time [s]', **SECONDS},
-                         yaxis_title=f'force on {drive} [N]')
+                         yaxis={'title': f'force on {drive} [N]', 'rangemode': 'tozero'})
     figures.append((figure, f'{found.name} on {drive}, where it changes most.'))
     return figures
 
