@@ -48,8 +48,8 @@ COMMANDS = {
 # Of what a command says: from the first line that begins so to the next that begins so.
 EXCERPTS = {
     'COMPARE': ('compare', ' ', '1. '), 'WHERE': ('compare', '1. ', 'page'),
-    'DIAGNOSE': ('diagnose', '╭', 'Within'), 'ADOPT': ('adopt', '╭', 'page'),
-    'WRONG': ('wrong', '╭', 'Error'), 'AGAIN': ('again', ' ', '1. '),
+    'DIAGNOSE': ('diagnose', '╭', 'Why'), 'ADOPT': ('adopt', '╭', 'page'),
+    'WRONG': ('wrong', '╭', '  error'), 'AGAIN': ('again', ' ', 'page'),
     'HISTORY': ('history', 'Error', 'picture'),
 }
 

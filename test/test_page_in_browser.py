@@ -10,11 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
-from made_up_diagnosis import found_effect, made_up_diagnosis, made_up_residuals, ranked_sets
+from made_up_diagnosis import (
+    NOISE,
+    found_effect,
+    made_up_diagnosis,
+    made_up_residuals,
+    ranked_sets,
+)
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.comparison import compare
-from pprs_dynamics.diagnosis.sentences import GivenFiles, word_diagnosis
+from pprs_dynamics.diagnosis.next_step import GivenFiles
+from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.report.comparison_page import comparison_page
@@ -239,3 +246,16 @@ def test_where_it_fails_is_ranked_by_squared_error_and_nothing_slight_is_listed(
     assert [one['drive'] for one in comparison.to_json()['where']] == [
         one.drive for one in comparison.where]
     assert set(comparison.drives) == set(DRIVES)
+
+
+def test_a_payload_picked_up_in_mid_run_is_no_noise() -> None:
+    residuals = made_up_residuals()
+    error = residuals.error.copy()
+    error[len(error) // 2:, 3:] += 0.97
+    comparison = compare(replace(residuals, measured=residuals.model + error))
+    for name in DRIVES[3:]:
+        assert comparison.drives[name].grade != 'noise'
+        assert comparison.drives[name].noise_floor == pytest.approx(NOISE, rel=0.3)
+        assert any(one.drive == name for one in comparison.where)
+    for name in DRIVES[:3]:
+        assert comparison.drives[name].grade == 'noise'

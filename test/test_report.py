@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import matplotlib.image
 import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
+from rich.console import Console
+from rich.progress import Progress
 from ros_processes import executable
 
 from pprs_dynamics.measurement.recording import read_recording, write_recording
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.report.comparison_figures import thinned, worst_spans
 from pprs_dynamics.report.page import Page
+from pprs_dynamics.report.progress import staged_bar
 from pprs_dynamics.residuals.residuals import Residuals
 
 
@@ -124,6 +129,29 @@ def test_a_browser_draws_the_page_without_complaints(
     pixels = picture[..., :3]
     assert 0.003 < np.mean(pixels.min(axis=2) < 0.5) < 0.5
     assert np.mean(np.ptp(pixels, axis=2) > 0.2) > 0.002
+
+
+def test_a_progress_bar_never_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[tuple[Any, float]] = []
+    monkeypatch.setattr(Progress, 'update', lambda self, task, completed: shown.append(
+        (task, completed)))
+    with staged_bar(Console(file=io.StringIO())) as advance:
+        for stage, share in (('diagnosing', 0.1), ('diagnosing', 0.6), ('diagnosing', 0.4),
+                             ('adopting', 0.2), ('adopting', 0.1)):
+            advance(stage, share)
+    first, second = shown[0][0], shown[-1][0]
+    assert shown == [(first, 0.1), (first, 0.6), (first, 0.6), (second, 0.2), (second, 0.2)]
+    assert first != second
+
+
+def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
+    time = np.arange(100_000.0)
+    first, second = np.zeros(100_000), np.zeros(100_000)
+    first[40_000], second[70_001] = 3.0, -4.0
+    times, one, other = thinned(time, first, second)
+    assert len(times) == len(one) == len(other) <= 3000
+    assert one.max() == 3.0
+    assert other.min() == -4.0
 
 
 def test_long_recordings_are_thinned_without_losing_a_peak() -> None:

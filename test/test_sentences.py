@@ -25,6 +25,7 @@ from rich.console import Console
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import error_steps
 from pprs_dynamics.diagnosis.found_effects import RankedSet
+from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.diagnosis.partial import partial_residual
 from pprs_dynamics.diagnosis.quantities import (
     change,
@@ -33,7 +34,8 @@ from pprs_dynamics.diagnosis.quantities import (
     with_uncertainty,
 )
 from pprs_dynamics.diagnosis.rivals import RivalEffect
-from pprs_dynamics.diagnosis.sentences import GivenFiles, runner_up, set_rows, word_diagnosis
+from pprs_dynamics.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.diagnosis.set_words import runner_up, set_rows
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.mechanism.robot import DRIVES

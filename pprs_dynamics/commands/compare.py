@@ -11,7 +11,7 @@ from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import localise
-from pprs_dynamics.diagnosis.sentences import GivenFiles
+from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.comparison_page import comparison_page
 from pprs_dynamics.report.progress import progress_bar

@@ -22,8 +22,9 @@ from pprs_dynamics.commands.recordings import (
     read_validation,
 )
 from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.diagnosis.rivals import rival_effects
-from pprs_dynamics.diagnosis.sentences import GivenFiles, word_diagnosis
+from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.diagnosis_page import diagnosis_page

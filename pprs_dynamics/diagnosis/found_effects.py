@@ -48,6 +48,11 @@ class FoundEffect:
         """Name in the catalogue."""
         return self.effect.name
 
+    @property
+    def is_confirmed(self) -> bool:
+        """Return whether the error on held-out data falls with it."""
+        return self.held_out_after < self.held_out_before
+
     def to_json(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),

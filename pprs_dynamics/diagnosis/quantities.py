@@ -69,6 +69,11 @@ def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:
     return listed([name for name in every if name in drives])
 
 
+def with_drives(name: str, drives: tuple[str, ...] | None, every: tuple[str, ...]) -> str:
+    """Return what it is and where it sits."""
+    return name if drives is None else f'{name} on {name_drives(drives, every)}'
+
+
 def listed(names: Sequence[str], last: str = 'and') -> str:
     """Return a, b and c."""
     if len(names) < 2:

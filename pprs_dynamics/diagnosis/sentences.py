@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, WithinModelError
+from pprs_dynamics.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.diagnosis.quantities import (
     INTERVAL,
     change,
     listed,
-    name_drives,
     newtons,
     plain,
     sentence,
+    with_drives,
     with_uncertainty,
 )
 from pprs_dynamics.diagnosis.rivals import RivalEffect
 from pprs_dynamics.diagnosis.statements import Statement
-from pprs_dynamics.diagnosis.unknown_words import describe_unexplained, place_of, place_on
+from pprs_dynamics.diagnosis.unknown_words import describe_unexplained, place_on
 from pprs_dynamics.effects.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import Parameter
@@ -28,41 +28,6 @@ from pprs_dynamics.selection.estimates import Calibration, Estimate
 
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
-SECOND = 'SECOND_RECORDING'  # that is still to be made
-
-
-@dataclass(frozen=True)
-class GivenFiles:
-    """Names of the files of a diagnosis, for commands that can be copied.
-
-    Parameters
-    ----------
-    recordings, validate : tuple of str
-    model : str
-        '' for the default.
-    """
-
-    recordings: tuple[str, ...] = ('RECORDING',)
-    validate: tuple[str, ...] = ()
-    model: str = ''
-
-    def command(self, *words: str, held_out: bool = False) -> str:
-        """Return a command of `pprs` on the recordings, then options; quoted for a shell.
-
-        Parameters
-        ----------
-        words : str
-            The command and its first arguments; from the first that starts with `--` on they
-            stand behind the recordings.
-        held_out : bool
-            Whether it takes --validate.
-        """
-        first = next((k for k, word in enumerate(words) if word.startswith('--')), len(words))
-        given = ['pprs', *words[:first], *self.recordings]
-        if held_out:
-            given += [part for name in self.validate for part in ('--validate', name)]
-        given += ['--model', self.model] if self.model else []
-        return shlex.join([*given, *words[first:]])
 
 
 @dataclass(frozen=True)
@@ -142,7 +107,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = GivenFiles(),
     rivals : sequence of RivalEffect, optional
         As `rival_effects` finds them.
     """
-    following, command = _following(diagnosis, files)
+    following, command = next_step(diagnosis, files)
     return Sentences(
         _headline(diagnosis),
         tuple(_effect(diagnosis, one, k == 0) for k, one in enumerate(diagnosis.effects)),
@@ -163,33 +128,6 @@ def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
     return [tuple(group) for group in groups.values()]
 
 
-def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Return the best sets of effects in words, each with its cost above the best."""
-    every = diagnosis.residuals.drives
-    return [(' and '.join(with_drives(_plain_name(name), drives, every)
-                          for name, drives in one.names) or 'nothing missing',
-             'the best' if one.cost <= 0 else f'+{plain(one.cost, 2)}') for one in diagnosis.sets]
-
-
-def runner_up(diagnosis: Diagnosis) -> str:
-    """Return how the second best set differs from the best, with its cost; '' for none."""
-    if len(diagnosis.sets) < 2:
-        return ''
-    every = diagnosis.residuals.drives
-    best, second = ([with_drives(_plain_name(name), drives, every) for name, drives in one.names]
-                    for one in diagnosis.sets[:2])
-    missing = listed([one for one in best if one not in second])
-    instead = listed([one for one in second if one not in best])
-    words = (f'{instead} instead of {missing}' if missing and instead
-             else f'{instead} as well' if instead else f'without {missing}')
-    return f'{words}, cost +{plain(diagnosis.sets[1].cost, 2)}'
-
-
-def _plain_name(name: str) -> str:
-    unknown, comma, variable = name.partition(', ')
-    return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
-
-
 def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
     """Return all that was fitted and not left at zero, in the order of adoption and of drives."""
     return [FittedValue(effect.name, drive, parameter,
@@ -197,13 +135,8 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
             for effect in diagnosis.effects for drive, parameter, one in _fitted(diagnosis, effect)]
 
 
-def with_drives(name: str, drives: tuple[str, ...] | None, every: tuple[str, ...]) -> str:
-    """Return what it is and where it sits."""
-    return name if drives is None else f'{name} on {name_drives(drives, every)}'
-
-
 def _headline(diagnosis: Diagnosis) -> str:
-    held = [one for one in diagnosis.effects if holds(one)]
+    held = [one for one in diagnosis.effects if one.is_confirmed]
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
@@ -236,7 +169,7 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 def _doubted(diagnosis: Diagnosis) -> list[str]:
     """Return effects that held-out data do not confirm."""
-    return [one.name for one in diagnosis.effects if not holds(one)]
+    return [one.name for one in diagnosis.effects if not one.is_confirmed]
 
 
 def _doubt(diagnosis: Diagnosis) -> str:
@@ -244,11 +177,6 @@ def _doubt(diagnosis: Diagnosis) -> str:
     return '' if not names else (
         f' {listed(names)} lower{"s" * (len(names) == 1)} the error of the fit, but not the one on '
         'held-out data.')
-
-
-def holds(found: FoundEffect) -> bool:
-    """Return whether held-out data confirm an effect."""
-    return found.held_out_after < found.held_out_before
 
 
 def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
@@ -264,7 +192,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card
     title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
-    lacks = f'The model lacks {title}' if holds(found) else (
+    lacks = f'The model lacks {title}' if found.is_confirmed else (
         f'Fitted, but not confirmed: {title}')
     what = f'{lacks}: {_parameters(diagnosis, found)}'
     if issubclass(found.effect, MeasurementEffect):
@@ -326,7 +254,7 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
     held_out += change(found.held_out_before, found.held_out_after)
-    held_out += '' if holds(found) else ': do not adopt it'
+    held_out += '' if found.is_confirmed else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
@@ -410,29 +338,3 @@ def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
     return (f'{moved}, within its tolerance of {tolerance:.2g} ({tolerance:.0%}): calibrated, not '
             'an effect' if within else
             f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')
-
-
-def _following(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
-    """Return what to do next, and the command for it."""
-    repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
-    if diagnosis.verdict == 'unknown':
-        return ('Look at that place on the machine, and record the motion again: what comes back '
-                'is the machine. Then diagnose both recordings', repeat)
-    if diagnosis.verdict == 'ambiguous':
-        return ('Record a motion that tells the candidates apart; this designs it',
-                files.command('next-experiment', '--output', 'next.csv'))
-    if doubted := _doubted(diagnosis):
-        return (f'Do not add {listed(doubted)} on this evidence. Record another motion, and '
-                'diagnose both recordings', repeat)
-    if len(diagnosis.effects) == 1:
-        found = diagnosis.effects[0]
-        return ('Confirm it on the machine, then add it', files.command(
-            'adopt', found.name, '--output', f'with_{found.name}.yaml', held_out=True))
-    if diagnosis.effects:
-        return ('Confirm them on the machine, then add them', files.command(
-            'diagnose', '--adopt-all', '--output', 'better.yaml', held_out=True))
-    if diagnosis.suspects:
-        return ('Repeat the recording: what comes back is the machine, what does not was noise',
-                repeat)
-    return ('Nothing to add. Another motion may show what this one does not excite',
-            GivenFiles((SECOND,), (), files.model).command('diagnose'))

@@ -13,10 +13,9 @@ from pprs_dynamics.diagnosis.sentences import (
     Finding,
     Sentences,
     fitted_values,
-    holds,
-    set_rows,
     unexplained_groups,
 )
+from pprs_dynamics.diagnosis.set_words import set_rows
 from pprs_dynamics.report import diagnosis_figures as figures
 from pprs_dynamics.report.diagnosis_tables import finding_lines, sites
 from pprs_dynamics.report.page import ErrorRow, Page
@@ -106,7 +105,7 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
         if picture is not None:
             page.figure(picture, f'What no effect explains, on {statement.drive}.')
             return
-    shown = sorted(diagnosis.effects, key=lambda one: not holds(one))
+    shown = sorted(diagnosis.effects, key=lambda one: not one.is_confirmed)
     if shown:
         page.figure(*figures.effect_pictures(diagnosis, shown[0])[0])
 

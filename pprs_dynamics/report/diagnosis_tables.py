@@ -20,9 +20,8 @@ from pprs_dynamics.diagnosis.sentences import (
     FittedValue,
     Sentences,
     fitted_values,
-    runner_up,
-    set_rows,
 )
+from pprs_dynamics.diagnosis.set_words import runner_up, set_rows
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give

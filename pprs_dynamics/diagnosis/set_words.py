@@ -1,0 +1,34 @@
+"""The best sets of effects in words, with their costs."""
+
+from __future__ import annotations
+
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.diagnosis.quantities import listed, plain, with_drives
+from pprs_dynamics.diagnosis.unknown_words import place_of
+
+
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best."""
+    every = diagnosis.residuals.drives
+    return [(' and '.join(with_drives(_plain_name(name), drives, every)
+                          for name, drives in one.names) or 'nothing missing',
+             'the best' if one.cost <= 0 else f'+{plain(one.cost, 2)}') for one in diagnosis.sets]
+
+
+def runner_up(diagnosis: Diagnosis) -> str:
+    """Return how the second best set differs from the best, with its cost; '' for none."""
+    if len(diagnosis.sets) < 2:
+        return ''
+    every = diagnosis.residuals.drives
+    best, second = ([with_drives(_plain_name(name), drives, every) for name, drives in one.names]
+                    for one in diagnosis.sets[:2])
+    missing = listed([one for one in best if one not in second])
+    instead = listed([one for one in second if one not in best])
+    words = (f'{instead} instead of {missing}' if missing and instead
+             else f'{instead} as well' if instead else f'without {missing}')
+    return f'{words}, cost +{plain(diagnosis.sets[1].cost, 2)}'
+
+
+def _plain_name(name: str) -> str:
+    unknown, comma, variable = name.partition(', ')
+    return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
