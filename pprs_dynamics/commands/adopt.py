@@ -19,6 +19,7 @@ from pprs_dynamics.commands.recordings import (
     read_recordings,
     read_validation,
 )
+from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.report.adoption_page import adoption_page
@@ -59,7 +60,9 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, answer.to_json())
     if options.report:
-        page = adoption_page(answer, recordings, validation)
+        files = GivenFiles(tuple(options.recordings), tuple(options.validate), options.output)
+        page = adoption_page(answer, recordings, validation,
+                             files.command('diagnose', held_out=True))
         screen.print(f'page: {shown(page.write(options.report))}')
     if not answer.adopted:
         return 1

@@ -45,6 +45,9 @@ class GivenFiles:
         return shlex.join([*given, *words[first:]])
 
 
+PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
+
+
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')

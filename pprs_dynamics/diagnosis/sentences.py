@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, WithinModelError
-from pprs_dynamics.diagnosis.next_step import GivenFiles, next_step
+from pprs_dynamics.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.diagnosis.quantities import (
     INTERVAL,
     change,
@@ -95,7 +95,7 @@ class Sentences:
     command: str
 
 
-def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = GivenFiles(),
+def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
                    rivals: Sequence[RivalEffect] = ()) -> Sentences:
     """Return a diagnosis in words.
 

@@ -19,8 +19,17 @@ from pprs_dynamics.residuals.residuals import Residuals
 
 
 def adoption_page(answer: Adoption, recordings: Sequence[Recording],
-                  validation: Sequence[Recording]) -> Page:
-    """Return the page of one adoption, or refusal, most important first."""
+                  validation: Sequence[Recording], command: str = '') -> Page:
+    """Return the page of one adoption, or refusal: an answer on one screen, the rest folded.
+
+    Parameters
+    ----------
+    answer : Adoption
+    recordings, validation : sequence of Recording
+        Those fitted, and those held out.
+    command : str, optional
+        That says what is still missing.
+    """
     before, after = answer.residuals_before, answer.residuals_after
     page = Page(f'{answer.effect}: ' + ('added to the model' if answer.adopted else 'refused'))
     page.text(headline(answer), 'lead')
@@ -28,12 +37,21 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     page.text(f'Model: {Path(answer.before.source).name or "built in memory"}. Recordings: '
               f'{", ".join(one.name for one in recordings)}.{held}', 'note')
     errors, fallen = rms_by_drive(before), rms_by_drive(after)
-    page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
-                          answer.noise_floor),
-                 *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
-                   for name in errors)],
-                'Error on the recordings, rms [N], before (grey) and with it (blue); dotted: the '
-                'noise.')
+    with page.columns():
+        page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
+                              answer.noise_floor),
+                     *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
+                       for name in errors)],
+                    'Error on the recordings, rms [N], before (grey) and with it (blue); dotted: '
+                    'the noise.')
+        most = max(answer.noise_floors, key=lambda name: errors[name] - fallen[name], default='')
+        if most:
+            page.figure(before_and_after(before, after, before.drives.index(most),
+                                         answer.noise_floors[most]),
+                        f'{most}, where it changes most: effort and error, before and with it.',
+                        over_time=True)
+    if command and answer.adopted:
+        page.command('See what is still missing', command)
     page.table(('error on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
                caption='What was fitted to, and what decides.')
     page.bullets(answer.remarks)

@@ -26,7 +26,7 @@ def adoption_view(answer: Adoption, details: bool = False) -> Group:
 def _brief(answer: Adoption) -> Iterator[Any]:
     """Yield the answer, the fall of the error and the first values, in at most 20 lines."""
     yield _verdict(answer)
-    held = 'held out' if answer.held_out_on == VALIDATION else 'held-out blocks'
+    held = 'held-out recordings' if answer.held_out_on == VALIDATION else 'held-out blocks'
     for label, before, after in (('recordings', answer.error_before, answer.error_after),
                                  (held, answer.held_out_before, answer.held_out_after)):
         yield f'  error on {label}: {plain(before)} → {plain(after)} N'

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pprs_dynamics.diagnosis.comparison import Comparison
+from pprs_dynamics.diagnosis.quantities import sentence
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.report import comparison_figures as figures
@@ -37,7 +38,7 @@ def comparison_page(
         That finds out why.
     """
     page = Page('Model against measurement')
-    page.text(comparison.verdict, 'lead')
+    page.text(sentence(comparison.verdict), 'lead')
     page.text(f'Model: {Path(model.source).name or "built in memory"}. Recordings: '
               f'{", ".join(recording.name for recording in recordings)}.', 'note')
     statements = comparison.where
