@@ -24,8 +24,8 @@ from pprs_dynamics.model.force_model import ForceModel
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
 # Friction that turns over in another width than the model's is no effect: multiples of the
-# width whose differences span what is between 0.2 and some 20 times the model's.
-DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0, 15.0)
+# width whose differences span what is between 0.2 and 5 times the model's.
+DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
 # Names of columns; those of effects outside the drives have the effects' names.
 NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
 OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'

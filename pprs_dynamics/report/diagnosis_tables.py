@@ -25,7 +25,7 @@ from pprs_dynamics.diagnosis.set_words import runner_up, set_rows
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give
-WIDTH = 80  # characters of a line of values that is shown without --details
+LONGEST = 120  # characters of values that are shown without --details
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 
@@ -43,7 +43,7 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
                            _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
         lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
                  for effect, drive, text in _joined(fitted_values(diagnosis))]
-        shown = [line for line in lines if len(line) <= WIDTH][:MOST_LISTED]
+        shown = [line for line in lines if len(line) <= LONGEST][:MOST_LISTED]
         yield from map(escape, shown)
         if len(lines) > len(shown):
             yield f'  … values of {len(lines) - len(shown)} more: --details'
