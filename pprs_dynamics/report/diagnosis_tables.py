@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import Any
 
 from rich import box
@@ -25,7 +26,8 @@ from pprs_dynamics.diagnosis.set_words import runner_up, set_rows
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give
-LONGEST = 120  # characters of values that are shown without --details
+WIDTH = 80
+LONGEST = 160  # characters of values that are shown without --details: two lines
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 
@@ -43,7 +45,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
                            _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
         lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
                  for effect, drive, text in _joined(fitted_values(diagnosis))]
-        shown = [line for line in lines if len(line) <= LONGEST][:MOST_LISTED]
+        taken = accumulate(-(-len(line) // WIDTH) * WIDTH for line in lines)
+        shown = [line for line, total in zip(lines, taken, strict=True) if total <= LONGEST]
         yield from map(escape, shown)
         if len(lines) > len(shown):
             yield f'  … values of {len(lines) - len(shown)} more: --details'
