@@ -231,7 +231,7 @@ def test_where_nothing_is_missing_nothing_is_added() -> None:
 
 MISTAKES = {
     ('coulomb_frictoin', '{first}', '--output', '{tmp}/x.yaml'): 'did you mean coulomb_friction',
-    ('coulomb_friction:lift_7', '{first}', '--output', '{tmp}/x.yaml'): "'lift_7' is no drive",
+    ('coulomb_friction:lift_7', '{first}', '--output', '{tmp}/x.yaml'): "unknown drive 'lift_7'",
     ('payload_mass:lift_1', '{first}', '--output', '{tmp}/x.yaml'): 'must stand alone',
     ('payload_mass', '{first}', '--output', '{model}'): 'another file than the model',
     ('payload_mass', '{first}', '--output', '{tmp}/none/x.yaml'): 'its folder does not exist',

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics.diagnosis.comparison import compare
-from pprs_dynamics.diagnosis.localisation import Localisation
+from pprs_dynamics.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.regression.joint_fit import Regression
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
@@ -133,7 +133,9 @@ def test_spectrum_shows_a_vibration_at_its_frequency_above_the_background() -> N
     time = PERIOD * np.arange(4000)
     error = (0.1 * rng.normal(size=4000) + 0.3 * np.sin(2 * np.pi * 12.5 * time))[:, None]
     residuals = recording(error, np.zeros_like(error))
-    spectrum = error_spectrum(residuals, 0, noise_of(residuals))
+    noise = localise(residuals).drives['drive_0'].noise
+    assert noise is not None
+    spectrum = error_spectrum(residuals, 0, noise)
     top = int(np.argmax(spectrum.power))
     assert spectrum.frequency[top] == pytest.approx(12.5, abs=0.05)
     quiet = np.abs(spectrum.frequency - 12.5) > 5

@@ -109,7 +109,7 @@ assert catalogue() is catalogue()
 
 def test_the_catalogue_lists_it_after_the_packages_own(installed: Path) -> None:
     done = python(LIST, installed)
-    assert done.stdout.split() == [*CATALOGUE, 'eddy_brake'], done.stderr
+    assert done.stdout.split() == [*CATALOGUE, 'eddy_brake', 'effort_filter'], done.stderr
 
 
 def test_no_other_package_is_asked_where_no_effect_of_theirs_is_named(
