@@ -13,6 +13,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.model.fingerprint import fingerprint
 from pprs_dynamics.model.margins import Margins, margins
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import answer_cdr
@@ -22,7 +23,7 @@ from pprs_dynamics.nodes.feedforward_settings import HOLD_GRAVITY, PARAMETERS, S
 from pprs_dynamics.nodes.managed_node import ManagedNode
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.nodes.parameters import declare_own
-from pprs_dynamics.nodes.provenance import files_given, fingerprint
+from pprs_dynamics.nodes.provenance import files_given
 from pprs_dynamics.nodes.qos import UNANSWERED, publisher, subscription
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -11,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.model.bounded_yaml import parse, read_text
-from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.plain_text import displayed
 
@@ -59,12 +57,6 @@ def _flat(tree: Mapping[str, Any]) -> Iterator[str]:
             yield from (f'{name}.{rest}' for rest in _flat(value))
         else:
             yield str(name)
-
-
-def fingerprint(model: DriveModel) -> str:
-    """Return the SHA-256 of the values in force, which changes with every parameter."""
-    values: dict[str, Any] = dict(model.values)
-    return _digest(json.dumps(values, sort_keys=True, default=str).encode())
 
 
 def _digest(data: bytes) -> str:

@@ -1,0 +1,1 @@
+"""Many recordings of many robots: surveys into a store, and trends out of it."""

@@ -1,0 +1,163 @@
+"""Work on many items by Dask distributed: a cluster of this machine, or one that is running.
+
+Only a bounded number of items is in the cluster at a time, so that the client's memory does not
+grow with their number.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from time import monotonic
+from typing import Any
+
+from pprs_dynamics.errors import MissingLibraryError, PprsError
+from pprs_dynamics.fleet.store import Store
+from pprs_dynamics.fleet.survey import Job, Result, examine, identify, lost
+
+LOOPBACK = '127.0.0.1'
+PER_WORKER = 4  # items in the cluster for each worker: enough that none waits
+# A recording may lose this many workers before it is given up: others may be killed by chance.
+ALLOWED_FAILURES = 2
+ASKED_EVERY = 5.0  # [s], for workers that have come or gone
+REACHED_WITHIN = '15s'  # the scheduler
+
+
+class SchedulerError(PprsError, ConnectionError):
+    """A scheduler that cannot be reached, or has gone."""
+
+
+@contextmanager
+def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[Any]:
+    """Give a Dask client; a cluster of its own lasts as long as the block, on the loopback only.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes; None: one for every core.
+    scheduler : str, optional
+        Address of a running one, tcp://HOST:PORT or tls://HOST:PORT; Dask's own configuration
+        holds certificates.
+
+    Raises
+    ------
+    SchedulerError
+        Where it cannot be reached.
+    """
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise MissingLibraryError('distributed', 'a survey', 'fleet') from None
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=REACHED_WITHIN, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise SchedulerError(f'--scheduler {scheduler}: cannot be reached: {error}') from None
+        try:
+            yield client
+        finally:
+            client.close(timeout=2)
+        return
+    settings = {'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
+                # Workers that are killed with their nannies are nobody's to restart.
+                'distributed.worker.daemon': True}
+    count = workers or len(os.sched_getaffinity(0))
+    with (dask.config.set(settings),
+          LocalCluster(n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
+                       dashboard_address=None, silence_logs='ERROR') as local,
+          Client(local, set_as_default=False) as client):
+        yield client
+
+
+def run_survey(client: Any, jobs: Iterable[Job], store: Store) -> Iterator[Result | None]:
+    """Write the rows of every recording to a store; yield each, or None for one done already.
+
+    Raises
+    ------
+    SchedulerError
+        Where the scheduler goes; what was written stays, and the same survey goes on from there.
+    """
+    def begin(job: Job) -> Any:
+        return client.submit(identify, job.entry.path, pure=False)
+
+    def after(job: Job, content: str | None, error: str | None) -> Any:
+        if error is not None:
+            return None
+        if content is not None and store.has(job.entry.robot, job.key(content)):
+            return None
+        # Ahead of other recordings' beginnings, so that what was begun is ended.
+        return client.submit(examine, job, content, pure=False, priority=1)
+
+    for job, first, second, error in _two_steps(client, jobs, begin, after):
+        if error is not None:
+            result = lost(job, first, error)
+        elif second is None:
+            yield None
+            continue
+        else:
+            result = second
+        store.write(job.entry.robot, result.key, result.rows, result.failed)
+        yield result
+
+
+def _two_steps(client: Any, items: Iterable[Any], begin: Callable[[Any], Any],
+               after: Callable[[Any, Any, str | None], Any],
+               ) -> Iterator[tuple[Any, Any, Any, str | None]]:
+    """Yield item, results of its first and second step, and the error of either, as they come."""
+    from distributed import as_completed
+
+    waiting = iter(items)
+    there: dict[Any, tuple[Any, Any, bool]] = {}
+    queue = as_completed()
+    queue.loop = client.loop
+
+    def add(future: Any, item: Any, first: Any, is_second: bool) -> None:
+        there[future.key] = (item, first, is_second)
+        queue.add(future)
+
+    most, asked = 0, -ASKED_EVERY
+
+    def fill() -> None:
+        nonlocal most, asked
+        if monotonic() > asked + ASKED_EVERY:
+            most, asked = PER_WORKER * max(len(client.ncores()), 1), monotonic()
+        while len(there) < most:
+            try:
+                item = next(waiting)
+            except StopIteration:
+                return
+            add(begin(item), item, None, False)
+
+    fill()
+    while there:
+        future = next(queue)
+        item, first, is_second = there.pop(future.key)
+        value, error = _outcome(future)
+        future.release()
+        if not is_second and error is None:
+            following = after(item, value, error)
+            if following is not None:
+                add(following, item, value, True)
+            else:
+                yield item, value, None, None
+        else:
+            yield item, first, value, error
+        fill()
+
+
+def _outcome(future: Any) -> tuple[Any, str | None]:
+    """Return the value of a future, or what became of it."""
+    from distributed import KilledWorker
+
+    if future.status == 'finished':
+        return future.result(), None
+    if future.status == 'error':
+        error = future.exception()
+        if isinstance(error, KilledWorker):
+            return None, (f'its worker was killed {ALLOWED_FAILURES + 1} times, by the system or '
+                          'for lack of memory')
+        return None, f'{type(error).__name__}: {error}'
+    raise SchedulerError('the scheduler has gone; what was written stays, and the same command '
+                         'does what is missing')
