@@ -11,7 +11,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo demo-feedforward test reproduce feedforward localisation score adoption benchmark \
-	reliability reliability-full experiments lint clean
+	reliability reliability-full experiments fleet lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
@@ -26,6 +26,7 @@ help:
 	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
 	@echo 'make reliability-full   the same at full size (an hour or two)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long)'
+	@echo 'make fleet      a fleet of the physics engine, surveyed: what is found of what changed (long)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
 demo: $(VENV)/.demo
@@ -71,6 +72,9 @@ reliability-full: $(VENV)/.test
 experiments: $(VENV)/.test
 	$(BIN)/python benchmarks/experiments_score.py
 
+fleet: $(VENV)/.test
+	$(BIN)/python benchmarks/fleet.py
+
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python
 	@echo 'Installing the package with ROS 2 wheels and compiling its equations (about a minute) ...'
@@ -81,7 +85,7 @@ $(VENV)/.demo: setup.py | $(VENV)/bin/python
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,test]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,fleet,test]'
 	@touch $@
 
 $(VENV)/bin/python:

@@ -44,6 +44,8 @@ setup(
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
+        'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
+                  'fsspec>=2024.6'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'types-PyYAML', 'scipy-stubs', 'colcon-common-extensions', 'colcon-ros',

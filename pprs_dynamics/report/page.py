@@ -178,6 +178,24 @@ class Page:
         self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
                           f'<div class="columns">{drawn}</div></section>')
 
+    def interactive(self, elements: str, name: str, data: str, script: str) -> None:
+        """Add a part that a script of the package fills.
+
+        Parameters
+        ----------
+        elements : str
+            HTML of the package, without text from files.
+        name : str
+            Id of the element that holds the data.
+        data : str
+            JSON; it may hold text from files.
+        script : str
+        """
+        # Within a script an end tag would end it, wherever it stands.
+        safe = data.replace('<', '\\u003c')
+        self._body.append(f'{elements}<script type="application/json" id="{name}">{safe}</script>'
+                          f'<script>{script}</script>')
+
     def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:
         from plotly.utils import PlotlyJSONEncoder
 

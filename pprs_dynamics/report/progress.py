@@ -42,3 +42,29 @@ def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
             bar.update(task, completed=furthest)
 
         yield advance
+
+
+@contextmanager
+def counting_bar(console: Any, what: str, total: int) -> Iterator[Callable[[], None]]:
+    """Show a bar with count, rate and remaining time; call the given function for each done."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        ProgressColumn,
+        Task,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(f'{60 * task.speed:.0f}/min' if task.speed else '')
+
+    columns = (TextColumn('{task.description}', markup=False), BarColumn(), MofNCompleteColumn(),
+               Rate(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True,
+                  disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.update(task, advance=1)
