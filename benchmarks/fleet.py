@@ -241,7 +241,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             answers.append(answer)
     total = {name: sum(one[name] for one in answers)
              for name in ('changed', 'unchanged', 'found', 'flagged')}
-    joined = {name: sum((one[name] for one in answers), [])
+    joined = {name: [value for one in answers for value in one[name]]
               for name in ('step_days', 'slope_days', 'slopes')}
     print(f'changed robots found, with the right drive and quantity: {total["found"]} of '
           f'{total["changed"]}\nrobots with nothing wrong that are flagged: {total["flagged"]} of '

@@ -30,14 +30,17 @@ MAY_USE = {
                   'selection'},
     'adoption': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                  'selection', 'diagnosis'},
+    'fleet': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
+              'selection', 'diagnosis', 'adoption'},
     'simulation': {'mechanism', 'model', 'measurement'},
     'experiments': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                     'selection'},
     'report': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-               'selection', 'diagnosis', 'adoption', 'experiments'},
+               'selection', 'diagnosis', 'adoption', 'experiments', 'fleet'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                 'selection', 'diagnosis', 'adoption', 'simulation', 'experiments', 'report'},
+                 'selection', 'diagnosis', 'adoption', 'simulation', 'experiments', 'report',
+                 'fleet'},
 }
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))

@@ -47,12 +47,13 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     """
     try:
         import dask
-        from distributed import Client, LocalCluster
+        import distributed
     except ImportError:
         raise MissingLibraryError('distributed', 'a survey', 'fleet') from None
+    library: Any = distributed  # whose functions carry no types
     if scheduler is not None:
         try:
-            client = Client(scheduler, timeout=REACHED_WITHIN, set_as_default=False)
+            client = library.Client(scheduler, timeout=REACHED_WITHIN, set_as_default=False)
         except (OSError, ValueError) as error:
             raise SchedulerError(f'--scheduler {scheduler}: cannot be reached: {error}') from None
         try:
@@ -65,9 +66,9 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
                 'distributed.worker.daemon': True}
     count = workers or len(os.sched_getaffinity(0))
     with (dask.config.set(settings),
-          LocalCluster(n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
+          library.LocalCluster(n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
                        dashboard_address=None, silence_logs='ERROR') as local,
-          Client(local, set_as_default=False) as client):
+          library.Client(local, set_as_default=False) as client):
         yield client
 
 
@@ -106,12 +107,12 @@ def _two_steps(client: Any, items: Iterable[Any], begin: Callable[[Any], Any],
                after: Callable[[Any, Any, str | None], Any],
                ) -> Iterator[tuple[Any, Any, Any, str | None]]:
     """Yield item, results of its first and second step, and the error of either, as they come."""
-    from distributed import as_completed
+    import distributed
 
+    library: Any = distributed
     waiting = iter(items)
     there: dict[Any, tuple[Any, Any, bool]] = {}
-    queue = as_completed()
-    queue.loop = client.loop
+    queue = library.as_completed(loop=client.loop)
 
     def add(future: Any, item: Any, first: Any, is_second: bool) -> None:
         there[future.key] = (item, first, is_second)

@@ -10,7 +10,7 @@ import hashlib
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
@@ -28,9 +28,7 @@ from pprs_dynamics.fleet.named_effects import OWN, fit_named_effects
 from pprs_dynamics.fleet.store import key_of
 from pprs_dynamics.measurement.conventions import find_mistakes
 from pprs_dynamics.measurement.fingerprint import fingerprint
-from pprs_dynamics.measurement.readings import POSITION_UNIT
 from pprs_dynamics.measurement.recording import Recording, describe, read_recording
-from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.plain_text import displayed
@@ -39,6 +37,9 @@ from pprs_dynamics.threads import use_one_thread
 
 AUTO = 'auto'
 FITTED = 'fitted'  # the verdict where only named effects were fitted
+# Of the model's error over the changing effort on a drive, beyond which units, signs and order of
+# drives are looked at: wrong ones leave as much as the effort or more.
+SUSPECT = 0.5
 MODELS_KEPT = 8  # built models that a worker remembers
 
 
@@ -195,18 +196,39 @@ def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}
     common = {**common, 'duration': summary.duration}
-    mistakes = find_mistakes(model, recording)
-    recording = replace(recording, findings=(*mistakes, *recording.findings))
-    for finding in mistakes:
-        if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
-            raise UnreadableFileError(job.entry.path, f'{finding.what}, but they must be metres')
-    found = _diagnosed(model, recording) if job.options == AUTO else _fitted(model, recording, job)
+    found = _judged(model, recording, job)
     rows, residuals, noise, verdict = found
     common = {**common, 'verdict': verdict}
     drives = _drives(residuals, noise)
     quantities = [{'drive': drive, **numbers} for drive, numbers in drives.items()]
     return [{**common, **row} for row in quantities] + [
         {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
+
+
+Examined = tuple[list[dict[str, Any]], Residuals, Mapping[str, float], str]
+
+
+def _judged(model: ForceModel, recording: Recording, job: Job) -> Examined:
+    """Return what is found; a recording of other units, signs or drives is refused.
+
+    The search for these takes longer than a fit, so that there only what fits badly is searched.
+    """
+    if job.options == AUTO:
+        _refuse_mistakes(model, recording, job)
+        return _diagnosed(model, recording)
+    try:
+        found = _fitted(model, recording, job)
+    except PprsError:
+        _refuse_mistakes(model, recording, job)
+        raise
+    if any(one['relative'] > SUSPECT for one in _drives(found[1], found[2]).values()):
+        _refuse_mistakes(model, recording, job)
+    return found
+
+
+def _refuse_mistakes(model: ForceModel, recording: Recording, job: Job) -> None:
+    for finding in find_mistakes(model, recording):
+        raise UnreadableFileError(displayed(job.entry.path), finding.text)
 
 
 def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[str, float]]:
@@ -220,9 +242,6 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
             found[drive] = {'rms': rms, 'relative': rms / swing if swing else float('nan'),
                             'noise': float(noise.get(drive, np.nan))}
     return found
-
-
-Examined = tuple[list[dict[str, Any]], Residuals, Mapping[str, float], str]
 
 
 def _fitted(model: ForceModel, recording: Recording, job: Job) -> Examined:

@@ -259,9 +259,11 @@ class _Rows:
                 gathered.setdefault((robot, quantity), []).append((time, value, std, sha256))
         if self.options == AUTO:
             _add_absent(gathered, every)
-        return {key: _Values(*(np.array([one[k] for one in found], dtype=float)
-                               for k in range(3)), [one[3] for one in found])
-                for key, found in gathered.items()}
+        found = {}
+        for key, values in gathered.items():
+            time, value, std = np.array([one[:3] for one in values], dtype=float).T
+            found[key] = _Values(time, value, std, [one[3] for one in values])
+        return found
 
     def _values(self) -> Iterator[tuple[str, Quantity, float, float, float, str]]:
         text, numbers = self.text, self.numbers
@@ -349,7 +351,8 @@ def main_change(trend: Trend) -> Change:
 def together(first: Trend, others: Sequence[Trend]) -> tuple[list[Trend], list[Trend]]:
     """Return trends that change with the first within their uncertainties, and all others."""
     at = main_change(first)
-    with_it, apart = [], []
+    with_it: list[Trend] = []
+    apart: list[Trend] = []
     for trend in others:
         other = main_change(trend)
         reach = 3 * float(np.hypot(at.time_std, other.time_std)) + 1.0

@@ -81,7 +81,7 @@ def sentences(fleet: FleetTrends) -> list[str]:
 def _sentences(fleet: FleetTrends) -> Iterator[str]:
     changed = [(robot, found) for robot in fleet.robots if (found := fleet.flagged(robot))]
     changed.sort(key=lambda one: one[1][0].order)
-    for robot, (first, *others) in changed:
+    for _, (first, *others) in changed:
         with_it, apart = together(first, others)
         more = f' ({len(with_it)} other quantities change with it)' if len(with_it) > 1 else (
             f' ({with_it[0].quantity.label} changes with it)' if with_it else '')

@@ -1,0 +1,257 @@
+"""Surveys and trends: what changes is found with its day and size, and nothing is done twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from pprs_dynamics import __version__
+from pprs_dynamics.commands.pprs import main
+from pprs_dynamics.fleet.changes import find_changes
+from pprs_dynamics.fleet.engine import cluster, run_survey
+from pprs_dynamics.fleet.manifest import Entry, ManifestError, entries, find_recordings
+from pprs_dynamics.fleet.store import DONE, FAILED, Store, key_of, schema
+from pprs_dynamics.fleet.survey import Job, examine, identify
+from pprs_dynamics.fleet.trend import FALSE_ALARMS, fleet_trends, main_change
+from pprs_dynamics.fleet.words import sentences
+from pprs_dynamics.model.fingerprint import fingerprint
+from pprs_dynamics.model.model_file import load_model
+
+MODEL = 'config/single_axis.yaml'
+EFFECTS = 'coulomb_friction'
+NOISE = 0.5  # [N]
+DAYS, EPOCH = 30, 20_000
+THRESHOLD = 1e-4
+RNG_SEEDS = range(40)
+
+
+def write_axis(path: Path, friction: float = 0.0, seed: int = 0) -> Path:
+    """Write 8 s of the single axis, with Coulomb friction that its model lacks [N]."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(800) / 100
+    position = 0.05 * np.sin(np.pi * time) + 0.02 * np.sin(2.6 * np.pi * time)
+    velocity = np.pi * (0.05 * np.cos(np.pi * time) + 0.052 * np.cos(2.6 * np.pi * time))
+    acceleration = -np.pi ** 2 * (0.05 * np.sin(np.pi * time)
+                                  + 0.1352 * np.sin(2.6 * np.pi * time))
+    # The numbers of config/single_axis.yaml.
+    effort = (95.109 * acceleration + 203.5 * velocity - 3.165
+              + (20.394 + friction) * np.tanh(velocity / 0.0003))
+    effort = effort + rng.normal(scale=NOISE, size=len(time))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = '\n'.join(f'{t:.4f},{q:.9f},{f:.6f}' for t, q, f in zip(
+        time, position, effort, strict=True))
+    path.write_text(f'time,axis/position,axis/effort\n{rows}\n')
+    return path
+
+
+def job(path: Path | str, robot: str = 'a') -> Job:
+    model = load_model(MODEL)
+    return Job(Entry(str(path), robot, 1e9), model.values, fingerprint(model), EFFECTS)
+
+
+def write_values(store: Store, robot: str, values: np.ndarray, parameter: str = 'force') -> None:
+    """Write one row a day, as a survey would."""
+    for day, value in enumerate(values):
+        sha256 = f'{robot} {day}'
+        row = {'recording': f'{day}.csv', 'path': f'/{robot}/{day}.csv', 'sha256': sha256,
+               'time': (EPOCH + day) * 86400 * 10 ** 6, 'model': 'm', 'options': EFFECTS,
+               'version': __version__, 'drive': 'slide_2', 'effect': 'coulomb_friction',
+               'parameter': parameter, 'value': float(value), 'std': 0.1, 'unit': 'N',
+               'conditions': [('temperature', 20.0)]}
+        store.write(robot, key_of(sha256, 'm', EFFECTS, __version__), [row])
+
+
+def test_noise_is_no_change() -> None:
+    """Of series without a change at most the promised share is told."""
+    time = np.arange(float(DAYS))
+    alarms = [bool(find_changes(time, np.random.default_rng(seed).normal(size=DAYS),
+                                0.1).found) for seed in range(200)]
+    assert np.mean(alarms) < 0.1
+
+
+def test_a_step_is_found_with_its_day_and_size() -> None:
+    time = np.arange(float(DAYS))
+    for seed in RNG_SEEDS:
+        noise = np.random.default_rng(seed).normal(size=DAYS)
+        found = find_changes(time, noise + 6.0 * (time >= 17), THRESHOLD).found
+        assert [one.kind for one in found] == ['step']
+        assert abs(found[0].time - 17) <= 1
+        assert abs(found[0].size - 6.0) < 4 * found[0].size_std
+
+
+def test_slopes_lie_within_their_intervals() -> None:
+    time = np.arange(float(DAYS))
+    right = []
+    for seed in RNG_SEEDS:
+        noise = np.random.default_rng(seed).normal(size=DAYS)
+        found = find_changes(time, noise + 0.7 * np.maximum(time - 12, 0), THRESHOLD).found
+        assert found[0].kind == 'slope'
+        assert abs(found[0].time - 12) < 4
+        right.append(abs(found[0].size - 0.7) < 1.96 * found[0].size_std)
+    assert np.mean(right) > 0.85
+
+
+def test_one_bad_day_is_no_change() -> None:
+    time = np.arange(float(DAYS))
+    value = np.random.default_rng(3).normal(size=DAYS)
+    value[13] += 50.0
+    assert not find_changes(time, value, THRESHOLD).found
+
+
+def test_the_robot_that_changes_is_told_with_its_limit(tmp_path: Path) -> None:
+    store, rng = Store(str(tmp_path / 'store')), np.random.default_rng(7)
+    days = np.arange(DAYS)
+    for robot in ('1', '2', '3', '4', '5'):
+        grown = 0.05 * np.maximum(days - 10, 0) if robot == '3' else 0.0
+        write_values(store, robot, rng.normal(scale=0.05, size=DAYS) + 0.3 + grown)
+    fleet = fleet_trends(store, {'coulomb_friction.force': 2.0})
+    told = {robot: fleet.flagged(robot) for robot in fleet.robots}
+    assert [robot for robot, found in told.items() if found] == ['3']
+    change = main_change(told['3'][0])
+    assert abs(change.size - 0.05) < 2 * change.size_std
+    reach = told['3'][0].reach
+    assert reach is not None
+    truth = EPOCH + 10 + (2.0 - 0.3) / 0.05
+    assert reach.times[0] < truth < reach.times[2]
+    first = sentences(fleet)[0]
+    assert first.startswith('robot 3, slide_2: coulomb_friction.force grows by 1.')
+    assert 'N per month since 2024-10-1' in first
+    assert 'limit 2 N in about' in first
+    assert told['3'][0].changes.probability < FALSE_ALARMS
+
+
+def test_the_page_shows_names_as_text(tmp_path: Path) -> None:
+    store = Store(str(tmp_path / 'store'))
+    for robot in ('</script><b>x', 'b'):
+        write_values(store, robot, np.random.default_rng(1).normal(size=DAYS))
+    report, data = tmp_path / 'fleet.html', tmp_path / 'trend.json'
+    assert main(['trend', store.path, '--report', str(report), '--json', str(data),
+                 '--beside', 'temperature']) == 0
+    assert '</script><b>x' not in report.read_text()
+    assert json.loads(data.read_text())['robots'] == ['</script><b>x', 'b']
+
+
+def test_trend_refuses_what_the_store_does_not_have(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['trend', str(tmp_path / 'nowhere')]) == 2
+    assert 'there is no store' in capsys.readouterr().err
+    write_values(Store(str(tmp_path / 's')), 'a', np.zeros(3))
+    assert main(['trend', str(tmp_path / 's'), '--limit', 'friction=1']) == 2
+    assert "unknown quantity 'friction'" in capsys.readouterr().err
+
+
+def test_a_manifest_says_whose_and_when(tmp_path: Path) -> None:
+    manifest = tmp_path / 'robots.csv'
+    manifest.write_text('path,robot,time,temperature\nx.csv,7,1970-01-02T00:00:00,21.5\n')
+    (entry,) = entries((), str(manifest))
+    assert entry == Entry(str(tmp_path / 'x.csv'), '7', 86400.0, None, {'temperature': 21.5})
+    manifest.write_text('path,robot,time\nx.csv,7,yesterday\n')
+    with pytest.raises(ManifestError, match="line 2: time 'yesterday', must be an ISO 8601"):
+        list(entries((), str(manifest)))
+
+
+def test_robots_are_called_as_their_folders(tmp_path: Path) -> None:
+    for name in ('r2/b.csv', 'r1/a.csv', 'r1/note.txt', 'r3/bag/metadata.yaml'):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text('x')
+    found = [(Path(one.path).name, one.robot) for one in find_recordings([str(tmp_path)])]
+    assert found == [('a.csv', 'r1'), ('b.csv', 'r2'), ('bag', 'r3')]
+
+
+def test_friction_of_a_recording_lies_within_its_deviation(tmp_path: Path) -> None:
+    path = write_axis(tmp_path / 'a' / '1.csv', friction=4.0)
+    result = examine(job(path), identify(str(path)))
+    assert result.error is None
+    (row,) = (row for row in result.rows if row.get('effect') == 'coulomb_friction')
+    assert abs(row['value'] - 4.0) < 4 * row['std']
+    assert row['unit'] == 'N'
+
+
+def test_recordings_are_read_through_fsspec(tmp_path: Path) -> None:
+    import fsspec
+
+    path = write_axis(tmp_path / '1.csv')
+    fsspec.filesystem('memory').pipe_file('/fleet/robot_1/1.csv', path.read_bytes())
+    (entry,) = find_recordings(['memory://fleet'])
+    assert entry.robot == 'robot_1'
+    content = identify(entry.path)
+    assert content == identify(str(path))
+    assert examine(job(entry.path), content).error is None
+
+
+def test_what_is_refused_is_a_row_with_the_reason(tmp_path: Path) -> None:
+    path = tmp_path / 'bad.csv'
+    path.write_text('this is no recording\n')
+    refused = examine(job(path), identify(str(path)))
+    assert refused.error is not None
+    assert 'bad.csv' in refused.error
+    assert not refused.failed
+    gone = examine(job(tmp_path / 'gone.csv'), identify(str(tmp_path / 'gone.csv')))
+    assert gone.failed  # it may be there the next time
+
+
+def test_a_store_holds_whole_files_of_the_documented_schema(tmp_path: Path) -> None:
+    store = Store(str(tmp_path / 'store'))
+    store.write('r 1', 'k', [{'recording': 'x', 'error': 'no'}], failed=True)
+    assert not store.has('r 1', 'k')
+    store.write('r 1', 'k', [{'recording': 'x'}])
+    files = [path for path in (tmp_path / 'store').rglob('*') if path.is_file()]
+    assert [path.name for path in files] == [f'k{DONE}']
+    assert pyarrow.parquet.ParquetFile(files[0]).schema_arrow.equals(schema())
+    assert store.read().column('robot').to_pylist() == ['r 1']
+
+
+@pytest.fixture(scope='module')
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('fleet')
+    for k in range(6):
+        write_axis(folder / 'robot_1' / f'{k}.csv', seed=k)
+    (folder / 'robot_1' / 'bad.csv').write_text('this is no recording\n')
+    return folder
+
+
+@pytest.fixture(scope='module')
+def client() -> Iterator[object]:
+    with cluster(2) as found:
+        yield found
+
+
+def test_a_killed_worker_changes_nothing(recordings: Path, client, tmp_path: Path) -> None:
+    store = Store(str(tmp_path / 'store'))
+    jobs = [job(entry.path, entry.robot) for entry in find_recordings([str(recordings)])]
+    results = run_survey(client, jobs, store)
+    first = next(results)
+    # Of the cluster that this test has started itself.
+    os.kill(client.run(os.getpid).popitem()[1], signal.SIGKILL)
+    done = [first, *results]
+    assert sorted(one.rows[0]['recording'] for one in done if one and one.error is None) == [
+        f'{k}.csv' for k in range(6)]
+    table = store.read(('recording', 'sha256', 'error')).to_pylist()
+    assert len({row['sha256'] for row in table}) == 7
+    assert [row['recording'] for row in table if row['error']] == ['bad.csv']
+    assert not list(Path(store.path).rglob(f'*{FAILED}'))
+    # What is done is not done again; what is missing is.
+    next(Path(store.path).rglob(f'*{DONE}')).unlink()
+    again = list(run_survey(client, jobs, store))
+    assert sum(one is not None for one in again) == 1
+    assert store.read(('recording',)).num_rows == len(table)
+
+
+def test_the_command_says_what_it_did(recordings: Path, tmp_path: Path,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    store, summary = tmp_path / 'store', tmp_path / 'survey.json'
+    arguments = ['survey', str(recordings), '--model', MODEL, '--effects', EFFECTS,
+                 '--output', str(store), '--workers', '1', '--json', str(summary)]
+    assert main(arguments) == 0
+    assert json.loads(summary.read_text())['done'] == 6
+    assert main(arguments) == 0
+    assert '0 done, 7 done before' in capsys.readouterr().out
+    assert main(['survey', str(tmp_path / 'none*'), '--output', str(store)]) == 2
+    assert 'there is no recording' in capsys.readouterr().err
