@@ -89,7 +89,7 @@ def test_a_step_is_found_with_its_day_and_size() -> None:
 def test_slopes_lie_within_their_intervals() -> None:
     time = np.arange(float(DAYS))
     right, days, slopes = [], [], 0
-    for seed in RNG_SEEDS:
+    for seed in range(200):
         noise = np.random.default_rng(seed).normal(size=DAYS)
         found = find_changes(time, noise + 0.7 * np.maximum(time - 12, 0), THRESHOLD).found
         if [one.kind for one in found] == ['slope']:
@@ -97,9 +97,9 @@ def test_slopes_lie_within_their_intervals() -> None:
             days.append(abs(found[0].time - 12))
             right.append(abs(found[0].size - 0.7) < 1.96 * found[0].size_std)
     # Noise may bend one slope in twenty so that steps describe it as well.
-    assert slopes >= 0.95 * len(RNG_SEEDS)
+    assert slopes >= 0.95 * 200
     assert np.median(days) < 4
-    assert np.mean(right) > 0.85
+    assert np.mean(right) >= 0.9
 
 
 def test_one_bad_day_is_no_change() -> None:

@@ -192,12 +192,15 @@ class _Series:
         """Return the slope, averaged over the days at which it may have begun."""
         places, c, squares, spreads = self._hinges
         noise = squares.min() / max(self.n - 3, 1)
-        weights = np.exp(-0.5 * (squares - squares.min()) / noise)
+        # The noise is not known either: Student's t, for places as for coefficients.
+        freedom = max(self.n - 3, 1)
+        weights = (squares / max(squares.min(), 1e-300)) ** (-freedom / 2)
         weights /= weights.sum()
         rng = np.random.default_rng(0)
         chosen = rng.choice(len(places), DRAWS, p=weights)
         roots = np.linalg.cholesky(noise * spreads)
-        drawn = c[chosen] + (roots[chosen] @ rng.standard_normal((DRAWS, 2, 1)))[:, :, 0]
+        wider = np.sqrt(freedom / rng.chisquare(freedom, (DRAWS, 1, 1)))
+        drawn = c[chosen] + (roots[chosen] @ (wider * rng.standard_normal((DRAWS, 2, 1))))[:, :, 0]
         draws = np.column_stack([places[chosen], drawn[:, 1], drawn[:, 0]])
         day, size, level = draws.mean(axis=0)
         between = float(np.median(np.diff(places))) / 12 ** 0.5 if len(places) > 1 else 0.0

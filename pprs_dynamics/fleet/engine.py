@@ -67,7 +67,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     count = workers or len(os.sched_getaffinity(0))
     with (dask.config.set(settings),
           library.LocalCluster(n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
-                       dashboard_address=None, silence_logs='ERROR') as local,
+                       dashboard_address=f'{LOOPBACK}:0',
+                               worker_dashboard_address=f'{LOOPBACK}:0', silence_logs='ERROR') as local,
           library.Client(local, set_as_default=False) as client):
         yield client
 

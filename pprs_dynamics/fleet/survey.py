@@ -39,7 +39,7 @@ AUTO = 'auto'
 FITTED = 'fitted'  # the verdict where only named effects were fitted
 # Of the model's error over the changing effort on a drive, beyond which units, signs and order of
 # drives are looked at: wrong ones leave as much as the effort or more.
-SUSPECT = 0.5
+SUSPECT = 1.0
 MODELS_KEPT = 8  # built models that a worker remembers
 
 
