@@ -68,7 +68,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     with (dask.config.set(settings),
           library.LocalCluster(n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
                        dashboard_address=f'{LOOPBACK}:0',
-                               worker_dashboard_address=f'{LOOPBACK}:0', silence_logs='ERROR') as local,
+                               worker_dashboard_address=f'{LOOPBACK}:0',
+                               silence_logs='ERROR') as local,
           library.Client(local, set_as_default=False) as client):
         yield client
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from pprs_dynamics.model.bounded_yaml import parse, read_text
 from pprs_dynamics.model.parameter_file import DEFAULT_MODEL, find_file
