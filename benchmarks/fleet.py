@@ -36,7 +36,7 @@ from pprs_dynamics.fleet.trend import FleetTrends, fleet_trends, main_change
 from pprs_dynamics.fleet.words import sentences
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.fingerprint import fingerprint
+from pprs_dynamics.model.model_fingerprint import fingerprint
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_bodies import PayloadMass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect

@@ -21,8 +21,8 @@ from pprs_dynamics.fleet.store import DONE, FAILED, Store, key_of, schema
 from pprs_dynamics.fleet.survey import Job, examine, identify
 from pprs_dynamics.fleet.trend import FALSE_ALARMS, fleet_trends, main_change
 from pprs_dynamics.fleet.words import sentences
-from pprs_dynamics.model.fingerprint import fingerprint
 from pprs_dynamics.model.model_file import load_model
+from pprs_dynamics.model.model_fingerprint import fingerprint
 
 MODEL = 'config/single_axis.yaml'
 EFFECTS = 'coulomb_friction'

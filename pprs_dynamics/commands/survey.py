@@ -17,9 +17,9 @@ from pprs_dynamics.fleet.store import Store, arrow
 from pprs_dynamics.fleet.survey import AUTO, Job, requests_of
 from pprs_dynamics.fleet.trend import fleet_trends
 from pprs_dynamics.fleet.words import sentences
-from pprs_dynamics.model.fingerprint import fingerprint
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import load_model
+from pprs_dynamics.model.model_fingerprint import fingerprint
 from pprs_dynamics.plain_text import displayed
 from pprs_dynamics.report.fleet_page import fleet_page
 from pprs_dynamics.report.progress import counting_bar

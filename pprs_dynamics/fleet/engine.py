@@ -66,10 +66,10 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
                 'distributed.worker.daemon': True}
     count = workers or len(os.sched_getaffinity(0))
     with (dask.config.set(settings),
-          library.LocalCluster(n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
-                       dashboard_address=f'{LOOPBACK}:0',
-                               worker_dashboard_address=f'{LOOPBACK}:0',
-                               silence_logs='ERROR') as local,
+          library.LocalCluster(
+              n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
+              dashboard_address=f'{LOOPBACK}:0', worker_dashboard_address=f'{LOOPBACK}:0',
+              silence_logs='ERROR') as local,
           library.Client(local, set_as_default=False) as client):
         yield client
 
@@ -137,8 +137,15 @@ def _two_steps(client: Any, items: Iterable[Any], begin: Callable[[Any], Any],
     while there:
         future = next(queue)
         item, first, is_second = there.pop(future.key)
-        value, error = _outcome(future)
+        outcome = _outcome(client, future)
         future.release()
+        if outcome is None:
+            # Done, but on a worker that was killed before it handed the result over.
+            again = after(item, first, None) if is_second else begin(item)
+            if again is not None:
+                add(again, item, first, is_second)
+            continue
+        value, error = outcome
         if not is_second and error is None:
             following = after(item, value, error)
             if following is not None:
@@ -150,17 +157,31 @@ def _two_steps(client: Any, items: Iterable[Any], begin: Callable[[Any], Any],
         fill()
 
 
-def _outcome(future: Any) -> tuple[Any, str | None]:
-    """Return the value of a future, or what became of it."""
+def _outcome(client: Any, future: Any) -> tuple[Any, str | None] | None:
+    """Return the value of a future, or what became of it; None where it went with its worker.
+
+    Raises
+    ------
+    SchedulerError
+        Where the scheduler has gone.
+    """
+    from concurrent.futures import CancelledError
+
     from distributed import KilledWorker
 
-    if future.status == 'finished':
-        return future.result(), None
-    if future.status == 'error':
+    status = future.status
+    try:
+        if status == 'finished':
+            return future.result(), None
+    except (CancelledError, KeyError, OSError):
+        status = 'lost'
+    if status == 'error':
         error = future.exception()
         if isinstance(error, KilledWorker):
             return None, (f'its worker was killed {ALLOWED_FAILURES + 1} times, by the system or '
                           'for lack of memory')
         return None, f'{type(error).__name__}: {error}'
+    if client.status == 'running':
+        return None
     raise SchedulerError('the scheduler has gone; what was written stays, and the same command '
                          'does what is missing')

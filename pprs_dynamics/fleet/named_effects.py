@@ -18,8 +18,10 @@ from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.regression.base_columns import KnownNumber
-from pprs_dynamics.regression.design import Design, Term
-from pprs_dynamics.regression.joint_fit import Block, JointFit, Regression
+from pprs_dynamics.regression.design import Design
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.regression.normal_equations import Block
+from pprs_dynamics.regression.terms import Term
 
 OWN = 'model'  # stands for an effect's name in rows of the model's own numbers
 

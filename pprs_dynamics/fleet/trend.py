@@ -8,7 +8,7 @@ before errors, which follow whatever else changes.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -346,16 +346,3 @@ def _natural(name: str) -> tuple[Any, ...]:
 def main_change(trend: Trend) -> Change:
     """Return the change that is told of a flagged trend: the largest."""
     return max(trend.changes.found, key=lambda one: abs(one.size) / max(one.size_std, 1e-300))
-
-
-def together(first: Trend, others: Sequence[Trend]) -> tuple[list[Trend], list[Trend]]:
-    """Return trends that change with the first within their uncertainties, and all others."""
-    at = main_change(first)
-    with_it: list[Trend] = []
-    apart: list[Trend] = []
-    for trend in others:
-        other = main_change(trend)
-        reach = 3 * float(np.hypot(at.time_std, other.time_std)) + 1.0
-        same = abs(other.time - at.time) <= reach or trend.quantity.rank == 2
-        (with_it if same else apart).append(trend)
-    return with_it, apart

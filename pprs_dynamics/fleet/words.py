@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.fleet.trend import FleetTrends, Trend, main_change, together
+from pprs_dynamics.fleet.trend import FleetTrends, Trend, main_change
 
 MONTH = 30.0  # [days], for slopes
 APART = 6.0  # standard deviations from the fleet's median beyond which a robot is mentioned
@@ -66,6 +66,19 @@ def _span(days: float) -> str:
     if days < 14:
         return f'{days:.0f} days'
     return f'{days / 7:.0f} weeks' if days < 120 else f'{days / MONTH:.0f} months'
+
+
+def together(first: Trend, others: Sequence[Trend]) -> tuple[list[Trend], list[Trend]]:
+    """Return trends that change with the first within their uncertainties, and all others."""
+    at = main_change(first)
+    with_it: list[Trend] = []
+    apart: list[Trend] = []
+    for trend in others:
+        other = main_change(trend)
+        reach = 3 * float(np.hypot(at.time_std, other.time_std)) + 1.0
+        same = abs(other.time - at.time) <= reach or trend.quantity.rank == 2
+        (with_it if same else apart).append(trend)
+    return with_it, apart
 
 
 def robot_text(robot: str) -> str:

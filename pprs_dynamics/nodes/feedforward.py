@@ -13,8 +13,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.model.fingerprint import fingerprint
 from pprs_dynamics.model.margins import Margins, margins
+from pprs_dynamics.model.model_fingerprint import fingerprint
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import answer_cdr
 from pprs_dynamics.nodes.answer import Answer, Feedforward
