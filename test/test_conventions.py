@@ -283,4 +283,4 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
                               text=True, timeout=100)
         assert done.returncode == 2
         assert done.stderr == (f'pprs {command[0]}: mm.csv: the positions of all drives look '
-                               'like millimetres, but they must be metres\n')
+                               'like millimetres, must be metres\n')

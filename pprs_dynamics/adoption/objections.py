@@ -104,7 +104,7 @@ def of_held_out_error(before: float, after: float, gains: Array, model: ForceMod
     if after >= before:
         return [f'the error on {where} does not fall: {before:.4g} N before, {after:.4g} N after']
     return [f'the error on {where} falls from {before:.4g} to {after:.4g} N, which is '
-            f'{sure:.2g} standard errors over blocks, but it must be more than {asked:g}']
+            f'{sure:.2g} standard errors over blocks, must be more than {asked:g}']
 
 
 def of_linearity(promised: float, found: float) -> list[str]:
@@ -157,7 +157,7 @@ def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
     first = next(iter(low))
     told = f'{first} would be {_with_std(low[first])}'
     if not fitted.request.effect.is_friction:
-        return [f'{told}, but it must not be negative']
+        return [f'{told}, must not be negative']
     pushing = _pushing_drives(fitted.model, after)
     if fitted.drives is None:
         shares = pushing.get('', 0.0)

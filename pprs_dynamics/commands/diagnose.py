@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> None:
     if options.adopt_all and not options.output:
-        raise OptionsError('--adopt-all: no --output FILE is given, but it must say where the new '
+        raise OptionsError('--adopt-all: no --output FILE is given, must say where the new '
                            'model file goes')
     if options.output and not options.adopt_all:
         raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '

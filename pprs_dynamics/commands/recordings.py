@@ -106,7 +106,7 @@ def _show_findings(paths: Sequence[str], recordings: Sequence[Recording], screen
     for path, recording in zip(paths, recordings, strict=True):
         for finding in recording.findings:
             if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
-                raise UnreadableFileError(path, f'{finding.what}, but they must be metres')
+                raise UnreadableFileError(path, f'{finding.what}, must be metres')
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
 
 

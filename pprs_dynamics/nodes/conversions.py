@@ -87,16 +87,16 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Ar
     names, values = list(message.name), getattr(message, field)
     missing = [drive for drive in DRIVES if drive not in names]
     if missing:
-        raise Rejection('NAMES', f'name is {names!r:.100}, but it must hold {missing[0]}')
+        raise Rejection('NAMES', f'name is {names!r:.100}, must hold {missing[0]}')
     if len(values) != len(names):
-        raise Rejection('SIZE', f'{field} has {len(values)} values, but it must have '
+        raise Rejection('SIZE', f'{field} has {len(values)} values, must have '
                         f'{len(names)}, as name')
     drives = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
     if may_be_nan:
         # Not a number, and no measurement either.
         return np.where(np.isfinite(drives), drives, np.nan)
     if not np.all(np.isfinite(drives)):
-        raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, but it must be finite')
+        raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, must be finite')
     return drives
 
 

@@ -155,7 +155,7 @@ class SimulatedRobotNode(Node):
             return
         efforts = np.array(message.data)
         if efforts.shape != (6,) or not np.all(np.isfinite(efforts)):
-            self._refuse(f'data holds {len(efforts)} values, but it must be six finite efforts')
+            self._refuse(f'data holds {len(efforts)} values, must be six finite efforts')
             return
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))

@@ -40,7 +40,7 @@ class ResidualsError(PprsError, ValueError):
 
     def __init__(self, quantity: str, found: str, rule: str) -> None:
         self.quantity, self.found, self.rule = quantity, found, rule
-        super().__init__(f'{quantity}: {found}, but it must {rule}')
+        super().__init__(f'{quantity}: {found}, must {rule}')
 
 
 @dataclass(frozen=True)
