@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The house rules: who may import whom, and every equation of the paper in one place."""
 
 from __future__ import annotations
@@ -166,9 +180,9 @@ def test_each_catalogue_effect_has_a_file_of_its_name_and_the_list_is_sorted() -
             assert parameter.lower < parameter.upper
 
 
-@pytest.mark.parametrize('folder', ['mechanism', 'effects', 'model', 'simulation'])
+@pytest.mark.parametrize('folder', ['pprs_dynamics', 'test', 'benchmarks', 'demo', 'docs'])
 def test_every_file_begins_with_the_licence(folder: str) -> None:
-    assert [file.name for file in sorted((PACKAGE / folder).glob('*.py'))
+    assert [str(file) for file in sorted((PACKAGE.parent / folder).rglob('*.py'))
             if not file.read_text(encoding='utf-8').startswith(LICENCE)] == []
 
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Units, signs and order of drives: mistakes are recognised, and nothing else is called one."""
 
 from __future__ import annotations
@@ -269,4 +283,4 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
                               text=True, timeout=100)
         assert done.returncode == 2
         assert done.stderr == (f'pprs {command[0]}: mm.csv: the positions of all drives look '
-                               'like millimetres, but they must be metres\n')
+                               'like millimetres, must be metres\n')

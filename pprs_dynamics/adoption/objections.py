@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What speaks against adding an effect to a model, each in a sentence with its figures."""
 
 from __future__ import annotations
@@ -90,7 +104,7 @@ def of_held_out_error(before: float, after: float, gains: Array, model: ForceMod
     if after >= before:
         return [f'the error on {where} does not fall: {before:.4g} N before, {after:.4g} N after']
     return [f'the error on {where} falls from {before:.4g} to {after:.4g} N, which is '
-            f'{sure:.2g} standard errors over blocks, but it must be more than {asked:g}']
+            f'{sure:.2g} standard errors over blocks, must be more than {asked:g}']
 
 
 def of_linearity(promised: float, found: float) -> list[str]:
@@ -143,7 +157,7 @@ def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
     first = next(iter(low))
     told = f'{first} would be {_with_std(low[first])}'
     if not fitted.request.effect.is_friction:
-        return [f'{told}, but it must not be negative']
+        return [f'{told}, must not be negative']
     pushing = _pushing_drives(fitted.model, after)
     if fitted.drives is None:
         shares = pushing.get('', 0.0)

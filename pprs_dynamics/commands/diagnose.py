@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """pprs diagnose: which physical effect is missing in the model, and how sure that is."""
 
 from __future__ import annotations
@@ -81,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> None:
     if options.adopt_all and not options.output:
-        raise OptionsError('--adopt-all: no --output FILE is given, but it must say where the new '
+        raise OptionsError('--adopt-all: no --output FILE is given, must say where the new '
                            'model file goes')
     if options.output and not options.adopt_all:
         raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The next experiment: the whole way from recordings to the motion that would tell most."""
 
 from __future__ import annotations
@@ -232,7 +246,7 @@ def next_experiment(
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
     """Raise PurposeError for a purpose that needs recordings where there are none."""
     if purpose not in PURPOSES:
-        raise PurposeError(f'purpose is {purpose!r}, but it must be one of {", ".join(PURPOSES)}')
+        raise PurposeError(f'purpose is {purpose!r}, must be one of {", ".join(PURPOSES)}')
     if purpose == 'separate' and not recordings:
         raise PurposeError('purpose separate: no recording is given, but it reads from recordings '
                            'what is to be told apart; a new robot starts with --purpose '
@@ -242,7 +256,7 @@ def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
 def check_duration(duration: float) -> None:
     """Raise PurposeError for a duration that no design is made for."""
     if not SHORTEST <= duration <= LONGEST:
-        raise PurposeError(f'duration is {duration:g} s, but it must lie between {SHORTEST:g} and '
+        raise PurposeError(f'duration is {duration:g} s, must lie between {SHORTEST:g} and '
                            f'{LONGEST:g} s')
 
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """ROS 2 messages to motions and back: shapes and names, no mathematics."""
 
 from __future__ import annotations
@@ -73,16 +87,16 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Ar
     names, values = list(message.name), getattr(message, field)
     missing = [drive for drive in DRIVES if drive not in names]
     if missing:
-        raise Rejection('NAMES', f'name is {names!r:.100}, but it must hold {missing[0]}')
+        raise Rejection('NAMES', f'name is {names!r:.100}, must hold {missing[0]}')
     if len(values) != len(names):
-        raise Rejection('SIZE', f'{field} has {len(values)} values, but it must have '
+        raise Rejection('SIZE', f'{field} has {len(values)} values, must have '
                         f'{len(names)}, as name')
     drives = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
     if may_be_nan:
         # Not a number, and no measurement either.
         return np.where(np.isfinite(drives), drives, np.nan)
     if not np.all(np.isfinite(drives)):
-        raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, but it must be finite')
+        raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, must be finite')
     return drives
 
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Node `simulated_robot`: a physics-engine 3-PPRS to run against, in real time."""
 
 from __future__ import annotations
@@ -141,7 +155,7 @@ class SimulatedRobotNode(Node):
             return
         efforts = np.array(message.data)
         if efforts.shape != (6,) or not np.all(np.isfinite(efforts)):
-            self._refuse(f'data holds {len(efforts)} values, but it must be six finite efforts')
+            self._refuse(f'data holds {len(efforts)} values, must be six finite efforts')
             return
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))

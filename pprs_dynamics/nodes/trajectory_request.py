@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A trajectory message as the model needs it, or the rule that it breaks."""
 
 from __future__ import annotations
@@ -83,13 +97,13 @@ def read_trajectory(
     """
     points = message.points
     if not points:
-        raise Rejection('EMPTY', 'points: the trajectory has none, but it must have at least 1')
+        raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
     if list(message.joint_names) != [PLATFORM]:
         raise Rejection('NAMES', f'joint_names is {list(message.joint_names)!r:.100}, '
-                        f'but it must be [{PLATFORM!r}]')
+                        f'must be [{PLATFORM!r}]')
     if message.header.frame_id not in BASE_FRAMES:
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
-                        "but it must be 'base' or empty")
+                        "must be 'base' or empty")
     lacking = _check_counts(points, missing)
     start = _start(nanoseconds(message.header.stamp), now, max_age)
     offsets = np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
@@ -102,7 +116,7 @@ def read_trajectory(
 def _request(start: int, numbers: Array, offsets: Indices) -> TrajectoryRequest:
     if offsets[0] < 0:
         raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s, '
-                        'but it must not be negative')
+                        'must not be negative')
     return TrajectoryRequest(
         PlatformMotion.from_rows(numbers, offsets / NANOSECONDS), start, offsets)
 
@@ -130,7 +144,7 @@ def _check_counts(points: Sequence[Any], missing: str) -> Mask:
             hint = (f': a spline needs at least {FEWEST_POSES} points, and the trajectory has '
                     f'{len(points)}' if may_lack else '')
             raise Rejection(
-                'SIZE', f'point {index} has {count} {field}, but it must have 1{hint}')
+                'SIZE', f'point {index} has {count} {field}, must have 1{hint}')
     return lacking
 
 

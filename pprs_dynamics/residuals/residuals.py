@@ -1,3 +1,17 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Measured and modelled efforts side by side, with the variables the error may depend on."""
 
 from __future__ import annotations
@@ -26,7 +40,7 @@ class ResidualsError(PprsError, ValueError):
 
     def __init__(self, quantity: str, found: str, rule: str) -> None:
         self.quantity, self.found, self.rule = quantity, found, rule
-        super().__init__(f'{quantity}: {found}, but it must {rule}')
+        super().__init__(f'{quantity}: {found}, must {rule}')
 
 
 @dataclass(frozen=True)

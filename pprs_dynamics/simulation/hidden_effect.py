@@ -269,4 +269,4 @@ def require_parameters(effect: type[HiddenEffect], given: Mapping[str, float]) -
                                 f'not {", ".join(given) or "none"}')
     for name, value in given.items():
         if not np.isfinite(value):
-            raise HiddenEffectError(f'{effect.name}: {name} is {value}, but it must be finite')
+            raise HiddenEffectError(f'{effect.name}: {name} is {value}, must be finite')
