@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import tempfile
 from collections.abc import Iterator
@@ -39,3 +40,11 @@ def ros_domain() -> Iterator[int]:
     """Domain id of this session."""
     yield _DOMAIN
     _HOLDER.close()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_to_collect(request: pytest.FixtureRequest) -> None:
+    """Keep what earlier tests left out of the garbage collection of nodes in real time."""
+    if request.node.get_closest_marker('nodes'):
+        gc.collect()
+        gc.freeze()
