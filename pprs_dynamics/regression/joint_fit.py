@@ -160,12 +160,6 @@ class Regression:
             self._products[key] = self.series[d].products(a.rows[d], other)
         return self._products[key]
 
-    def forget(self, kept: Sequence[Block]) -> None:
-        """Drop the products of all blocks but some, to bound the memory of a long search."""
-        wanted = set(kept)
-        self._products = {key: value for key, value in self._products.items()
-                          if key[0] in wanted and (key[1] is None or key[1] in wanted)}
-
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
 
