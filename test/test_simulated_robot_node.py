@@ -127,7 +127,7 @@ def test_efforts_alone_move_it_without_a_loop(robot: RobotBench) -> None:
 
 @pytest.mark.parametrize(('change', 'words'), [
     ({'position': [float('nan')] * 6}, 'must be finite'),
-    ({'name': ['a', 'b', 'c', 'd', 'e', 'f']}, 'it must hold slide_1'),
+    ({'name': ['a', 'b', 'c', 'd', 'e', 'f']}, 'must hold slide_1'),
     ({'velocity': []}, 'velocity has 0 values'),
     ({'position': [9.0] * 6}, 'outside its stroke'),
 ])
