@@ -258,9 +258,13 @@ class Library:
 
     def candidate(self, effect: type[CatalogueEffect],
                   placements: Sequence[Placement]) -> EffectCandidate:
-        """Return an effect with the price of its name and drives."""
+        """Return an effect with the price of its name and drives.
+
+        With other coefficients on other drives it is more than one hypothesis: asymmetric
+        friction that is dry on one drive and viscous on another is two.
+        """
         ordered = tuple(sorted(placements, key=lambda one: -1 if one.drive is None else one.drive))
-        price = self.prices.of_name()
+        price = len({one.names for one in ordered}) * self.prices.of_name()
         if ordered[0].drive is not None:
             price += self.prices.of_drives(len(ordered))
         return EffectCandidate(effect, ordered, price)
