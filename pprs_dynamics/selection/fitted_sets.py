@@ -100,14 +100,14 @@ class FittedSets:
                                       candidate)[0] >= 1 for candidate in found.unknowns)
 
     def _is_doubted(self, placement: Placement) -> bool:
-        return placement.bare is not None or self.library.turning_rows(placement) is not None
+        return placement.bare is not None or self.library.open_rows(placement) is not None
 
     def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
                          ) -> dict[Placement, tuple[Block, ...]]:
         """Return columns for what effects leave open, in proportion to their fitted force.
 
-        Whether friction follows the loads that an effect adds; and how friction turns over. Each
-        has a coefficient of unit prior.
+        Whether friction follows the loads that an effect adds; how friction turns over; and how
+        real forms depart from the catalogue's. Each has a coefficient of unit prior.
         """
         found = {}
         for candidate in candidates:
@@ -116,11 +116,11 @@ class FittedSets:
                 if placement.bare is not None:
                     rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
                     blocks.append(Block(rows, np.eye(1)))
-                turning = self.library.turning_rows(placement)
-                if turning is not None:
+                left_open = self.library.open_rows(placement)
+                if left_open is not None:
                     assert placement.drive is not None
-                    blocks.append(Block({placement.drive: np.tensordot(c, turning, 1)},
-                                        np.eye(turning.shape[1])))
+                    blocks.append(Block({placement.drive: np.tensordot(c, left_open, 1)},
+                                        np.eye(left_open.shape[1])))
                 if blocks:
                     found[placement] = tuple(blocks)
         return found
