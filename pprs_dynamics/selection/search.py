@@ -115,10 +115,20 @@ class Search(FittedSets):
         for candidates, near in sets:
             if set_key(candidates) not in self.evaluated and self._is_bounded(candidates):
                 new.append(self.evaluate(candidates, near))
+        # No noise takes a constant: what lacks nothing else is judged once it has it.
+        for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
+            new += [self.evaluate(more, found) for more in self.proposals(found, 1)
+                    if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
         for found in sorted(shaped, key=lambda one: one.cost)[:REFINED]:
             self.refined(found)
+
+    def _all_but_constants(self, found: CandidateSet) -> float:
+        """Return the cost of a set if its drives' constants were what their noise expects."""
+        squares = found.fit.squares[:, 0] / self.regression.noise_shapes.spectrum(
+            found.fit.amplitudes)[:, 0]
+        return found.cost - float(np.sum(np.maximum(squares - self.regression.counts[:, 0], 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
