@@ -323,12 +323,13 @@ class Search(FittedSets):
             if not isinstance(candidate, EffectCandidate):
                 continue
             effect = candidate.effect
-            if len(candidate.placements) > 1:
-                for gone in candidate.placements:
-                    if self.drop_cost(best, gone) < 3 * self.decisions.rival_margin:
-                        rest = [one for one in candidate.placements if one is not gone]
-                        yield self._exchanged(best, candidate,
-                                              self.library.candidate(effect, rest))
+            # The drives where it matters most; fewer of them may be better though one less is not.
+            strength = {one: self.drop_cost(best, one) for one in candidate.placements}
+            ranked = sorted(candidate.placements, key=lambda one: -strength[one])
+            for count in range(1, len(ranked)):
+                if sum(strength[one] for one in ranked[count:]) < 3 * self.decisions.rival_margin:
+                    yield self._exchanged(best, candidate,
+                                          self.library.candidate(effect, ranked[:count]))
             if len({one.names for one in candidate.placements}) > 1:
                 for names in effect.variants:
                     yield self._exchanged(best, candidate, self.library.candidate(effect, [
