@@ -51,6 +51,7 @@ def main() -> int:
                                           args=['--no-sandbox'])
         tab = browser.new_page(viewport={'width': 1280, 'height': 900})
         tab.goto(options.page.resolve().as_uri())
+        tab.wait_for_function("performance.getEntriesByType('paint').length")
         paint = tab.evaluate("performance.getEntriesByType('paint')[0].startTime")
         tab.click('summary:has-text("What if")')
         tab.wait_for_selector('#what-if[data-ready]')

@@ -122,13 +122,18 @@
     isDrawn = true;
     show(cells[0].now, Math.sqrt(sum / samples), 3);
     cells.forEach(({now: {value}, bar}) => { bar.style.width = `${100 * value / data.largest}%`; });
+    const own = (effect) => effect.placements.filter((one) => ticked.has(one));
     for (const effect of data.effects) {
-      const mine = effect.placements.filter((one) => ticked.has(one));
-      const other = fit(mine.length ? chosen.filter((one) => !mine.includes(one))
-        : [...chosen, ...effect.placements.filter((one) => one.isFirstChoice)]);
-      effect.box.checked = mine.length > 0;
+      effect.box.checked = own(effect).length > 0;
       effect.placements.forEach((one) => { if (one.box) one.box.checked = ticked.has(one); });
-      show(effect.evidence, mine.length ? other.cost - now.cost : now.cost - other.cost, 0);
+      if (effect.box.checked) continue;
+      const more = effect.placements.filter((one) => one.isFirstChoice);
+      show(effect.evidence, now.cost - fit([...chosen, ...more]).cost, 0);
+    }
+    // From the last one on the factor stays good for what stands before.
+    for (const effect of data.effects.filter(({box}) => box.checked).reverse()) {
+      const mine = own(effect), rest = chosen.filter((one) => !mine.includes(one));
+      show(effect.evidence, fit(rest).cost - now.cost, 0);
     }
     const names = data.effects.filter((effect) => effect.box.checked).map((one) => one.name);
     status.textContent = `With ${names.join(', ') || 'nothing'} in the model the error would be `

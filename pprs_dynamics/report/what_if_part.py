@@ -32,7 +32,8 @@ from pprs_dynamics.residuals.residuals import Residuals
 POINTS = 400  # pairs of extremes that are shown of a drive: a third of a screen is no wider
 LARGEST = 32767  # of 16 bits; the least stands for a sample that was not measured
 GAP = -LARGEST - 1
-_ELEMENTS = '''
+_HEADINGS = ''.join(f'<th scope="col">{name}</th>' for name in ('', 'as given', 'now', 'noise', ''))
+_ELEMENTS = f'''
 <div id="what-if">
 <p class="note">Tick an effect, or the drives it is to be on, and see what would be left. All that
 is ticked is fitted together, beside the model's own numbers within their tolerances, at the noise
@@ -44,10 +45,9 @@ changes how others show; with it added or taken away, the figures are only nearl
 <div class="effects"><table><thead><tr><th scope="col">effect</th><th scope="col">evidence</th></tr>
 </thead><tbody></tbody></table></div></div>
 <div><p role="status"></p>
-<table class="errors"><caption>Error, rms [N], as given (grey) and with the effects ticked (blue);
-dotted: the noise.</caption><thead><tr><th scope="col"></th><th scope="col">as given</th>
-<th scope="col">now</th><th scope="col">noise</th><th scope="col"></th></tr></thead>
-<tbody></tbody></table>
+<div class="scroll"><table class="errors"><caption>Error, rms [N], as given (grey) and with the
+effects ticked (blue); dotted: the noise.</caption><thead><tr>{_HEADINGS}</tr></thead>
+<tbody></tbody></table></div>
 <p class="note">Error over time [s, N]; dotted: two standard deviations of the noise. Drag to zoom,
 on all drives at once; double-click to return.</p><div class="charts"></div></div></div></div>
 '''
