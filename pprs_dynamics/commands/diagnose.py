@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
     keep(diagnosis_key(model, options.recordings, options.topic), diagnosis)
-    rivals = rival_effects(diagnosis)
+    rivals = rival_effects(diagnosis, validate)
     words = word_diagnosis(diagnosis, GivenFiles(
         tuple(options.recordings), tuple(options.validate),
         '' if options.model == DEFAULT_MODEL else str(options.model)), rivals)

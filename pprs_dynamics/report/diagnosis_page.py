@@ -192,8 +192,8 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
              f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
              sites(one.drives, diagnosis)) for one in diagnosis.effects],
-            caption='Those with most evidence first, parameters fitted anew at every step. '
-            f'Held out: {where}.')
+            caption='Those without which the error would be largest first, parameters fitted anew '
+            f'at every step. Held out: {where}.')
         drives = diagnosis.residuals.drives
         size = sum((one.force ** 2).mean(axis=0) for one in diagnosis.effects)
         acting = [name for d, name in enumerate(drives) if size[d] > 0]
