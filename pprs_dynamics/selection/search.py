@@ -47,6 +47,7 @@ from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates, F
 from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
+BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
 # Lowest score of a proposal, and how much worse than the best a replacement may look at the best
@@ -139,8 +140,8 @@ class Search(FittedSets):
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[tuple[Candidates, CandidateSet]] = []
         ranked = sorted(self.evaluated.values(), key=lambda one: one.cost)
-        for rank, base in enumerate(ranked[:int(self.decisions.beam)]):
-            count = int(self.decisions.proposals) if rank == 0 else 2
+        for rank, base in enumerate(ranked[:BEAM]):
+            count = PROPOSALS if rank == 0 else 2
             found += [(candidates, base) for candidates in self.proposals(base, count)]
             if rank == 0:
                 fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
