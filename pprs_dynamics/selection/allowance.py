@@ -21,8 +21,6 @@ sensors are exact, and nothing else's lack of fit looks like them by much.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from pprs_dynamics.effects.effect import CatalogueEffect
@@ -35,16 +33,12 @@ from pprs_dynamics.selection.decisions import Decisions
 
 def share_of_allowance(design: Design, regression: Regression, decisions: Decisions,
                        found: CandidateSet, candidate: Candidate,
-                       part: Sequence[Block] = ()) -> tuple[float, tuple[str, ...]]:
-    """Return a candidate's force beyond the others over what their lack of fit may leave.
-
-    Of a part of it, if blocks are given: that on one of its drives.
-    """
-    blocks = part or candidate.blocks
+                       ) -> tuple[float, tuple[str, ...]]:
+    """Return a candidate's force beyond the others over what their lack of fit may leave."""
     # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
     exact = isinstance(candidate, EffectCandidate) and not candidate.effect.idealised
     share = decisions.exact_share if exact else decisions.form_share
-    drives = {d for block in blocks for d in block.rows}
+    drives = {d for block in candidate.blocks for d in block.rows}
     allowed, names = 0.0, []
     for other in found.effects:
         if other is candidate or not other.effect.idealised:
@@ -61,16 +55,16 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
         design, regression, found, drives)
     if own > allowed:
         names = ["the model's own friction"]
-    square = beyond_others(regression, found, blocks)
+    square = beyond_others(regression, found, candidate)
     return float(np.sqrt(square / max(allowed + own, 1e-300))), tuple(names)
 
 
-def beyond_others(regression: Regression, found: CandidateSet, blocks: Sequence[Block]) -> float:
-    """Return the whitened square of what blocks add that no refit of the others makes good."""
-    free = [block for block in blocks if not block.is_fixed]
+def beyond_others(regression: Regression, found: CandidateSet, candidate: Candidate) -> float:
+    """Return the whitened square of what no refit of the others makes good."""
+    free = [block for block in candidate.blocks if not block.is_fixed]
     if not free:
         return sum(whitened_square(regression, found, block, set(block.rows))
-                   for block in blocks)
+                   for block in candidate.blocks)
     index = np.concatenate([np.arange(place.start, place.stop) for place in (
         found.fit.places[block] for block in free)])
     c = found.fit.coefficients[index]

@@ -59,23 +59,10 @@ def without_remainders(search: FittedSets, best: CandidateSet,
             if share < 1:
                 small[candidate] = names
         if not small:
-            return _without_drives(search, best), tuple(remainders)
+            return best, tuple(remainders)
         # Of two that look like each other, either is small beyond the other.
         without = {candidate: search.evaluate(
             tuple(c for c in best.candidates if c is not candidate), best) for candidate in small}
         least = min(without, key=lambda candidate: without[candidate].total)
         remainders.append(Remainder(least, best, small[least]))
         best = without[least]
-
-
-def _without_drives(search: FittedSets, best: CandidateSet) -> CandidateSet:
-    """Return the set without drives on which an effect is within the model error of others."""
-    for candidate in best.effects:
-        kept = [placement for placement in candidate.placements if share_of_allowance(
-            search.design, search.regression, search.decisions, best, candidate,
-            (placement.block,))[0] >= 1]
-        if 0 < len(kept) < len(candidate.placements):
-            less = search.library.candidate(candidate.effect, kept)
-            return _without_drives(search, search.evaluate(
-                tuple(less if c is candidate else c for c in best.candidates), best))
-    return best
