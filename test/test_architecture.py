@@ -51,6 +51,8 @@ MAY_USE = {
                     'selection'},
     'report': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                'selection', 'diagnosis', 'adoption', 'experiments', 'fleet'},
+    'workbench': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
+                  'selection', 'diagnosis', 'adoption', 'experiments'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                  'selection', 'diagnosis', 'adoption', 'simulation', 'experiments', 'report',
