@@ -31,9 +31,9 @@ from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.model.ledger import read_steps
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.workbench import Session
+from pprs_dynamics.workbench.errors import SessionError, StaleError
 from pprs_dynamics.workbench.jobs import Cancelled, Job
 from pprs_dynamics.workbench.shown import EXACT, FITTED, LINEAR
-from pprs_dynamics.workbench.tick_board import SessionError, StaleError
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
 MASS = HIDDEN['effects.payload_mass.mass']

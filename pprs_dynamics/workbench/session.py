@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from typing import Any
@@ -25,17 +26,19 @@ from pprs_dynamics.adoption.adopt import Adoption, adopt, original
 from pprs_dynamics.adoption.ledger_entry import LedgerBook
 from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.experiments.next_experiment import Experiment, next_experiment
-from pprs_dynamics.measurement.recording import Recording, read_recording
-from pprs_dynamics.measurement.repeats import find_repeat
+from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import Step, read_steps, without_last_step
 from pprs_dynamics.model.model_file import build_model, load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.model.parameter_file import find_file
-from pprs_dynamics.workbench.jobs import Job
+from pprs_dynamics.workbench.errors import SessionError
+from pprs_dynamics.workbench.jobs import Cancelled, Job
 from pprs_dynamics.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
+from pprs_dynamics.workbench.reading import read, refuse_paths, refuse_repeats
 from pprs_dynamics.workbench.shown import (
     Share,
     effect_to_json,
@@ -43,7 +46,7 @@ from pprs_dynamics.workbench.shown import (
     names_of,
     rms,
 )
-from pprs_dynamics.workbench.tick_board import SessionError, TickBoard
+from pprs_dynamics.workbench.tick_board import TickBoard
 from pprs_dynamics.workbench.what_if import WhatIf
 
 
@@ -94,10 +97,11 @@ class Session(TickBoard):
         """
         base = find_file(model)
         found = load_model(base)
+        refuse_paths([str(path) for path in (*recordings, *validation)])
         fitted, held_out = (
-            {str(path): read_recording(path, found.drives, topic) for path in paths}
+            {str(path): read(path, found, topic) for path in paths}
             for paths in (recordings, validation))
-        _refuse_repeats(fitted, held_out)
+        refuse_repeats(fitted, held_out)
         return cls(found, fitted, held_out, base)
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
@@ -108,10 +112,11 @@ class Session(TickBoard):
         PprsError
             Where it cannot be read, holds the samples of another, or the model cannot follow it.
         """
-        more = {str(path): read_recording(path, self.model.drives)}
+        refuse_paths([*self.recordings, *self.validation, str(path)])
+        more = {str(path): read(path, self.model)}
         fitted = self.recordings if is_held_out else {**self.recordings, **more}
         held_out = {**self.validation, **more} if is_held_out else self.validation
-        _refuse_repeats(fitted, held_out)
+        refuse_repeats(fitted, held_out)
         if is_held_out:
             self.validation = held_out
             self.tell()
@@ -194,6 +199,7 @@ class Session(TickBoard):
 
     def _adopted(self, what_if: WhatIf, request: EffectRequest, force: bool,
                  report: Callable[[float], None]) -> Adoption:
+        self._await_diagnosis(report)
         answer = adopt(what_if.model, request, what_if.recordings,
                        list(self.validation.values()), force, lambda share: report(0.9 * share),
                        self.diagnosis)
@@ -209,6 +215,14 @@ class Session(TickBoard):
                                   if name != request.name})
         self.last_adoption = answer
         return answer
+
+    def _await_diagnosis(self, report: Callable[[float], None]) -> None:
+        """Wait for a diagnosis that is under way: an adoption would make it again."""
+        job = self.jobs.get('diagnose')
+        while job is not None and job.is_running:
+            report(0.4 * job.share)
+            with suppress(TimeoutError, Cancelled, PprsError):
+                job.result(0.1)
 
     def next_experiment(self, duration: float = 20.0, seed: int = 0) -> Job[Experiment]:
         """Begin to design the motion that would tell what these recordings leave open.
@@ -296,6 +310,7 @@ class Session(TickBoard):
             adoption = self.last_adoption
             return {
                 'revision': self.revision, 'version': self.version, 'stage': shown.stage,
+                'is_settled': shown.is_settled,
                 'is_approximate': shown.is_approximate, 'departure': finite(shown.departure),
                 'notice': shown.notice, 'drives': list(self.drives),
                 'noise_is_guess': self.noise_floors is None,
@@ -325,10 +340,3 @@ class Session(TickBoard):
                 'now': finite(rms(self.now[part])),
                 'findings': [finding.text for finding in recording.findings]})
         return found
-
-
-def _refuse_repeats(fitted: Mapping[str, Recording], held_out: Mapping[str, Recording]) -> None:
-    repeat = find_repeat(list(fitted.values()), ()) or find_repeat(
-        list(held_out.values()), list(fitted.values()))
-    if repeat is not None:
-        raise SessionError(f'{repeat[1]}, but every recording may be given once')

@@ -121,6 +121,11 @@ class Shown:
         return not any(tick.chosen for tick in self.ticks.values())
 
     @property
+    def is_settled(self) -> bool:
+        """True where nothing more would follow from these ticks."""
+        return self.has_offers and (self.stage == EXACT or not self.ticks)
+
+    @property
     def departure(self) -> float:
         """By how much the cost is above that of the best values."""
         return max(self.found.total - self.free.total, 0.0)

@@ -33,6 +33,7 @@ from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.selection.candidates import CandidateSet
 from pprs_dynamics.selection.estimates import Estimate
+from pprs_dynamics.workbench.errors import SessionError, StaleError
 from pprs_dynamics.workbench.shown import (
     EXACT,
     FITTED,
@@ -47,14 +48,6 @@ from pprs_dynamics.workbench.shown import (
 from pprs_dynamics.workbench.what_if import Tick, WhatIf
 
 CHANGED_SHAPES = 1.0  # fall of the cost, from which what the others would gain is looked at again
-
-
-class SessionError(PprsError, ValueError):
-    """What a session cannot do."""
-
-
-class StaleError(SessionError):
-    """A change that counts on a state which is not that of the session any more."""
 
 
 class TickBoard:
@@ -93,6 +86,12 @@ class TickBoard:
                 on = tick.best.drives
                 self.tick(name, [what_if.drives[d] for d in on] if on else None)
             self.tell()
+
+    @contextmanager
+    def steady(self) -> Iterator[None]:
+        """Keep everything as it is while the block lasts, so that it belongs together."""
+        with self._lock:
+            yield
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call a function after every change, and return one that ends this."""
