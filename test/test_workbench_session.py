@@ -17,8 +17,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,7 @@ from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.model.ledger import read_steps
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.workbench import Session
+from pprs_dynamics.workbench.apart import EndedError, run_apart
 from pprs_dynamics.workbench.errors import SessionError, StaleError
 from pprs_dynamics.workbench.jobs import Cancelled, Job
 from pprs_dynamics.workbench.shown import EXACT, FITTED, LINEAR
@@ -255,6 +258,38 @@ def test_a_job_is_cancelled_at_its_next_report() -> None:
     assert shares == [0, 1, 2, 3]
     assert job.to_json()['error'] == ''
     assert not job.is_running
+
+
+def sleep(seconds: float, progress: Any) -> str:
+    for _ in range(int(100 * seconds)):
+        progress(0.5)
+        time.sleep(0.01)
+    return 'slept'
+
+
+def fail(progress: Any) -> None:
+    raise SessionError('the value is 1, must be 2')
+
+
+def end(progress: Any) -> None:
+    os._exit(3)
+
+
+def test_work_apart_answers_fails_and_is_ended() -> None:
+    shares: list[float] = []
+    assert run_apart(sleep, 0.5, report=shares.append) == 'slept'
+    assert 0.5 in shares
+    with pytest.raises(SessionError, match='must be 2'):
+        run_apart(fail, report=shares.append)
+    with pytest.raises(EndedError, match='status 3'):
+        run_apart(end, report=shares.append)
+    began = time.monotonic()
+    job: Job[str] = Job('diagnose', '', lambda report: run_apart(sleep, 60, report=report)).start()
+    time.sleep(0.5)
+    job.cancel()
+    with pytest.raises(Cancelled):
+        job.result(20)
+    assert time.monotonic() - began < 20
 
 
 def test_the_session_imports_neither_ros_nor_a_server() -> None:

@@ -55,7 +55,6 @@ UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
 MOST_POINTS = 20_000  # of a scatter
 HEARTBEAT = 15.0  # [s] between signs of life
-EXPERIMENT_RATE = 100.0  # [Hz], the default of play_trajectory
 STATIC = {'workbench.js': 'text/javascript', 'curves.js': 'text/javascript',
           'robot.js': 'text/javascript', 'scatter.js': 'text/javascript',
           'workbench.css': 'text/css'}
@@ -241,9 +240,8 @@ class Api:
         found = self.hub.the_session.experiment
         if found is None:
             raise SessionError('no experiment is designed yet')
-        count = int(found.duration * EXPERIMENT_RATE + 1e-9) + 1
-        return self._download('next.csv', 'text/csv', lambda path: write_poses(
-            path, found.motion(np.arange(count) / EXPERIMENT_RATE)))
+        return self._download('next.csv', 'text/csv',
+                              lambda path: write_poses(path, found.motion))
 
     def model(self, query: Any) -> Response:
         """Answer the model file, with what is ticked where that is asked for."""
@@ -278,8 +276,9 @@ class Api:
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
         found = robot_motion(self.hub.the_session)
-        return binary({}, {'time': found.time, 'joints': found.joints, 'before': found.before,
-                            'now': found.now})
+        return binary({'angles': found.angles}, {
+            'time': found.time, 'joints': found.joints, 'before': found.before,
+            'now': found.now})
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""

@@ -36,6 +36,8 @@ class RobotMotion:
 
     Parameters
     ----------
+    angles : tuple of float
+        Of the chains about z [rad].
     time : (F,) array
         Of the residuals [s].
     joints : (F, 3, 3, 3) array
@@ -44,6 +46,7 @@ class RobotMotion:
         Error of the drives there, rms over the samples until the next pose [N].
     """
 
+    angles: tuple[float, ...]
     time: Array
     joints: Array
     before: Array
@@ -71,7 +74,8 @@ def robot_motion(board: TickBoard, most: int = MOST_POSES) -> RobotMotion:
         if len(here):
             found = joint_positions(model.robot.geometry, one.motion[starts[here]])
             joints.append(np.stack((found.foot, found.elbow, found.tip), axis=1))
-    return RobotMotion(board.data.time[chosen], np.concatenate(joints),
+    angles = tuple(float(angle) for angle in model.values['geometry.chain_angles'])
+    return RobotMotion(angles, board.data.time[chosen], np.concatenate(joints),
                        _rms_between(board.before, chosen), _rms_between(board.now, chosen))
 
 

@@ -22,12 +22,11 @@ from dataclasses import replace
 from os import PathLike
 from typing import Any
 
-from pprs_dynamics.adoption.adopt import Adoption, adopt, original
+from pprs_dynamics.adoption.adopt import Adoption, original
 from pprs_dynamics.adoption.ledger_entry import LedgerBook
 from pprs_dynamics.adoption.request import EffectRequest
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.experiments.next_experiment import Experiment, next_experiment
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
@@ -35,8 +34,10 @@ from pprs_dynamics.model.ledger import Step, read_steps, without_last_step
 from pprs_dynamics.model.model_file import build_model, load_model
 from pprs_dynamics.model.model_writer import write_model
 from pprs_dynamics.model.parameter_file import find_file
+from pprs_dynamics.workbench.apart import run_apart
 from pprs_dynamics.workbench.errors import SessionError
 from pprs_dynamics.workbench.jobs import Cancelled, Job
+from pprs_dynamics.workbench.long_work import DesignedMotion, designed, diagnosed, judged
 from pprs_dynamics.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
 from pprs_dynamics.workbench.reading import read, refuse_paths, refuse_repeats
 from pprs_dynamics.workbench.shown import (
@@ -80,7 +81,7 @@ class Session(TickBoard):
         self.base = base
         self.diagnosis: Diagnosis | None = None
         self.last_adoption: Adoption | None = None
-        self.experiment: Experiment | None = None
+        self.experiment: DesignedMotion | None = None
         self.jobs: dict[str, Job[Any]] = {}
         super().__init__(WhatIf(model, list(self.recordings.values())))
 
@@ -162,7 +163,8 @@ class Session(TickBoard):
         what_if = self.what_if
 
         def work(report: Callable[[float], None]) -> Diagnosis:
-            found = diagnose(original(what_if.model), what_if.recordings, (), report)
+            found: Diagnosis = run_apart(diagnosed, original(what_if.model), what_if.recordings,
+                                         report=report)
             with self._lock:
                 if what_if is self.what_if:
                     self.diagnosis, self.noise_floors = found, found.noise_floors
@@ -200,9 +202,9 @@ class Session(TickBoard):
     def _adopted(self, what_if: WhatIf, request: EffectRequest, force: bool,
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
-        answer = adopt(what_if.model, request, what_if.recordings,
-                       list(self.validation.values()), force, lambda share: report(0.9 * share),
-                       self.diagnosis)
+        answer: Adoption = run_apart(
+            judged, what_if.model, request, what_if.recordings, list(self.validation.values()),
+            force, self.diagnosis, report=lambda share: report(0.9 * share))
         if answer.adopted:
             book = LedgerBook.of(self.recordings, self.validation)
             after = WhatIf(book.entered(answer), what_if.recordings)
@@ -224,7 +226,7 @@ class Session(TickBoard):
             with suppress(TimeoutError, Cancelled, PprsError):
                 job.result(0.1)
 
-    def next_experiment(self, duration: float = 20.0, seed: int = 0) -> Job[Experiment]:
+    def next_experiment(self, duration: float = 20.0, seed: int = 0) -> Job[DesignedMotion]:
         """Begin to design the motion that would tell what these recordings leave open.
 
         Raises
@@ -236,10 +238,11 @@ class Session(TickBoard):
         if not isinstance(model, DriveModel):
             raise SessionError(f'motions are designed for the 3-PPRS, not for {model.title}')
 
-        def work(report: Callable[[float], None]) -> Experiment:
-            self.experiment = next_experiment(model, self.what_if.recordings, duration=duration,
-                                              seed=seed, progress=report)
-            return self.experiment
+        def work(report: Callable[[float], None]) -> DesignedMotion:
+            found: DesignedMotion = run_apart(designed, model, self.what_if.recordings, duration,
+                                              seed, report=report)
+            self.experiment = found
+            return found
         return self._begin(Job('experiment', '', work, self._job_changed))
 
     def cancel(self, kind: str) -> None:
@@ -322,7 +325,7 @@ class Session(TickBoard):
                 'steps': [step.to_json() for step in self.steps],
                 'jobs': {kind: job.to_json() for kind, job in self.jobs.items()},
                 'adoption': adoption.to_json() if adoption else None,
-                'experiment': self.experiment.to_json() if self.experiment else None,
+                'experiment': self.experiment.promise if self.experiment else None,
                 'recordings': self._recordings(),
                 'held_out': [one.name for one in self.validation.values()]}
 
