@@ -58,7 +58,7 @@ MAY_USE = {
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                  'selection', 'diagnosis', 'adoption', 'simulation', 'experiments', 'report',
-                 'fleet', 'workbench', 'server'},
+                 'fleet', 'workbench', 'server', 'nodes'},
 }
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))

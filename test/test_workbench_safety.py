@@ -181,6 +181,7 @@ def test_uploads_are_bounded_and_read_by_the_strict_readers(
     assert upload(bench, other.read_bytes(), '..%2f..%2fother.csv') == 200
     assert len(bench.screen()['recordings']) == before + 1
     assert not (folder.parent / 'other.csv').exists()
+    assert bench.screen()['recordings'][-1]['name'] == 'other.csv'
 
 
 def test_a_body_that_goes_on_is_cut_off(bench: Workbench) -> None:

@@ -22,6 +22,8 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.commands.arguments import number
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.server.folders import Folders, is_folder
 from pprs_dynamics.server.hub import Hub, LiveSource
 from pprs_dynamics.server.serve import serve
@@ -39,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='a recording that is never fitted: adoptions are judged on it; may '
                         'be repeated')
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
-                        'holds several')
+                        'holds several, and to listen to with --live')
     parser.add_argument('--live', action='store_true',
                         help='listen to joint_states, and set effects on running nodes')
     parser.add_argument('--port', type=number(0, 65535), default=0.0,
@@ -57,7 +59,17 @@ def run(options: argparse.Namespace) -> int:
         if not given:
             return None
         return Session.open(given, options.model, options.validate, options.topic)
-    live: LiveSource | None = None
+    live = _live(options) if options.live else None
     hub = Hub(begin, options.model, Folders.of(options.recordings), live)
     serve(hub, options.host, int(options.port), not options.no_browser)
     return 0
+
+
+def _live(options: argparse.Namespace) -> LiveSource:
+    model = DriveModel.load(options.model)
+    try:
+        from pprs_dynamics.nodes.live_joint_states import LiveSource as JointStates
+    except ImportError:
+        raise MissingLibraryError('rclpy', 'live data', 'ros') from None
+    source: LiveSource = JointStates(model, options.topic or 'joint_states')
+    return source

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -30,7 +31,8 @@ from pprs_dynamics.server.folders import ENDINGS, Folders
 from pprs_dynamics.workbench.errors import SessionError
 from pprs_dynamics.workbench.session import Session
 
-MOST_UPLOADS = 20
+MOST_UPLOADS, LONGEST_NAME = 20, 80
+NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
 IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
@@ -45,6 +47,9 @@ class LiveSource(Protocol):
 
     def set_model(self, model: ForceModel) -> dict[str, str]:
         """Set a model on the running nodes; return what each said, '' where it took it."""
+
+    def close(self) -> None:
+        """End it."""
 
 
 class Hub:
@@ -90,6 +95,8 @@ class Hub:
         if self.session is not None:
             for job in self.session.jobs.values():
                 job.cancel()
+        if self.live is not None:
+            self.live.close()
         self._worker.join(10)
         self._uploads.cleanup()
 
@@ -142,7 +149,7 @@ class Hub:
         self._changed()
 
     def save_upload(self, name: str) -> Path:
-        """Return the path for an upload; of its name only the ending counts.
+        """Return the path for an upload, in a folder of its own, with what is plain of its name.
 
         Raises
         ------
@@ -157,7 +164,10 @@ class Hub:
                 raise SessionError(f'{MOST_UPLOADS} recordings were uploaded already, must be no '
                                    'more')
             self._count += 1
-            return Path(self._uploads.name) / f'upload_{self._count}{ending}'
+            folder = Path(self._uploads.name) / str(self._count)
+        folder.mkdir()
+        stem = NOT_PLAIN.sub('_', name.replace('\\', '/').rpartition('/')[2][:-len(ending)])
+        return folder / f'{stem.strip(".")[:LONGEST_NAME] or "recording"}{ending}'
 
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''

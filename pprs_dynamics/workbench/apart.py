@@ -33,7 +33,7 @@ from pprs_dynamics.errors import PprsError
 SHARE, RESULT, ERROR = 'share', 'result', 'error'
 PATIENCE = 0.2  # [s] between looks whether the work was called off
 START = 'from pprs_dynamics.workbench.apart import main; main()'
-NICENESS = 5  # whoever clicks comes first
+NICENESS = 2  # whoever clicks comes first
 
 
 class EndedError(PprsError, RuntimeError):

@@ -414,7 +414,7 @@ class EffectRow {
         input.value = one.value === null ? '' : digits(one.value, one.std && 2 * one.std);
       }
       after.textContent = `${one.is_chosen ? '' : one.std === null ? '± … '
-        : `± ${(2 * one.std).toPrecision(2)} `}${one.unit}`;
+        : `± ${(2 * one.std).toPrecision(2)} `}${one.unit === '1' ? '' : one.unit}`;
       if (range && document.activeElement !== range) {
         if (!one.is_chosen) range.dataset.middle = one.value;
         range.value = this.toRange(range, one);
@@ -664,6 +664,7 @@ const open = (name) => {
   if (name === 'scatter') loadScatter();
   if (name === 'robot') loadRobot();
   if (name === 'recordings') showFiles();
+  if (name === 'live') showLive();
   if (name === 'curves') curves.resize();
 };
 
@@ -803,6 +804,83 @@ const prepare = () => {
 
 /* -- live --------------------------------------------------------------------------------- */
 
-const prepareLive = () => {};
+let livePlots = [];
+
+const showLive = async () => {
+  if (view !== 'live' || !bench.state?.has_live) return;
+  let found;
+  try {
+    found = await ask('live');
+  } catch (error) {
+    $('live-state').textContent = error.message;
+    return;
+  }
+  bench.live = found;
+  const rms = (values) => {
+    const known = values.filter((v) => v !== null);
+    return known.length ? Math.sqrt(known.reduce((a, v) => a + v * v, 0) / known.length) : null;
+  };
+  const running = found.age !== null && found.age < 2;
+  const monitor = found.monitor_error ? ` · the monitor says ${newtons(rms(found.monitor_error))} N`
+    : '';
+  $('live-state').textContent = running
+    ? `error of the last 2 s ${newtons(rms(found.error))} N with ${found.effects.length
+      ? found.effects.map(titleOf).join(', ') : 'no added effect'}${monitor} · ${
+      found.kept.toFixed(0)} s kept${found.trouble ? ` · ${found.trouble}` : ''}`
+    : `Nothing comes in on joint_states${found.received ? ' any more' : ''}. ${found.trouble}`;
+  $('live-take').disabled = !found.kept;
+  if (!found.residual.length) return;
+  const origin = found.time[found.time.length - 1];
+  const time = found.time.map((t) => t - origin);
+  const root = $('live-curves');
+  if (livePlots.length !== found.drives.length) {
+    root.replaceChildren();
+    const axis = {stroke: css('--quiet'), grid: {stroke: css('--line'), width: 1},
+                  font: '12px system-ui'};
+    livePlots = found.drives.map((drive, d) => {
+      const box = make('div', '', 'curve');
+      const head = make('h3', drive);
+      const reading = make('span');
+      head.append(reading);
+      box.append(head);
+      root.append(box);
+      const plot = new uPlot({
+        width: Math.max(root.clientWidth, 100), height: 84, legend: {show: false},
+        padding: [8, 6, 0, 0], cursor: {show: false}, scales: {x: {time: false}},
+        axes: [{...axis, size: 20, values: (u, ticks) => ticks.map((t) => `${t} s`)},
+               {...axis, size: 62, space: 22,
+                values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} N`)}],
+        series: [{}, {stroke: css('--now'), width: 1, points: {show: false}}],
+      }, [time, found.residual[d]], box);
+      return {plot, reading};
+    });
+  }
+  livePlots.forEach(({plot, reading}, d) => {
+    plot.setData([time, found.residual[d]]);
+    reading.textContent = `${newtons(found.error[d])} N`;
+  });
+};
+
+const prepareLive = () => {
+  setInterval(showLive, 400);
+  $('live-set').addEventListener('click', async () => {
+    try {
+      const {nodes} = await ask('live/set', {});
+      $('live-nodes').replaceChildren(...Object.entries(nodes).map(([name, said]) =>
+        make('li', `${name}: ${said || 'took the effects'}`)));
+      tell('');
+    } catch (error) {
+      tell(error.message);
+    }
+  });
+  $('live-take').addEventListener('click', async () => {
+    try {
+      show(await ask('live/take', {}));
+      tell('What came in last is a recording of this session now.', true);
+    } catch (error) {
+      tell(error.message);
+    }
+  });
+};
 
 prepare();
