@@ -75,7 +75,7 @@ class Curves {
                   ticks: {stroke: css('--line'), size: 4}, font: '12px system-ui', gap: 3};
     const is_last = d === this.drives.length - 1;
     const plot = new uPlot({
-      width: Math.max(this.root.clientWidth, 100), height: is_last ? 116 : 92,
+      width: Math.max(this.root.clientWidth, 100), height: this.height() + (is_last ? 24 : 0),
       padding: [8, 6, 0, 0], legend: {show: false},
       cursor: {sync: {key: 'time', setSeries: false, scales: ['x', null]}, points: {show: false},
                drag: {x: true, y: false, setScale: false}, y: false},
@@ -105,6 +105,11 @@ class Curves {
       this.zoom([at - (at - a) * factor, at + (b - at) * factor]);
     }, {passive: false});
     return plot;
+  }
+
+  /* Of one curve: six fit on a screen [px]. */
+  height() {
+    return Math.round(Math.min(Math.max((innerHeight - 285) / this.drives.length - 22, 64), 150));
   }
 
   /* Show what is left now; rows are those of the drives. */
