@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import subprocess
 from collections.abc import Iterator
@@ -231,11 +232,11 @@ def test_changes_are_pushed(bench: Workbench) -> None:
         connection.sendall(f'GET /api/events HTTP/1.1\r\nHost: {bench.host}\r\n'
                            f'Cookie: {bench.cookie}\r\n\r\n'.encode())
         read = b''
-        while b'hello' not in read:
+        while b'data: 0' not in read:
             read += connection.recv(4096)
-        bench.settled()
+        count = bench.settled()['count']
         bench.post('/api/tick', effect='payload_mass', revision=bench.screen()['revision'])
-        while b'changed' not in read:
+        while not any(int(number) > count for number in re.findall(rb'data: (\d+)\n', read)):
             read += connection.recv(4096)
     bench.post('/api/tick', effect='payload_mass', is_ticked=False,
                revision=bench.screen()['revision'])

@@ -156,7 +156,7 @@ class Api:
     def screen(self, query: Any) -> Response:
         """Answer all that one screen shows, and the errors now."""
         hub = self.hub
-        common = {'generation': hub.generation, 'failure': hub.failure,
+        common = {'count': hub.count, 'generation': hub.generation, 'failure': hub.failure,
                   'is_beginning': hub.is_beginning, 'has_folders': bool(hub.folders.roots),
                   'has_live': hub.live is not None}
         session = hub.session
@@ -330,15 +330,15 @@ class Api:
         return self.hub.live
 
     async def events(self, request: Request) -> Response:
-        """Tell the page whenever something changed."""
+        """Tell the page, whenever something changed, how often so far."""
         async def lines() -> AsyncIterator[bytes]:
             queue = self.hub.listen()
             try:
-                yield b'data: hello\n\n'
+                yield b'data: 0\n\n'
                 while True:
                     with suppress(TimeoutError):
                         await asyncio.wait_for(queue.get(), HEARTBEAT)
-                    yield b'data: changed\n\n'
+                    yield b'data: %d\n\n' % self.hub.count
             finally:
                 self.hub.leave(queue)
         return StreamingResponse(lines(), media_type='text/event-stream')

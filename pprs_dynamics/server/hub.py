@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -33,6 +34,7 @@ from pprs_dynamics.workbench.session import Session
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
+BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
 IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
@@ -71,7 +73,7 @@ class Hub:
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
-        self.generation = 0
+        self.generation = self.count = 0
         self._begin = begin
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
         self._count, self._lock, self._opening = 0, Lock(), Lock()
@@ -114,6 +116,7 @@ class Hub:
 
     def tell(self) -> None:
         """Tell all browsers that something changed."""
+        self.count += 1
         if self._loop is not None and not self._loop.is_closed():
             with suppress(RuntimeError):  # it closes just now
                 self._loop.call_soon_threadsafe(self._put)
@@ -197,6 +200,7 @@ class Hub:
                 self._diagnose()
                 self._work.wait()
             self._work.clear()
+            time.sleep(BREATH)
             session = self.session
             if session is None or self._ends:
                 continue

@@ -73,7 +73,9 @@ const tell = (text, isGood = false) => {
 
 /* Changes go out one after the other, each with the revision that the one before led to. */
 let chain = Promise.resolve();
+let underway = 0;
 const change = (path, body, began) => {
+  underway += 1;
   chain = chain.then(async () => {
     try {
       show(await ask(path, {...body, revision: bench.state.revision}));
@@ -84,28 +86,35 @@ const change = (path, body, began) => {
       tell('');
     } catch (error) {
       tell(error.message);
-      await refresh();
+      heard = Infinity;
     }
+    underway -= 1;
+    refresh();
   });
   return chain;
 };
 
+/* How many changes the server told of; an answer to a change of ours has them as well. */
+let heard = 0;
+const hear = (event) => {
+  heard = Math.max(heard, Number(event.data));
+  refresh();
+};
+
 let refreshing = false;
-let again = false;
 const refresh = async () => {
-  if (refreshing) {
-    again = true;
-    return;
-  }
+  if (refreshing) return;
   refreshing = true;
-  do {
-    again = false;
+  while (!underway && (!bench.state || heard > bench.state.count)) {
     try {
-      show(await ask('screen'));
+      const found = await ask('screen');
+      if (heard === Infinity) heard = found.header.count;
+      show(found);
     } catch (error) {
       tell(error.status ? error.message : 'The workbench does not answer: was it stopped?');
+      break;
     }
-  } while (again);
+  }
   refreshing = false;
 };
 
@@ -117,29 +126,32 @@ let scatter;
 let robot;
 let view = 'curves';
 let mark = null;
+let drawn = '';
+let latest = []; // what is left now, by drive
+const drawnOf = (state) => [state.generation, state.revision, state.stage].join();
 
 const show = ({header, arrays}) => {
   const last = bench.state;
   // An answer that was overtaken by a later one.
-  if (last && header.generation === last.generation && header.version < last.version) return;
+  if (last && header.count < last.count) return;
   bench.state = header;
   if (header.failure) tell(header.failure);
   if (header.has_live) $('live-tab').hidden = false;
   if (header.is_empty) {
     $('verdict').textContent = header.is_beginning ? 'Reading and measuring …'
       : 'No recording is open: add one.';
-    if (!header.is_beginning && !last?.is_empty_shown) {
-      header.is_empty_shown = true;
-      open('recordings');
-    }
+    if (!header.is_beginning && (!last || last.is_beginning)) open('recordings');
     return;
   }
+  latest = rowsOf(arrays.now);
   if (header.generation !== generation) {
     generation = header.generation;
-    begin(arrays.now);
-  } else if (curves.before) {
-    curves.setNow(rowsOf(arrays.now));
+    curves.before = null;
+    begin(generation);
+  } else if (curves.before && drawnOf(header) !== drawn) {
+    curves.setNow(latest);
   }
+  drawn = drawnOf(header);
   showVerdict(header);
   showErrors(header);
   showEffects(header);
@@ -158,12 +170,13 @@ const show = ({header, arrays}) => {
   }
 };
 
-const begin = async (now) => {
+const begin = async (wanted) => {
   const {header, arrays} = await ask('curves');
+  if (wanted !== generation) return; // overtaken
   const {seconds, rest} = arrays;
   const time = Float64Array.from(seconds.values, (s, k) => s + rest.values[k]);
   curves.use(header.drives, time, arrays.segment.values, rowsOf(arrays.before));
-  if (now.shape[1] === time.length) curves.setNow(rowsOf(now));
+  if (latest[0].length === time.length) curves.setNow(latest);
   bench.curves = curves;
   const options = (names) => names.map((name) => {
     const option = make('option', titleOf(name));
@@ -204,7 +217,7 @@ const showVerdict = (state) => {
     bar.setAttribute('aria-label', what);
     const stop = make('button', 'Cancel');
     stop.type = 'button';
-    stop.addEventListener('click', () => ask('cancel', {kind: job.kind}).then(refresh));
+    stop.addEventListener('click', () => ask('cancel', {kind: job.kind}).then(show));
     nodes.push(` · ${what} `, bar, ' ', stop);
   }
   $('verdict').replaceChildren(...nodes);
@@ -797,7 +810,7 @@ const prepare = () => {
   });
   prepareLive();
   const events = new EventSource('/api/events');
-  events.onmessage = refresh;
+  events.onmessage = hear;
   events.onerror = () => tell('The workbench does not answer: was it stopped?');
   events.onopen = () => tell('');
 };
