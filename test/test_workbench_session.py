@@ -298,3 +298,17 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                             check=True).stdout.split()
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
+
+
+def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
+    notebook = json.loads((Path(__file__).parents[1] / 'docs' / 'workbench.ipynb').read_text())
+    assert notebook['nbformat'] == 4
+    names: dict[str, Any] = {'__name__': '__main__'}
+    for cell in notebook['cells']:
+        if cell['cell_type'] == 'code':
+            exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
+    said = capsys.readouterr().out
+    assert 'adopted - the error on held-out blocks' in said
+    assert said.endswith("['payload_mass']\n[]\n")
+    costs = names['costs']
+    assert costs[0] > costs[4] < costs[-1]

@@ -23,7 +23,7 @@ from os import PathLike
 from typing import Any
 
 from pprs_dynamics.adoption.adopt import Adoption, original
-from pprs_dynamics.adoption.ledger_entry import LedgerBook
+from pprs_dynamics.adoption.ledger_entry import LedgerBook, RecordingEntry
 from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.errors import PprsError
@@ -60,9 +60,9 @@ class Session(TickBoard):
     ----------
     model : ForceModel
     recordings : mapping of str to Recording
-        By path, to fit to.
+        To fit to, by path or by whatever name.
     validation : mapping of str to Recording, optional
-        By path; never fitted, adoptions are judged on them.
+        Never fitted, adoptions are judged on them.
     base : path, optional
         The model's file, whose comments exported models keep.
 
@@ -82,6 +82,7 @@ class Session(TickBoard):
         self.diagnosis: Diagnosis | None = None
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
+        self._files: set[str] = set()  # the ledger has the hashes of these; of others' samples
         self.jobs: dict[str, Job[Any]] = {}
         super().__init__(WhatIf(model, list(self.recordings.values())))
 
@@ -103,7 +104,9 @@ class Session(TickBoard):
             {str(path): read(path, found, topic) for path in paths}
             for paths in (recordings, validation))
         refuse_repeats(fitted, held_out)
-        return cls(found, fitted, held_out, base)
+        session = cls(found, fitted, held_out, base)
+        session._files = {*fitted, *held_out}
+        return session
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
         """Take one more recording, read by the reader of all commands.
@@ -118,6 +121,7 @@ class Session(TickBoard):
         fitted = self.recordings if is_held_out else {**self.recordings, **more}
         held_out = {**self.validation, **more} if is_held_out else self.validation
         refuse_repeats(fitted, held_out)
+        self._files |= {*more}
         if is_held_out:
             self.validation = held_out
             self.tell()
@@ -206,7 +210,7 @@ class Session(TickBoard):
             judged, what_if.model, request, what_if.recordings, list(self.validation.values()),
             force, self.diagnosis, report=lambda share: report(0.9 * share))
         if answer.adopted:
-            book = LedgerBook.of(self.recordings, self.validation)
+            book = LedgerBook(self._entries(self.recordings), self._entries(self.validation))
             after = WhatIf(book.entered(answer), what_if.recordings)
             report(0.95)
             with self._lock:
@@ -217,6 +221,10 @@ class Session(TickBoard):
                                   if name != request.name})
         self.last_adoption = answer
         return answer
+
+    def _entries(self, recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
+        return tuple(RecordingEntry.of(path, one) if path in self._files
+                     else RecordingEntry.of_samples(one) for path, one in recordings.items())
 
     def _await_diagnosis(self, report: Callable[[float], None]) -> None:
         """Wait for a diagnosis that is under way: an adoption would make it again."""
