@@ -22,8 +22,8 @@ import shlex
 import numpy as np
 from rich.markup import escape
 
+from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import PAGE, POSES, number, output_file, seed
-from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings, refuse_inputs
 from pprs_dynamics.experiments.motion_limits import MotionLimits
