@@ -24,42 +24,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import combinations
 
 import numpy as np
 
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.parallel import each
 from pprs_dynamics.regression.design import Design
-from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.selection.candidates import (
     Candidate,
     CandidateSet,
     EffectCandidate,
-    Placement,
     UnknownCandidate,
     set_key,
 )
 from pprs_dynamics.selection.decisions import Decisions
-from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates
+from pprs_dynamics.selection.scanned_sets import ScannedSets, with_fast_noise
 from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
-# Lowest score of a proposal, and how much worse than the best a replacement may look at the best
-# one's noise: its own noise may favour it by about as much.
-# And how much of what is lost without it a replacement has to make good at that noise.
-PROPOSED, REPLACED, RECOVERED = -12.0, 15.0, 0.9
-
-SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
+# How much worse than the best a replacement may look at the best one's noise (its own noise may
+# favour it by about as much), and how much of what is lost without it it has to make good there.
+REPLACED, RECOVERED = 15.0, 0.9
 
 
-
-class Search(FittedSets):
+class Search(ScannedSets):
     """A search over the candidates of one design.
 
     Parameters
@@ -154,55 +147,6 @@ class Search(FittedSets):
                     found += [((*base.candidates, pattern), near) for pattern in patterns]
         return found
 
-    def proposals(self, base: CandidateSet, count: int, drive: int | None = None,
-                  least: float = PROPOSED) -> list[Candidates]:
-        """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
-
-        Parameters
-        ----------
-        base : CandidateSet
-        count : int
-        drive : int, optional
-            Only effects on this one.
-        least : float
-            By which the cost must fall at the set's noise.
-        """
-        scored: list[tuple[float, Callable[[], Candidates]]] = []
-        for effect, found in self._scan(base, drive).items():
-            old = next((c for c in base.effects if c.effect is effect), None)
-            score, chosen = self._best_drives(effect, found, old)
-            if score > least and chosen:
-                scored.append((score, self._joined(base, effect, chosen, old)))
-        scored.sort(key=lambda one: -one[0])
-        return [make() for _, make in scored[:count]]
-
-    def _scan(self, base: CandidateSet, drive: int | None = None,
-              ) -> dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]]:
-        """Return gains less prices of placements, by effect; one for each drive."""
-        library, fit = self.library, base.fit
-        taken = {(c.effect, placement.drive) for c in base.effects for placement in c.placements}
-        found: dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]] = {}
-        drives = tuple(library.local) if drive is None else (drive,)
-        offered = each(lambda d: library.local[d].offers(fit), drives)
-        for d, offers in zip(drives, offered, strict=True):
-            for offer in offers.values():
-                effect = offer.term.effect
-                if (effect, d) not in taken:
-                    price = library.prices.of_placement(
-                        effect, library.local[d].trials[effect.name])
-                    found.setdefault(effect, []).append(
-                        (offer.gain - price, partial(library.full, offer)))
-        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
-        for placement in (*library.structure, *library.spanning) if drive is None else ():
-            key = (placement.term.effect, placement.drive)
-            if key not in taken:
-                net = self.regression.gain(fit, placement.block) - placement.price
-                if key not in best or net > best[key][0]:
-                    best[key] = (net, placement)
-        for (effect, _), (net, placement) in best.items():
-            found.setdefault(effect, []).append((net, partial(_same, placement)))
-        return found
-
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 ) -> CandidateSet | None:
         """Return the best set of one effect alone, on some drives or where it pays.
@@ -258,31 +202,6 @@ class Search(FittedSets):
                     rest = [one for one in candidate.placements if one is not placement]
                     yield self.library.candidate(candidate.effect, [
                         *rest, self.library.placement(placement.term, names)])
-
-    def _best_drives(
-        self, effect: type[CatalogueEffect],
-        found: list[tuple[float, Callable[[], Placement]]], old: EffectCandidate | None,
-    ) -> tuple[float, list[Callable[[], Placement]]]:
-        """Return the drives on which an effect pays, and the score of all together."""
-        prices = self.library.prices
-        found = sorted(found, key=lambda one: -one[0])
-        if not issubclass(effect, DriveEffect):
-            return found[0][0] - prices.of_name(), [found[0][1]]
-        there = len(old.placements) if old else 0
-        before = prices.of_drives(there) if there else -prices.of_name()
-        nets = np.cumsum([net for net, _ in found])
-        scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
-        best = int(np.argmax(scores))
-        return float(scores[best]), [make for _, make in found[:best + 1]]
-
-    def _joined(self, base: CandidateSet, effect: type[CatalogueEffect],
-                chosen: Sequence[Callable[[], Placement]], old: EffectCandidate | None,
-                ) -> Callable[[], Candidates]:
-        def make() -> Candidates:
-            placements = [*(old.placements if old else ()), *(one() for one in chosen)]
-            kept = tuple(c for c in base.candidates if c is not old)
-            return (*kept, self.library.candidate(effect, placements))
-        return make
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
@@ -375,16 +294,3 @@ class Search(FittedSets):
     @staticmethod
     def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
         return tuple(new if c is old else c for c in found.candidates)
-
-def _same(placement: Placement) -> Placement:
-    return placement
-
-
-def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
-    """Return a fit under the noise that the higher frequencies alone would tell.
-
-    The slow part of a noise spectrum may be what is missing. It only proposes.
-    """
-    amplitudes = fit.amplitudes.copy()
-    amplitudes[:, 1:][:, regression.noise_shapes.is_slow] *= SLOW_LEFT
-    return regression.at(fit.blocks, amplitudes)
