@@ -86,6 +86,7 @@ def _drive(one: OptionalForces, residuals: Residuals) -> dict[str, Any]:
     at = shown_samples(residuals, one.given, points=POINTS)
     rows = np.concatenate((one.rows, one.error[None], one.given[None]))[:, at]
     rows[:, at < 0] = np.nan
+    rows[-1, ~np.isfinite(rows[-2])] = np.nan  # both curves end where the fit does
     size = np.fmax(np.nanmax(np.abs(rows), axis=1, keepdims=True), 1e-12)
     steps = np.where(np.isfinite(rows), np.round(LARGEST / size * np.nan_to_num(rows)), GAP)
     time = residuals.time[np.where(at < 0, np.roll(at, 1), at)]
