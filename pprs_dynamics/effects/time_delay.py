@@ -40,8 +40,7 @@ class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
     name: ClassVar[str] = 'time_delay'
-    idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    bends_columns: ClassVar[bool] = True  # and idealised: real lags are only nearly a delay
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)

@@ -118,8 +118,10 @@ class Search(ScannedSets):
                     if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
-        for found in sorted(shaped, key=lambda one: one.cost)[:REFINED]:
-            self.refined(found)
+        for number, found in enumerate(sorted(shaped, key=lambda one: one.cost)):
+            # The first effect decides which way the search goes.
+            if number < REFINED or len(found.candidates) == 1:
+                self.refined(found)
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
