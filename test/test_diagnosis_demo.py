@@ -74,6 +74,16 @@ def test_the_error_falls_and_the_secret_is_told_last(tmp_path: Path) -> None:
         assert (tmp_path / file).stat().st_size > 10_000
 
 
+def test_nothing_is_claimed_where_nothing_is_hidden(tmp_path: Path) -> None:
+    # Sampling does not resolve the simulated robot's reversals: what that leaves is no delay.
+    run, answer = tmp_path / 'run.mcap', tmp_path / 'why.json'
+    for arguments in (['simulate', '--output', run, '--seed', '1', '--duration', '40'],
+                      ['diagnose', run, '--json', answer]):
+        subprocess.run([executable('pprs'), *map(str, arguments)], check=True, capture_output=True)
+    said = json.loads(answer.read_text())
+    assert (said['verdict'], said['effects']) == ('adequate', [])
+
+
 HIDDEN: dict[str, Any] = {'name': 'viscous_friction', 'drives': ['lift_1']}
 FOREIGN = {'name': 'vibration', 'drives': ['lift_1']}
 
