@@ -44,6 +44,7 @@ setup(
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
+        'arm': ['pin>=3'],
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',

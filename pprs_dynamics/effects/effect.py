@@ -26,6 +26,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.mechanism.state import MechanismState
 
+# Kinds of models.
+PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -160,6 +163,8 @@ class CatalogueEffect(Effect):
     Class attributes
     ----------------
     card : Card
+    acts_in : set of {'platform', 'axis', 'arm'}
+        The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
     linear, shape : tuple of Parameter
     parameters : tuple of Parameter
         Both.
@@ -185,6 +190,7 @@ class CatalogueEffect(Effect):
     """
 
     card: ClassVar[Card]
+    acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
     parameters: ClassVar[tuple[Parameter, ...]]

@@ -28,13 +28,15 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 
 
 class HomingError(MeasurementEffect):
     """The whole mechanism stands elsewhere than its encoders say."""
 
     name: ClassVar[str] = 'homing_error'
+    # No force of an axis depends on its zero.
+    acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = True
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,

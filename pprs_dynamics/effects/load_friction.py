@@ -21,13 +21,15 @@ from typing import ClassVar
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 
 
 class LoadFriction(DriveEffect):
     """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
 
     name: ClassVar[str] = 'load_friction'
+    # The load of an axis's guide is constant, so that this is coulomb_friction there.
+    acts_in = frozenset({PLATFORM, ARM})
     is_friction: ClassVar[bool] = True
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)

@@ -24,16 +24,18 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from pprs_dynamics.effects.altered_masses import with_masses
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.altered_masses import with_payload
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.mechanism.arm import Arm
 from pprs_dynamics.mechanism.robot import Robot
 
 
 class PayloadMass(BodyEffect):
-    """Mass more at the centre of mass, as a point: the inertia about it stays."""
+    """Mass more as a point: at the platform's centre of mass, at the origin of an arm's tool."""
 
     name: ClassVar[str] = 'payload_mass'
+    acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     linear = (Parameter('mass', 'm_+', 'kg', 'mass beyond masses.payload', -1e3, 1e3,
                         scale=0.1),)
@@ -48,6 +50,6 @@ class PayloadMass(BodyEffect):
         'so move fast',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Robot) -> Robot:
+    def changed(self, robot: Robot | Arm) -> Robot | Arm:
         """Return the robot with the other payload."""
-        return with_masses(robot, payload=robot.masses.payload + self.values['mass'])
+        return with_payload(robot, self.values['mass'])

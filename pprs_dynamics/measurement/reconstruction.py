@@ -33,6 +33,7 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.differentiation import Smoothing
 from pprs_dynamics.measurement.drive_motion import Measured, smooth_drives
 from pprs_dynamics.measurement.followed_motion import CHUNK, Motion, kinematics_of
+from pprs_dynamics.measurement.rests import find_rests
 from pprs_dynamics.measurement.samples import Progress
 from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.mechanism.robot import Geometry
@@ -45,7 +46,7 @@ class Chunk:
 
     Parameters
     ----------
-    motion : PlatformMotion or AxisMotion
+    motion : PlatformMotion or JointMotion
         With times.
     samples, blocks : slice
         Its place in the reconstruction, before and after treatment.
@@ -72,7 +73,7 @@ class Reconstruction:
         [s].
     position, velocity, acceleration : (N, D) arrays
         Of the drives, smoothed [m, m/s, m/s^2].
-    motion : PlatformMotion or AxisMotion
+    motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
         As measured [N]; NaN where it was not.
@@ -91,6 +92,8 @@ class Reconstruction:
         See `ForwardKinematics`.
     jumps : (J,) int array
         Samples before which the pose jumps.
+    from_current : (D,) bool array
+        Drives whose efforts are recorded currents times the model's gain.
     dropped : int
         Samples of the recording's segments that are not here: edges and short segments.
     notes : tuple of str
@@ -116,6 +119,7 @@ class Reconstruction:
     dropped: int
     notes: tuple[str, ...]
     start: float
+    from_current: np.ndarray
 
     def __len__(self) -> int:
         return len(self.time)
@@ -170,17 +174,46 @@ def reconstruct(
     if isinstance(model, ForceModel) and np.any(model.position_error):
         drives = replace(drives, position=drives.position - model.position_error)
     time, total = recording.time[drives.index], len(drives.index)
+    effort = _efforts(model, recording)[drives.index]
     followed = kinematics.follow(time, drives, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
              *followed.notes(time)]
+    rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
+    if np.any(rests):
+        shares = (f'{name} {share:.0%}' for name, share in zip(
+            kinematics.drives, rests.mean(axis=0), strict=True) if share >= 0.005)
+        notes.append('efforts of drives that stand do not count, static friction holds any: '
+                     + (', '.join(shares) or 'less than 0.5% of the time'))
     return Reconstruction(
         time, drives.position, drives.velocity, drives.acceleration, followed.motion,
-        recording.effort[drives.index], drives.index, drives.segments,
+        effort, drives.index, drives.segments,
         Treatment(drives.block_starts, total), drives.smoothing, drives.block,
         drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
-        float(recording.time[0]))
+        float(recording.time[0]), np.isfinite(applied_gain(recording)))
+
+
+def applied_gain(recording: Measured) -> Array:
+    """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
+    gain: Array | None = getattr(recording, 'gain', None)
+    return np.full(len(recording.drives), np.nan) if gain is None else gain
+
+
+def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
+    """Return the efforts of a recording by the model's gain, NaN where a drive stands."""
+    effort = recording.effort
+    if not isinstance(model, ForceModel):
+        return effort
+    applied = applied_gain(recording)
+    if model.gain is not None and np.any(np.isfinite(applied)):
+        effort = effort * np.where(np.isfinite(applied), np.asarray(model.gain) / applied, 1.0)
+    if model.rest_speed:
+        effort = effort.copy()
+        for part in recording.segments:
+            step = float(np.median(np.diff(recording.time[part])))
+            effort[part][find_rests(recording.position[part], step, model.rest_speed)] = np.nan
+    return effort
 
 
 def treated_forces(

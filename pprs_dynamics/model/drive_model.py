@@ -26,7 +26,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction
-from pprs_dynamics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.effects.effect import PLATFORM, Effect
 from pprs_dynamics.effects.passive_friction import (
     IndependentChainsFriction,
     JointFriction,
@@ -119,6 +119,7 @@ class DriveModel(ForceModel):
         See `ForceModel`; the paper's friction comes first.
     """
 
+    kind: ClassVar[str] = PLATFORM
     title: ClassVar[str] = 'a 3-PPRS'
     drives: ClassVar[tuple[str, ...]] = DRIVES
     keys = KEYS
@@ -172,16 +173,12 @@ class DriveModel(ForceModel):
                           Masses(**_group(values, 'masses.')), values['gravity'])
             limits = Limits(**_group(values, 'limits.'))
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
-                       _passive_friction(values, limits), *added_effects(parameters, cls))
+                       _passive_friction(values, limits),
+                       *added_effects(parameters, cls, cls.drives))
             _require_bodies(robot, effects)
             reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
                        equations=values['equations'], values=values, source=source)
-
-    @classmethod
-    def offers(cls, effect: type[CatalogueEffect]) -> bool:
-        """Return True: the catalogue is that of this robot."""
-        return True
 
     def mechanism(self, motion: PlatformMotion) -> MechanismState:
         """Return drive motion, Jacobians and frictionless forces for a platform motion.

@@ -114,26 +114,63 @@ class ForceModel(ABC):
 
     Class attributes
     ----------------
+    kind : {'platform', 'axis', 'arm'}
+        Effects say in which kinds they act.
     title : str
         What it is a model of, for a sentence.
+
+    Attributes
+    ----------
     drives : tuple of D str
     keys : dict of str to Key
         Of its files.
     """
 
+    kind: ClassVar[str]
     title: ClassVar[str]
-    drives: ClassVar[tuple[str, ...]]
-    keys: ClassVar[dict[str, Key]]
 
     effects: tuple[Effect, ...]
     reversal: Reversal
     values: Mapping[str, Any] = field(default_factory=dict)
     source: str = ''
 
-    @classmethod
+    @property
     @abstractmethod
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+
+    @property
+    @abstractmethod
+    def keys(self) -> dict[str, Key]:
+        """Keys of its files, by name."""
+
+    @property
+    def content(self) -> str:
+        """What the model is built from beside its values: a hash of further files."""
+        return ''
+
+    @property
+    def gain(self) -> tuple[float, ...] | None:
+        """Effort per ampere of each drive; None for a model without."""
+        return None
+
+    @property
+    def efforts_in_amperes(self) -> bool:
+        """Whether efforts of recordings are currents."""
+        return False
+
+    @property
+    def rest_speed(self) -> float:
+        """Speed below which a drive that stays there stands, and its effort tells nothing.
+
+        0 where efforts at rest count as well.
+        """
+        return 0.0
+
+    @classmethod
     def offers(cls, effect: type[CatalogueEffect]) -> bool:
         """Return whether an effect of the catalogue can act in what this is a model of."""
+        return cls.kind in effect.acts_in
 
     @abstractmethod
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:

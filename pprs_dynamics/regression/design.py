@@ -124,7 +124,8 @@ class Design:
     def around(self, point: Point, recordings: Sequence[Recording],
                progress: Callable[[float], None] | None = None) -> Design:
         """Return the design of the same recordings around another point."""
-        same = np.array_equal(point.model.position_error, self.model.position_error)
+        same = (np.array_equal(point.model.position_error, self.model.position_error)
+                and point.model.gain == self.model.gain)
         found = (self.reconstructions if same else
                  tuple(reconstruct(point.model, recording) for recording in recordings))
         design = self._evaluated(point.model, self.given, found, progress)
@@ -154,7 +155,7 @@ class Design:
                 if progress is not None:
                     progress((k + done / total) / len(reconstructions))
 
-            collector = ColumnCollector(sensitivities)
+            collector = ColumnCollector(sensitivities, reconstruction)
             tables.append(treated_table(model, reconstruction, report, collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
