@@ -40,6 +40,8 @@ MAY_USE = {
     'residuals': {'mechanism', 'effects', 'model', 'measurement'},
     'regression': {'mechanism', 'effects', 'model', 'measurement', 'residuals'},
     'selection': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression'},
+    'identification': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
+                       'selection'},
     'diagnosis': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                   'selection'},
     'adoption': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
@@ -50,11 +52,11 @@ MAY_USE = {
     'experiments': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                     'selection'},
     'report': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-               'selection', 'diagnosis', 'adoption', 'experiments', 'fleet'},
+               'selection', 'identification', 'diagnosis', 'adoption', 'experiments', 'fleet'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                 'selection', 'diagnosis', 'adoption', 'simulation', 'experiments', 'report',
-                 'fleet'},
+                 'selection', 'identification', 'diagnosis', 'adoption', 'simulation',
+                 'experiments', 'report', 'fleet'},
 }
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))

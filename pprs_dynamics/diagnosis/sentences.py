@@ -25,8 +25,8 @@ from pprs_dynamics.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_ste
 from pprs_dynamics.diagnosis.quantities import (
     INTERVAL,
     change,
+    in_unit,
     listed,
-    newtons,
     plain,
     sentence,
     with_drives,
@@ -155,7 +155,7 @@ def _headline(diagnosis: Diagnosis) -> str:
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{change(diagnosis.effects[0].error_before, held[-1].error_after)}')
+        f'{_change(diagnosis, diagnosis.effects[0].error_before, held[-1].error_after)}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]])
@@ -164,7 +164,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
-    noise = newtons(diagnosis.noise_floor)
+    noise = in_unit(diagnosis.noise_floor, diagnosis.residuals.unit)
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
@@ -179,6 +179,10 @@ def _headline(diagnosis: Diagnosis) -> str:
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
     return f'The model lacks {named}{which}.{fall}{level}{doubt}'
+
+
+def _change(diagnosis: Diagnosis, before: float, after: float) -> str:
+    return change(before, after, diagnosis.residuals.unit)
 
 
 def _doubted(diagnosis: Diagnosis) -> list[str]:
@@ -225,8 +229,8 @@ def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
     return Finding(
         f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '
         f'{_parameters(diagnosis, rival)}.',
-        f'With it the error is {newtons(rival.error_after)}, and the cost of the set is '
-        f'{plain(rival.cost, 2)} above the best one.', sentence(card.causes),
+        f'With it the error is {in_unit(rival.error_after, diagnosis.residuals.unit)}, and the '
+        f'cost of the set is {plain(rival.cost, 2)} above the best one.', sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like))
 
 
@@ -267,13 +271,13 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
     fresh = diagnosis.held_out_on == 'validation'
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
-    held_out += change(found.held_out_before, found.held_out_after)
+    held_out += _change(diagnosis, found.held_out_before, found.held_out_after)
     held_out += '' if found.is_confirmed else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'With it the error {change(found.error_before, found.error_after)}. {held_out}. '
-            f'Evidence {found.evidence:.0f}, where 0 is the threshold.')
+    return (f'With it the error {_change(diagnosis, found.error_before, found.error_after)}. '
+            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
 def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
@@ -312,13 +316,14 @@ def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
             forces.setdefault(drive, {})[parameter.name] = one
     remarks = []
     for drive, both in forces.items():
+        unit = diagnosis.residuals.units_of(drive).effort
         forward, backward = (both[key].value if key in both else 0.0
                              for key in ('force_forward', 'force_backward'))
         remarks.append(
             f'{drive}: the dry part is the same as coulomb_friction of '
-            f'{newtons((forward + backward) / 2)} plus effort_offset of '
-            f'{newtons((forward - backward) / 2)}; data of moving drives cannot tell the one from '
-            'the two, a reading at rest can.')
+            f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
+            f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the one '
+            'from the two, a reading at rest can.')
     return remarks
 
 
@@ -337,8 +342,9 @@ def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:
 
 def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
     return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}, '
-            f'{newtons(one.rms)} rms, is within the model error of {listed(one.of)}: a real '
-            'machine is only nearly of the form that the catalogue gives it. Not adopted')
+            f'{in_unit(one.rms, diagnosis.residuals.unit)} rms, is within the model error of '
+            f'{listed(one.of)}: a real machine is only nearly of the form that the catalogue '
+            'gives it. Not adopted')
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:

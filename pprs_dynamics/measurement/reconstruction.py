@@ -76,7 +76,7 @@ class Reconstruction:
     motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
-        As measured [N]; NaN where it was not.
+        As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
     index : (N,) int array
         The samples' places in the recording.
     segments : tuple of slice
@@ -92,8 +92,8 @@ class Reconstruction:
         See `ForwardKinematics`.
     jumps : (J,) int array
         Samples before which the pose jumps.
-    from_current : (D,) bool array
-        Drives whose efforts are recorded currents times the model's gain.
+    gain : (D,) array
+        By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
         Samples of the recording's segments that are not here: edges and short segments.
     notes : tuple of str
@@ -119,10 +119,19 @@ class Reconstruction:
     dropped: int
     notes: tuple[str, ...]
     start: float
-    from_current: np.ndarray
+    gain: Array
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def recorded_share(self, model: ForceModel) -> Array:
+        """Return by what a model's efforts are multiplied to be those of the recording, (D,).
+
+        1, but for currents that another gain than the model's made efforts of.
+        """
+        if model.gain is None:
+            return np.ones_like(self.gain)
+        return np.where(np.isfinite(self.gain), self.gain / np.asarray(model.gain), 1.0)
 
     def chunks(self, samples: int = CHUNK) -> Iterator[Chunk]:
         """Yield whole blocks of at most about `samples` samples, segment by segment."""
@@ -191,24 +200,19 @@ def reconstruct(
         effort, drives.index, drives.segments,
         Treatment(drives.block_starts, total), drives.smoothing, drives.block,
         drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
-        float(recording.time[0]), np.isfinite(applied_gain(recording)))
+        float(recording.time[0]), _applied_gain(recording))
 
 
-def applied_gain(recording: Measured) -> Array:
+def _applied_gain(recording: Measured) -> Array:
     """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
     gain: Array | None = getattr(recording, 'gain', None)
     return np.full(len(recording.drives), np.nan) if gain is None else gain
 
 
 def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
-    """Return the efforts of a recording by the model's gain, NaN where a drive stands."""
+    """Return the efforts of a recording, NaN where a drive stands."""
     effort = recording.effort
-    if not isinstance(model, ForceModel):
-        return effort
-    applied = applied_gain(recording)
-    if model.gain is not None and np.any(np.isfinite(applied)):
-        effort = effort * np.where(np.isfinite(applied), np.asarray(model.gain) / applied, 1.0)
-    if model.rest_speed:
+    if isinstance(model, ForceModel) and model.rest_speed:
         effort = effort.copy()
         for part in recording.segments:
             step = float(np.median(np.diff(recording.time[part])))
@@ -240,12 +244,15 @@ def treated_forces(
         See `DriveModel.drive_forces`.
     """
     treated: dict[str, Array] = {}
+    share = reconstruction.recorded_share(model)
     state = model.initial_state(reconstruction.start)
     for chunk in reconstruction.chunks():
         if chunk.is_start:
             state = model.initial_state(reconstruction.start)
         forces = model.measured(model.drive_forces(chunk.motion, state), state)
-        for name, values in {**forces.parts, 'total': forces.total, **more(forces)}.items():
+        efforts = {name: values * share
+                   for name, values in {**forces.parts, 'total': forces.total}.items()}
+        for name, values in {**efforts, **more(forces)}.items():
             if name not in treated:
                 treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
             treated[name][chunk.blocks] = chunk.treat(values)

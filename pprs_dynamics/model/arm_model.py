@@ -36,7 +36,8 @@ from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.mechanism.arm import Arm, ArmState
 from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.reversal import Reversal
-from pprs_dynamics.mechanism.urdf import ArmTree, read_arm
+from pprs_dynamics.mechanism.units import DriveUnits
+from pprs_dynamics.mechanism.urdf import TURNING, ArmTree, read_arm
 from pprs_dynamics.model.effects_block import added_effects
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
 from pprs_dynamics.model.keys import ARM_GAIN, ARM_JOINTS, ARM_URDF, Key, arm_keys, is_arm
@@ -81,6 +82,11 @@ class ArmModel(ForceModel):
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
         return arm_keys(len(self.drives))
+
+    @property
+    def units(self) -> tuple[DriveUnits, ...]:
+        """Units of the joints' quantities."""
+        return tuple(DriveUnits(kind == TURNING) for kind in self.kinds)
 
     @property
     def content(self) -> str:

@@ -34,6 +34,7 @@ from pprs_dynamics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.state import DriveStates
+from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.model.keys import Key
 
 RIGID_BODY = 'rigid_body'
@@ -143,6 +144,11 @@ class ForceModel(ABC):
     @abstractmethod
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
+
+    @property
+    def units(self) -> tuple[DriveUnits, ...]:
+        """Units of the drives' quantities."""
+        return (DriveUnits(),) * len(self.drives)
 
     @property
     def content(self) -> str:

@@ -73,9 +73,10 @@ class ArmSensitivities(Sensitivities):
         for row, (number, moved) in enumerate(zip(self.numbers, self._moved, strict=True)):
             if moved is None:
                 assert number.element is not None
-                # Measured efforts are currents times the gain: more of it is less of the model.
+                # The more torque an ampere gives, the fewer amperes the model's torque takes.
                 numbers[row, :, number.element] = (
-                    -forces.total[:, number.element] * number.deviation / number.value)
+                    -forces.total[:, number.element] * number.deviation
+                    / self.model.gain[number.element])
                 continue
             change = self._efforts(moved, self._state(moved, state)) - reference
             numbers[row] = self.sensed(

@@ -64,7 +64,8 @@ class ColumnCollector:
         # A gain changes nothing of efforts that were not recorded as currents.
         self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
                              if number.key == ARM_GAIN
-                             and not reconstruction.from_current[number.element]]
+                             and np.isnan(reconstruction.gain[number.element])]
+        self.share = reconstruction.recorded_share(sensitivities.model)
         self.sensors = [effect.name for effect in sensitivities.model.effects
                         if isinstance(effect, MeasurementEffect)]
         self.kept: list[tuple[Array, ...]] = []
@@ -76,7 +77,7 @@ class ColumnCollector:
         self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
         columns = self.sensitivities.columns(forces)
         columns[NUMBERS][self.without_gain] = 0.0
-        return {COLUMN + name: column.transpose(1, 0, 2).reshape(len(s.velocity), -1)
+        return {COLUMN + name: (self.share * column).transpose(1, 0, 2).reshape(len(s.velocity), -1)
                 for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:

@@ -124,8 +124,7 @@ class Design:
     def around(self, point: Point, recordings: Sequence[Recording],
                progress: Callable[[float], None] | None = None) -> Design:
         """Return the design of the same recordings around another point."""
-        same = (np.array_equal(point.model.position_error, self.model.position_error)
-                and point.model.gain == self.model.gain)
+        same = np.array_equal(point.model.position_error, self.model.position_error)
         found = (self.reconstructions if same else
                  tuple(reconstruct(point.model, recording) for recording in recordings))
         design = self._evaluated(point.model, self.given, found, progress)
@@ -160,7 +159,7 @@ class Design:
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
         stacked = stacked_columns(tables, len(model.drives))
-        residuals = join_tables(model.drives, tables)
+        residuals = join_tables(model, tables)
         count = len(model.drives)
         structure = tuple(
             Term(effect, None, {}, _by_drive(stacked[effect.name], count),
