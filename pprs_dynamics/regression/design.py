@@ -323,6 +323,19 @@ class Design:
             parts.append(recording.treat(rows.T).T)
         return np.concatenate(parts, axis=1)
 
+    def deviation_rows(self, term: Term, coefficients: Array) -> Array:
+        """Return what real forms of a term's effect may add to its force, (w, M) [N]."""
+        effect = term.effect
+        if term.drive is None or not issubclass(effect, DriveEffect):
+            return np.zeros((0, len(self.residuals)))
+        found = [effect.deviations(recording.samples(slice(None), term.drive), **term.shape)
+                 for recording in self.recordings]
+        if not found[0]:
+            return np.zeros((0, len(self.residuals)))
+        return np.concatenate([
+            recording.treat(np.stack([coefficients @ np.stack(one) for one in columns], axis=-1)).T
+            for recording, columns in zip(self.recordings, found, strict=True)], axis=1)
+
     def _present_in_drives(self, effect: DriveEffect) -> list[BaseColumn]:
         """Return what an effect of the given model may still change, drive by drive."""
         found: list[BaseColumn] = []

@@ -85,8 +85,9 @@ class Search(FittedSets):
         self.evaluate(())
         if start:
             self.refined(self.evaluate(start))
-        # Effects first: a pattern of no catalogue stands only beside what effects explain.
-        self._descend(False, 0.0)
+        else:
+            # Effects first: a pattern of no catalogue stands only beside what effects explain.
+            self._descend(False, 0.0)
         if self.patterns:
             self._descend(True, 0.5)
         self._report(1.0)
@@ -266,10 +267,14 @@ class Search(FittedSets):
                     rests.append((tuple(c for c in best.candidates if c not in gone), None))
         for candidate in best.effects:
             for placement in candidate.placements if len(candidate.placements) > 1 else ():
-                # On one of its drives it may stand for another effect.
-                less = self.library.candidate(candidate.effect, [
-                    one for one in candidate.placements if one is not placement])
-                rests.append((self._exchanged(best, candidate, less), placement.drive))
+                # On one of its drives it, or some of its coefficients, may stand for another.
+                others = [one for one in candidate.placements if one is not placement]
+                fewer = [names for names in candidate.effect.variants
+                         if set(names) < set(placement.names)]
+                for kept in ([], *([self.library.placement(placement.term, names)]
+                                   for names in fewer)):
+                    less = self.library.candidate(candidate.effect, [*others, *kept])
+                    rests.append((self._exchanged(best, candidate, less), placement.drive))
         for rest, drive in rests:
             base = self._at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
@@ -314,6 +319,10 @@ class Search(FittedSets):
                         rest = [one for one in candidate.placements if one is not gone]
                         yield self._exchanged(best, candidate,
                                               self.library.candidate(effect, rest))
+            if len({one.names for one in candidate.placements}) > 1:
+                for names in effect.variants:
+                    yield self._exchanged(best, candidate, self.library.candidate(effect, [
+                        self.library.placement(one.term, names) for one in candidate.placements]))
             for placement in candidate.placements:
                 for names in effect.variants:
                     # The others take part in every scan.
