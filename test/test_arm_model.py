@@ -231,5 +231,5 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
 
 
 def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableFileError, match='made_up.urdf'):
+    with pytest.raises(UnreadableFileError, match=r'made_up\.urdf'):
         load_model(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))

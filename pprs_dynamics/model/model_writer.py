@@ -194,12 +194,14 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
             changes.append((starts[key.start_mark.line], starts[_last_line(node) + 1], ''))
     indent = block.value[0][0].start_mark.column
     there = {key.value.split('.')[0] for key, _ in block.value}
-    whole = {key: value for key, value in new.items() if key.split('.')[0] not in there}
+    keys = keys_of(wanted)
+    whole = {key: value for key, value in new.items()
+             if key in keys and key.split('.')[0] not in there}
     shift = ' ' * (indent - DEPTH * len(INDENT))
     blocks = '\n'.join([
         *(f'{" " * indent}{key}: {_value(value)}' for key, value in new.items()
           if key not in whole),
-        *(shift + line for line in _lines(whole, DEPTH, keys_of(wanted))),
+        *(shift + line for line in _lines(whole, DEPTH, keys)),
         *_written_blocks(wanted, indent)])
     if not text.endswith('\n') and end == len(lines):
         blocks = '\n' + blocks
