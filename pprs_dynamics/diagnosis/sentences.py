@@ -208,7 +208,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 
 
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
-    card = found.effect.card
+    card = found.effect.card_in(diagnosis.model.kind)
     title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
     lacks = f'The model lacks {title}' if found.is_confirmed else (
         f'Fitted, but not confirmed: {title}')
@@ -224,7 +224,7 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    card = rival.effect.card
+    card = rival.effect.card_in(diagnosis.model.kind)
     title = with_drives(rival.name, rival.drives, diagnosis.residuals.drives)
     return Finding(
         f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '

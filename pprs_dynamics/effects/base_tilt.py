@@ -51,6 +51,15 @@ class BaseTilt(BodyEffect):
         'the model with a wrong direction',
         'put a spirit level on the base; shim one foot by 5 mm and repeat: the error must change',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
+    arm_card = Card(
+        'g -> R_y(alpha_y) R_x(alpha_x) g, in base',
+        'errors of all joints that depend on the pose alone: the first joint, which carries no '
+        'weight on a level base, shows it best where its axis should be upright',
+        'an arm mounted on a slope, a wall or a moving carriage, gravity in the model with a wrong '
+        'direction',
+        'put a spirit level on the base; let the arm stretch out and turn the first joint: its '
+        'effort at rest must change with the angle',
+        'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
     def changed(self, robot: Robot | Arm) -> Robot | Arm:
         """Return the robot under the turned gravity."""

@@ -162,7 +162,8 @@ class CatalogueEffect(Effect):
 
     Class attributes
     ----------------
-    card : Card
+    card, arm_card : Card
+        The latter where an arm needs other words.
     acts_in : set of {'platform', 'axis', 'arm'}
         The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
     linear, shape : tuple of Parameter
@@ -190,6 +191,7 @@ class CatalogueEffect(Effect):
     """
 
     card: ClassVar[Card]
+    arm_card: ClassVar[Card | None] = None
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
@@ -231,6 +233,11 @@ class CatalogueEffect(Effect):
     @abstractmethod
     def to_file(self) -> dict[str, Any]:
         """Return the block from which `from_file` makes this effect."""
+
+    @classmethod
+    def card_in(cls, kind: str) -> Card:
+        """Return the description for a kind of model."""
+        return cls.arm_card if kind == ARM and cls.arm_card is not None else cls.card
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

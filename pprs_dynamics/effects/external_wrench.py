@@ -60,6 +60,14 @@ class ExternalWrench(BodyEffect):
         'and look whether the same force is found. Only accelerations tell a downward force '
         'from a payload',
         'Tsai, Robot Analysis, 1999')
+    arm_card = Card(
+        'tau = J^T (F, M), F and M in base at the origin of the tool',
+        'errors that depend on the pose alone, whatever the speed, in the proportions of the '
+        'Jacobian of the tool',
+        'a hose or cable that pulls at the tool, a balancer, contact with a workpiece',
+        'take away whatever touches the tool and repeat. Only accelerations and turns of the tool '
+        'tell a downward force from a payload',
+        'Tsai, Robot Analysis, 1999')
 
     def load(self, state: MechanismState | ArmState) -> StructureLoad:
         """Return the wrench, the same for every sample."""

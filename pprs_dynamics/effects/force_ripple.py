@@ -70,6 +70,16 @@ class ForceRipple(DriveEffect):
         'coupling and repeat: cogging moves with the motor',
         'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
         'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
+    arm_card = Card(
+        'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
+        'a wave over the angle of the joint, always at the same places, both ways and at any '
+        'speed; over time its frequency follows the speed',
+        'the gear: the wave generator of a harmonic drive ripples twice a turn of the motor (p is '
+        'pi over the gear ratio), teeth of other gears once a tooth; cogging of the motor',
+        'compare 2 pi / p with the gear ratio and numbers of teeth and poles; creep to and fro: '
+        'peaks must stay in place',
+        'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
+        'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

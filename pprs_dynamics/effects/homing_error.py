@@ -49,6 +49,13 @@ class HomingError(MeasurementEffect):
         'drive mounted a little aside',
         'home the drive again and repeat; check the zero with a gauge block',
         'Merlet, Parallel Robots, 2006')
+    arm_card = Card(
+        'measured position = q + z',
+        'an error of this joint and of those before it, that depends on the pose: the weight '
+        'pulls in another direction than the model thinks',
+        'an encoder that lost counts, a joint put together one tooth aside, zeros of another arm',
+        'move to the zero marks of the arm; measure an angle with a level',
+        'Merlet, Parallel Robots, 2006')
 
     def position_error(self, drives: Sequence[str]) -> Array:
         """Return z of each drive [m], (D,)."""

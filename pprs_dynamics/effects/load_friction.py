@@ -51,6 +51,16 @@ class LoadFriction(DriveEffect):
         'grow with the load (if it does not: coulomb_friction); clean and lubricate, and repeat',
         'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
         'depending on load and velocity, IROS, 2010')
+    arm_card = Card(
+        'dmu |tau| sgn(q_dot), tau the torque of the joint without friction',
+        'a step at each reversal that is higher where the joint carries more weight or accelerates '
+        'more',
+        'every gear has it: teeth and bearings of a harmonic or planetary gear rub in proportion '
+        'to what they transmit; more than before means wear or lack of grease',
+        'move one joint slowly to and fro, with the arm hanging down and stretched out: the step '
+        'at reversal must grow with the weight',
+        'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
+        'depending on load and velocity, IROS, 2010')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -49,6 +49,15 @@ class PayloadMass(BodyEffect):
         'change by just that weight. Only accelerations tell it from a constant downward force, '
         'so move fast',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+    arm_card = Card(
+        'tau -> tau + what moves a mass m_+ at the origin of the tool',
+        'an error of the joints that carry the arm, as large as its weight times its distance from '
+        'each axis, and with it one that follows the accelerations of the tool',
+        'a tool or workpiece that the model was not told of, or one that was taken off; a hose or '
+        'cable that hangs on the wrist',
+        'weigh what hangs on the flange; repeat without it, or with a known weight more. A gain of '
+        'the drives that is wrong by 5 % makes this mass wrong by 5 %',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
     def changed(self, robot: Robot | Arm) -> Robot | Arm:
         """Return the robot with the other payload."""

@@ -125,14 +125,16 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
 
 def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
               rivals: Sequence[RivalEffect]) -> None:
+    kind = diagnosis.model.kind
     if words.effects:
         with page.fold('What was found, why, and how to confirm it'):
             for finding, one in zip(words.effects, diagnosis.effects, strict=True):
-                page.card(finding.title, _lines(finding, one.effect.card.equation),
+                page.card(finding.title, _lines(finding, one.effect.card_in(kind).equation),
                           figures.effect_pictures(diagnosis, one))
                 for said, rival in zip(words.rivals, rivals, strict=True):
                     if rival.of == one.name:
-                        page.card(said.title, _lines(said, rival.effect.card.equation),
+                        page.card(said.title,
+                                  _lines(said, rival.effect.card_in(kind).equation),
                                   figures.effect_pictures(diagnosis, rival))
     if words.unexplained:
         with page.fold('What no effect of the catalogue explains'):
