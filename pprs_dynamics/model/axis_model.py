@@ -36,7 +36,7 @@ from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.model.effects_block import added_effects
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
-from pprs_dynamics.model.keys import AXIS_KEYS, is_axis
+from pprs_dynamics.model.keys import AXIS_KEYS, is_arm, is_axis
 from pprs_dynamics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
@@ -121,7 +121,7 @@ class AxisModel(ForceModel):
             a 3-PPRS.
         """
         with source_of_errors(source):
-            if not is_axis(parameters):
+            if not is_axis(parameters) or is_arm(parameters):
                 raise ModelError('axis.mass', MISSING, 'be given: this needs a single axis')
             values = checked_values(parameters)
             friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])
