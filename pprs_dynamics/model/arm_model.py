@@ -44,6 +44,8 @@ from pprs_dynamics.model.keys import ARM_GAIN, ARM_JOINTS, ARM_URDF, Key, arm_ke
 from pprs_dynamics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
+# Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
+BLOCKS_PER_PERIOD = 100.0
 # Elements of an inertia tensor: as files have them, and as Pinocchio has them.
 OF_FILES, OF_PINOCCHIO = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
 FROM_FILES = [OF_FILES.index(axes) for axes in OF_PINOCCHIO]
@@ -108,6 +110,11 @@ class ArmModel(ForceModel):
     def rest_speed(self) -> float:
         """Speed [rad/s, m/s] below which a joint stands, and its gear holds any torque."""
         return float(np.min(self.reversal.velocity))
+
+    @property
+    def blocks_per_period(self) -> float:
+        """Means of efforts that are compared in a period of the motion."""
+        return BLOCKS_PER_PERIOD
 
     @property
     def kinds(self) -> tuple[str, ...]:

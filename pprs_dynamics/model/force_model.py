@@ -173,6 +173,11 @@ class ForceModel(ABC):
         """
         return 0.0
 
+    @property
+    def blocks_per_period(self) -> float:
+        """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
+        return 0.0
+
     @classmethod
     def offers(cls, effect: type[CatalogueEffect]) -> bool:
         """Return whether an effect of the catalogue can act in what this is a model of."""
