@@ -27,7 +27,7 @@ setup(
     maintainer_email='pprs-dynamics@example.org',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
     package_data={package_name: ['py.typed', 'report/*.css', 'report/*.js',
-                                 'report/plotly-basic.*']},
+                                 'report/plotly-basic.*', 'report/uplot.*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

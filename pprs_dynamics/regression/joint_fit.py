@@ -162,7 +162,7 @@ class Regression:
         return self._products[key]
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None,
-            tolerance: float = CONVERGED, rival: float = np.inf) -> JointFit:
+            rival: float = np.inf) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
 
         Parameters
@@ -170,8 +170,6 @@ class Regression:
         blocks : sequence of Block
         start : (D, J + 1) array, optional
             Amplitudes of the noise to start from.
-        tolerance : float
-            Of the deviance.
         rival : float
             The deviance to be compared with: far above it the fit is only a rough one.
         """
@@ -183,7 +181,7 @@ class Regression:
         for _ in range(MOST_ROUNDS):
             solution = system.solve(shapes.spectrum(amplitudes), self.counts)
             above = solution.deviance - rival
-            if abs(before - solution.deviance) < max(tolerance, HOPELESS * above):
+            if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
                 break
             before = solution.deviance
             amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,

@@ -11,19 +11,24 @@
   const menus = [...document.querySelectorAll('select[data-menu]')];
   const drawn = new Set();
   let span = null;
-  let library = null;
+  const libraries = {};
 
-  function plotly() {
-    library ??= (async () => {
-      const letters = document.getElementById('plotly').textContent;
+  // A library unpacks itself when it is first asked for.
+  window.library = (name) => {
+    libraries[name] ??= (async () => {
+      const letters = document.getElementById(name).textContent;
       const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
       const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
       const script = document.createElement('script');
       script.textContent = await new Response(unpacked).text();
       document.head.append(script);
-      return window.Plotly;
     })();
-    return library;
+    return libraries[name];
+  };
+
+  async function plotly() {
+    await window.library('plotly');
+    return window.Plotly;
   }
 
   function contentOf(plot) {

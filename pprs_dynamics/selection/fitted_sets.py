@@ -25,7 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.regression.design import Design
-from pprs_dynamics.regression.joint_fit import CONVERGED, JointFit, Regression
+from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.regression.normal_equations import Block
 from pprs_dynamics.selection.allowance import share_of_allowance
 from pprs_dynamics.selection.candidates import (
@@ -39,7 +39,6 @@ from pprs_dynamics.selection.candidates import (
 from pprs_dynamics.selection.decisions import Decisions
 from pprs_dynamics.selection.library import Library
 
-ROUGH = 1.0  # tolerance of the deviance where only the size of forces matters
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 
@@ -81,16 +80,14 @@ class FittedSets:
 
     def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
         blocks = [block for candidate in candidates for block in candidate.blocks]
+        if start is not None:
+            # The size of its forces, in proportion to which friction is in doubt, need not be
+            # exact: the noise of a near set does.
+            doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
+        else:
+            doubtful = {}
         rival = min((one.fit.deviance for one in self.evaluated.values()), default=np.inf)
-        # Forces of friction, in proportion to which there is doubt, need not be exact.
-        is_doubted = any(self._is_doubted(placement) for candidate in candidates
-                         if isinstance(candidate, EffectCandidate)
-                         for placement in candidate.placements)
-        fit = self.regression.fit(blocks, start, ROUGH if is_doubted else CONVERGED, rival)
-        doubtful = self._doubtful_blocks(candidates, fit)
-        if doubtful:
-            fit = self.regression.fit([*blocks, *chain(*doubtful.values())], fit.amplitudes,
-                                      rival=rival)
+        fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start, rival)
         found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
         return replace(found, is_admissible=self._is_admissible(found))
 
@@ -98,9 +95,6 @@ class FittedSets:
         """Return whether every pattern is more than the lack of fit of the effects beside it."""
         return all(share_of_allowance(self.design, self.regression, self.decisions, found,
                                       candidate)[0] >= 1 for candidate in found.unknowns)
-
-    def _is_doubted(self, placement: Placement) -> bool:
-        return placement.bare is not None or self.library.open_rows(placement) is not None
 
     def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
                          ) -> dict[Placement, tuple[Block, ...]]:

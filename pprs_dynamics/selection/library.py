@@ -28,6 +28,7 @@ from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.design import Design, searched_in_drives
 from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.regression.normal_equations import Block, term_gains
+from pprs_dynamics.regression.open_form import open_rows
 from pprs_dynamics.regression.terms import Term
 from pprs_dynamics.selection.candidates import Candidate, EffectCandidate, Placement, Prices
 
@@ -233,8 +234,7 @@ class Library:
         if d is None or term.is_fixed:
             return None
         units = np.eye(len(term.names))[[term.names.index(name) for name in placement.names]]
-        rows = np.stack([np.concatenate((design.reversal_rows(term, unit),
-                                         design.deviation_rows(term, unit))) for unit in units])
+        rows = np.stack([open_rows(design, term, unit) for unit in units])
         return self.regression.series[d].transform(rows) if np.any(rows) else None
 
     def _placed(self, term: Term, names: tuple[str, ...]) -> Placement:
