@@ -50,7 +50,7 @@ MAY_USE = {
               'selection', 'diagnosis', 'adoption'},
     'simulation': {'mechanism', 'model', 'measurement'},
     'experiments': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                    'selection'},
+                    'selection', 'identification'},
     'report': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                'selection', 'identification', 'diagnosis', 'adoption', 'experiments', 'fleet'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},

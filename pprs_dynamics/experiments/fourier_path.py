@@ -74,7 +74,7 @@ class FourierFamily:
         Each is about the excursion of one series that satisfies the conditions.
         """
         rows = np.reshape(parameters, (FREEDOMS, -1))
-        coefficients = np.stack([_resting(tuple(row.tolist())) @ own
+        coefficients = np.stack([resting_series(tuple(row.tolist())) @ own
                                  for row, own in zip(self.harmonics, rows, strict=True)])
         K = self.harmonics.shape[1]
         return FourierPath(self.duration, self.harmonics, coefficients[:, :K],
@@ -147,7 +147,7 @@ def joined_motion(paths: Sequence[FourierPath], time: Array) -> PlatformMotion:
 
 
 @cache
-def _resting(harmonics: tuple[int, ...]) -> Array:
+def resting_series(harmonics: tuple[int, ...]) -> Array:
     """Return a basis of all (a, b) that start and end at rest, each of unit peak, (2 K, p)."""
     k = np.array(harmonics, dtype=float)
     zero = np.zeros_like(k)
