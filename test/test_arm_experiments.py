@@ -64,7 +64,7 @@ def test_it_is_a_motion_from_rest_to_rest(found) -> None:
 def test_it_tells_more_than_motions_drawn_at_random(model: ArmModel, found) -> None:
     search = _Search(model, ArmLimits(), DURATION)
     random = np.random.default_rng(99)
-    drawn = [search.within_limits(random.normal(size=found.coefficients.shape))
+    drawn = [search.within_limits(random.normal(size=found.series.coefficients.shape))
              for _ in range(20)]
     told = [np.sum(np.log1p(search.information(one))) for one in (found, *drawn)]
     assert told[0] > max(told[1:])

@@ -33,9 +33,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.experiments.fourier_path import resting_series
 from pprs_dynamics.identification.bodies import Bodies
 from pprs_dynamics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.mechanism.joint_series import JointSeries
 from pprs_dynamics.model.arm_model import ArmModel
 
 HARMONICS = 8  # of the duration
@@ -72,12 +72,7 @@ class ArmExcitation:
     Parameters
     ----------
     model : ArmModel
-    coefficients : (n, p) array
-        Of the resting series of each joint [rad, m].
-    middle : (n,) array
-        [rad, m]
-    duration : float
-        [s]
+    series : JointSeries
     determined, total : int
         Numbers of links, rotors and friction that it tells better than the description, and all.
     limits : dict of str to float
@@ -85,35 +80,27 @@ class ArmExcitation:
     """
 
     model: ArmModel
-    coefficients: Array
-    middle: Array
-    duration: float
+    series: JointSeries
     determined: int = 0
     total: int = 0
     limits: dict[str, float] | None = None
 
     def motion(self, time: Array) -> JointMotion:
         """Return the motion at times [s]."""
-        series = resting_series(tuple(range(1, HARMONICS + 1)))
-        ab = (self.coefficients @ series.T).reshape(len(self.middle), 2, HARMONICS)
-        omega = 2 * np.pi * np.arange(1, HARMONICS + 1) / self.duration
-        s, c = np.sin(np.outer(time, omega)), np.cos(np.outer(time, omega))
-        a, b = ab[:, 0].T, ab[:, 1].T
-        speed = omega[:, None]
-        return JointMotion(self.middle + (c - 1) @ a + s @ b, c @ (speed * b) - s @ (speed * a),
-                           -(c @ (speed ** 2 * a)) - s @ (speed ** 2 * b), time)
+        return self.series.motion(time)
 
     @property
     def text(self) -> str:
         """What it promises, in a sentence."""
-        return (f'A motion of {self.duration:g} s that tells {self.determined} of {self.total} '
-                'numbers of links, rotors and friction better than the URDF; the rest does not '
-                'show in any effort, or hardly. Whether links touch each other is not checked.')
+        return (f'A motion of {self.series.duration:g} s that tells {self.determined} of '
+                f'{self.total} numbers of links, rotors and friction better than the URDF; the '
+                'rest does not show in any effort, or hardly. Whether links touch each other is '
+                'not checked.')
 
     def to_json(self) -> dict[str, Any]:
         """Return what it promises."""
         return {'separates': [], 'expected_evidence': 0.0, 'determined': self.determined,
-                'total': self.total, 'limits': self.limits, 'duration': self.duration}
+                'total': self.total, 'limits': self.limits, 'duration': self.series.duration}
 
 
 def excite_arm(model: ArmModel, limits: ArmLimits, duration: float, seed: int,
@@ -131,7 +118,7 @@ def excite_arm(model: ArmModel, limits: ArmLimits, duration: float, seed: int,
     """
     random = np.random.default_rng(seed)
     search = _Search(model, limits, duration)
-    size = resting_series(tuple(range(1, HARMONICS + 1))).shape[1]
+    size = JointSeries.size(HARMONICS)
     best, most = None, -np.inf
     for k in range(DRAWN + CLIMBED):
         if progress is not None:
@@ -140,8 +127,9 @@ def excite_arm(model: ArmModel, limits: ArmLimits, duration: float, seed: int,
             drawn = random.normal(size=(len(model.drives), size))
         else:
             step = STEP * (1 - 0.9 * (k - DRAWN) / CLIMBED)
-            scale = np.abs(best.coefficients).max(axis=1, keepdims=True)
-            drawn = best.coefficients / scale + step * random.normal(size=best.coefficients.shape)
+            shape = best.series.coefficients
+            drawn = (shape / np.abs(shape).max(axis=1, keepdims=True)
+                     + step * random.normal(size=shape.shape))
         tried = search.within_limits(drawn)
         told = search.information(tried)
         value = float(np.sum(np.log1p(np.maximum(told, 0.0))))
@@ -174,7 +162,7 @@ class _Search:
     def within_limits(self, drawn: Array) -> ArmExcitation:
         """Return the largest motion of a shape that keeps the limits."""
         time = np.linspace(0, self.duration, CHECKED)
-        found = ArmExcitation(self.model, drawn, self.middle, self.duration)
+        found = JointSeries(drawn, self.middle, self.duration, HARMONICS)
         motion = found.motion(time)
         uses = np.max([np.abs(values).max(axis=0) / bound for values, bound in (
             (motion.position - self.middle, self.reach), (motion.velocity, self.speed),
@@ -186,7 +174,7 @@ class _Search:
             if np.all(np.abs(efforts) <= self.effort):
                 break
             found = replace(found, coefficients=SHRINK * found.coefficients)
-        return found
+        return ArmExcitation(self.model, found)
 
     def information(self, found: ArmExcitation) -> Array:
         """Return by how much each combination is told better than by the description, squared."""

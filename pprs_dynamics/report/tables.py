@@ -70,11 +70,14 @@ def _span(bounds: tuple[float, float] | None) -> str:
     return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
 
 
+EFFORTS = ('rms', 'bias', 'peak', 'noise')
+
+
 def comparison_headings(comparison: Comparison) -> tuple[str, ...]:
     """Return the headings of `comparison_rows`."""
     unit = comparison.unit
-    return ('drive', f'rms [{unit}]', 'relative', f'bias [{unit}]', f'peak [{unit}]', 'explained',
-            f'noise [{unit}]', 'independent samples')
+    return ('drive', *(f'{name} [{unit}]' if name in EFFORTS else name for name in (
+        'rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')))
 
 
 def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
@@ -92,7 +95,11 @@ def comparison_table(comparison: Comparison) -> Any:
 
     colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
     table = Table(box=None, padding=(0, 1))
+    # One unit for all: names of joints need the room.
+    short = len(comparison.unit) > 1
     for heading in comparison_headings(comparison)[:7]:
+        if short and not heading.startswith('rms'):
+            heading = heading.partition(' [')[0]
         table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
     for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
         table.add_row(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
