@@ -27,7 +27,8 @@ setup(
     maintainer_email='pprs-dynamics@example.org',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
     package_data={package_name: ['py.typed', 'report/*.css', 'report/*.js',
-                                 'report/plotly-basic.*', 'report/uplot.*']},
+                                 'report/plotly-basic.*', 'report/uplot.*',
+                                 'server/static/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -47,6 +48,7 @@ setup(
         'arm': ['pin>=3'],
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
+        'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'types-PyYAML', 'scipy-stubs', 'colcon-common-extensions', 'colcon-ros',

@@ -31,6 +31,7 @@ PACKAGE = Path(__file__).parents[1] / 'pprs_dynamics'
 ROS = {'rclpy', 'std_msgs', 'sensor_msgs', 'trajectory_msgs', 'geometry_msgs', 'rcl_interfaces',
        'builtin_interfaces', 'diagnostic_msgs'}
 PLOTTING = {'matplotlib', 'plotly', 'rich'}
+WEB = {'starlette', 'uvicorn'}
 # Each folder uses itself and those named; arrows point from what stands on to what it stands on.
 MAY_USE = {
     'mechanism': set(),
@@ -53,10 +54,13 @@ MAY_USE = {
                     'selection', 'identification'},
     'report': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                'selection', 'identification', 'diagnosis', 'adoption', 'experiments', 'fleet'},
+    'workbench': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
+                  'selection', 'diagnosis', 'adoption', 'experiments'},
+    'server': {'model', 'measurement', 'workbench'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                  'selection', 'identification', 'diagnosis', 'adoption', 'simulation',
-                 'experiments', 'report', 'fleet'},
+                 'experiments', 'report', 'fleet', 'workbench', 'server', 'nodes'},
 }
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))
@@ -127,6 +131,8 @@ def test_arrows_point_one_way(file: Path) -> None:
         assert not libraries & ROS
     if folder not in ('report', 'commands'):
         assert not libraries & PLOTTING
+    if folder != 'server':
+        assert not libraries & WEB
 
 
 def test_no_file_imports_one_that_imports_it() -> None:

@@ -22,10 +22,10 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.adoption.adopt import adopt, original
+from pprs_dynamics.adoption.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.commands.arguments import MODEL, PAGE, add_details, output_file
 from pprs_dynamics.commands.diagnosis_cache import diagnosis_key, kept_diagnosis
-from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,

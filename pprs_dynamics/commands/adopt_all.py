@@ -22,8 +22,8 @@ from typing import Any
 
 from rich.markup import escape
 
+from pprs_dynamics.adoption.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.adoption.loop import REFUSED, adopt_all
-from pprs_dynamics.commands.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.measurement.recording import Recording

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 
+from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.adopt_all import adopt_what_was_found
 from pprs_dynamics.commands.arguments import (
     DEFAULT_MODEL,
@@ -27,7 +28,6 @@ from pprs_dynamics.commands.arguments import (
     output_file,
 )
 from pprs_dynamics.commands.diagnosis_cache import diagnosis_key, keep
-from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,

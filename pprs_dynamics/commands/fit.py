@@ -20,8 +20,8 @@ import argparse
 
 from rich.markup import escape
 
+from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
-from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import (
     add_recordings,

@@ -20,8 +20,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
-from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.units import common_effort

@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from typing import Any
 
 import numpy as np
 from rich.markup import escape
 
+from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import PAGE, POSES, number, output_file, seed
-from pprs_dynamics.commands.ledger_entry import check_output
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings, refuse_inputs
 from pprs_dynamics.experiments.arm_excitation import ArmLimits, excite_arm
@@ -112,12 +113,13 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, {**experiment.to_json(), 'purpose': options.purpose,
                                   'seed': options.seed, 'rate': options.rate,
                                   'output': options.output})
+    command = shlex.join([
+        'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
+        '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     if options.report:
-        page = experiment_page(experiment, motion)
+        page = experiment_page(experiment, motion, command)
         screen.print(f'page: {shown(page.write(options.report))}')
-    screen.print('[bold]play it[/]: ' + escape(
-        f'ros2 run pprs_dynamics play_trajectory --ros-args -p source:=csv -p '
-        f'file:={options.output} -p rate:={options.rate} -p lead_in:=3.0'))
+    screen.print(f'[bold]play it[/]: {escape(command)}')
     return 0
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What tells one recording from every other: the SHA-256 of its file, or of a bag's files."""
+"""What tells one recording from every other: the SHA-256 of its file or of its samples."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from os import PathLike
 from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.recording import Recording
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
@@ -43,3 +44,11 @@ def fingerprint(path: str | PathLike[str]) -> str:
         return whole.hexdigest()
     except OSError as error:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
+
+
+def samples_fingerprint(recording: Recording) -> str:
+    """Return the hash of a recording that came from no file."""
+    whole = hashlib.sha256(repr((recording.drives, recording.epoch)).encode())
+    for values in (recording.time, recording.position, recording.velocity, recording.effort):
+        whole.update(b'' if values is None else values.astype('<f8').tobytes())
+    return whole.hexdigest()

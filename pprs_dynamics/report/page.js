@@ -32,7 +32,14 @@
   }
 
   function contentOf(plot) {
-    let text = document.getElementById(`${plot.id}-data`).textContent;
+    const content = window.themed(document.getElementById(`${plot.id}-data`).textContent);
+    if (span && plot.dataset.time !== undefined) content.layout.xaxis.range = span;
+    show(content.data);
+    return content;
+  }
+
+  // What Plotly draws of a figure in JSON, in the colours of the page.
+  window.themed = (text) => {
     if (dark.matches) {
       for (const [from, to] of Object.entries(ON_BLACK)) text = text.replaceAll(from, to);
     }
@@ -55,10 +62,8 @@
                               ...layout.scene[name]};
       }
     }
-    if (span && plot.dataset.time !== undefined) layout.xaxis.range = span;
-    show(data);
     return {data, layout, frames};
-  }
+  };
 
   // Traces of a drive are shown where the menus stand on it.
   function show(data) {

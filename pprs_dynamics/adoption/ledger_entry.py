@@ -25,7 +25,7 @@ from pathlib import Path
 
 from pprs_dynamics import __version__
 from pprs_dynamics.adoption.adopt import Adoption
-from pprs_dynamics.measurement.fingerprint import fingerprint
+from pprs_dynamics.measurement.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import NOT_KNOWN, Step, with_step
@@ -45,9 +45,18 @@ class RecordingEntry:
 
     @classmethod
     def of(cls, path: str | PathLike[str], recording: Recording) -> RecordingEntry:
-        """Return what the ledger says of a recording."""
+        """Return what the ledger says of a recording from a file."""
+        return cls._of(recording, fingerprint(path))
+
+    @classmethod
+    def of_samples(cls, recording: Recording) -> RecordingEntry:
+        """Return what the ledger says of a recording that came from no file."""
+        return cls._of(recording, samples_fingerprint(recording))
+
+    @classmethod
+    def _of(cls, recording: Recording, sha256: str) -> RecordingEntry:
         time = recording.epoch + recording.time
-        return cls(recording.name, fingerprint(path), (float(time[0]), float(time[-1])))
+        return cls(recording.name, sha256, (float(time[0]), float(time[-1])))
 
 
 @dataclass(frozen=True)

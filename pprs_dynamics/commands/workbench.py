@@ -1,0 +1,75 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""pprs workbench: effects to tick on recordings, in the browser.
+
+Serves one page on this machine; its first line on stdout is the address with a token.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from pprs_dynamics.commands.arguments import number
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.server.folders import Folders, is_folder
+from pprs_dynamics.server.hub import Hub, LiveSource
+from pprs_dynamics.server.serve import serve
+from pprs_dynamics.workbench.session import Session
+
+HOST = '127.0.0.1'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('recordings', metavar='RECORDING', nargs='*',
+                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, to choose '
+                        'from in the browser')
+    parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
+                        help='a recording that is never fitted: adoptions are judged on it; may '
+                        'be repeated')
+    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
+                        'holds several, and to listen to with --live')
+    parser.add_argument('--live', action='store_true',
+                        help='listen to joint_states, and set effects on running nodes')
+    parser.add_argument('--port', type=number(0, 65535), default=0.0,
+                        help='to listen on (default: any that is free)')
+    parser.add_argument('--host', default=HOST,
+                        help=f'to listen on (default {HOST}: nobody else on the network sees it)')
+    parser.add_argument('--no-browser', action='store_true', help='open no browser')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    given = [path for path in options.recordings if not is_folder(path)]
+
+    def begin() -> Session | None:
+        if not given:
+            return None
+        return Session.open(given, options.model, options.validate, options.topic)
+    live = _live(options) if options.live else None
+    hub = Hub(begin, options.model, Folders.of(options.recordings), live)
+    serve(hub, options.host, int(options.port), not options.no_browser)
+    return 0
+
+
+def _live(options: argparse.Namespace) -> LiveSource:
+    model = DriveModel.load(options.model)
+    try:
+        from pprs_dynamics.nodes.live_joint_states import LiveSource as JointStates
+    except ImportError:
+        raise MissingLibraryError('rclpy', 'live data', 'ros') from None
+    source: LiveSource = JointStates(model, options.topic or 'joint_states')
+    return source

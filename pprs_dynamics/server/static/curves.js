@@ -1,0 +1,217 @@
+/* Linked curves over time, one of each drive: what is left before and now. */
+'use strict';
+
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const DRIVE_UNIT = 'N';
+
+/* Gaps are null to uPlot; typed arrays stay typed where there are none. */
+const withGaps = (values) => {
+  for (let k = 0; k < values.length; k++) {
+    if (Number.isNaN(values[k])) return Array.from(values, (v) => (Number.isNaN(v) ? null : v));
+  }
+  return values;
+};
+
+class Curves {
+  constructor(root, marked) {
+    this.root = root;
+    this.marked = marked; // called with {time: [from, to], drive}
+    this.plots = [];
+    this.drives = [];
+    this.time = new Float64Array(0);
+    this.source = null;
+    this.window = null; // what is seen; null is all
+    new ResizeObserver(() => this.resize()).observe(root);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.build());
+    root.addEventListener('keydown', (event) => this.key(event));
+  }
+
+  /* Take times and the error before; the error now follows. */
+  use(drives, time, segment, before) {
+    this.drives = drives;
+    this.time = time;
+    this.before = before.map((row) => this.cut(row, segment));
+    this.segment = segment;
+    this.now = this.before;
+    this.window = null;
+    this.build();
+  }
+
+  /* Let no line go from one recording or segment to the next. */
+  cut(row, segment) {
+    const cut = withGaps(row);
+    let gapped = cut;
+    for (let k = 1; k < segment.length; k++) {
+      if (segment[k] !== segment[k - 1]) {
+        if (gapped === row) gapped = Array.from(row);
+        gapped[k] = null;
+      }
+    }
+    return gapped;
+  }
+
+  build() {
+    for (const plot of this.plots) plot.destroy();
+    this.root.replaceChildren();
+    this.plots = this.drives.map((drive, d) => this.plot(drive, d));
+    if (this.window) this.zoom(this.window);
+  }
+
+  plot(drive, d) {
+    const box = document.createElement('div');
+    box.className = 'curve';
+    const head = document.createElement('h3');
+    head.textContent = drive;
+    const reading = document.createElement('span');
+    head.append(reading);
+    const place = document.createElement('div');
+    place.className = 'plot';
+    place.tabIndex = 0;
+    place.setAttribute('role', 'img');
+    place.setAttribute('aria-label', `error of ${drive} over time, before and now`);
+    box.append(head, place);
+    this.root.append(box);
+    const axis = {stroke: css('--quiet'), grid: {stroke: css('--line'), width: 1},
+                  ticks: {stroke: css('--line'), size: 4}, font: '12px system-ui', gap: 3};
+    const is_last = d === this.drives.length - 1;
+    const plot = new uPlot({
+      width: Math.max(this.root.clientWidth, 100), height: this.height() + (is_last ? 24 : 0),
+      padding: [8, 6, 0, 0], legend: {show: false},
+      cursor: {sync: {key: 'time', setSeries: false, scales: ['x', null]}, points: {show: false},
+               drag: {x: true, y: false, setScale: false}, y: false},
+      scales: {x: {time: false}},
+      axes: [{...axis, size: is_last ? 30 : 6,
+              values: is_last ? (u, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`)
+                : (u, ticks) => ticks.map(() => '')},
+             {...axis, size: 62, values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} N`),
+              space: 22}],
+      series: [{},
+               {stroke: css('--before'), width: 1, points: {show: false}},
+               {stroke: css('--now'), width: 1, points: {show: false}}],
+      hooks: {
+        setSelect: [(u) => this.select(u, d)],
+        setCursor: [(u) => this.read(u, reading)],
+        draw: [(u) => this.bands(u)],
+      },
+    }, [this.time, this.before[d], this.now[d] || this.before[d]], place);
+    plot.over.addEventListener('mousedown', () => { this.source = plot; });
+    plot.over.addEventListener('dblclick', () => this.all());
+    plot.over.addEventListener('wheel', (event) => {
+      if (!event.ctrlKey && !event.shiftKey) return; // the page scrolls
+      event.preventDefault();
+      const at = plot.posToVal(event.offsetX, 'x');
+      const factor = event.deltaY > 0 ? 1.25 : 0.8;
+      const [a, b] = this.range();
+      this.zoom([at - (at - a) * factor, at + (b - at) * factor]);
+    }, {passive: false});
+    return plot;
+  }
+
+  /* Of one curve: six fit on a screen [px]. */
+  height() {
+    return Math.round(Math.min(Math.max((innerHeight - 285) / this.drives.length - 22, 64), 150));
+  }
+
+  /* Show what is left now; rows are those of the drives. */
+  setNow(rows) {
+    this.now = rows.map((row) => this.cut(row, this.segment));
+    this.plots.forEach((plot, d) => {
+      plot.setData([this.time, this.before[d], this.now[d]], false);
+      const [min, max] = this.range();
+      plot.setScale('x', {min, max});
+    });
+  }
+
+  range() {
+    return this.window || [this.time[0], this.time[this.time.length - 1]];
+  }
+
+  zoom(range) {
+    if (!this.plots.length || (range && !(range[1] > range[0]))) return;
+    this.window = range;
+    const [min, max] = this.range();
+    for (const plot of this.plots) plot.setScale('x', {min, max});
+    // The places of marks follow once the scales are in force.
+    queueMicrotask(() => this.show());
+  }
+
+  all() {
+    this.zoom(null);
+  }
+
+  select(u, d) {
+    if (u !== this.source || u.select.width < 3) return;
+    this.source = null;
+    const time = [u.posToVal(u.select.left, 'x'),
+                  u.posToVal(u.select.left + u.select.width, 'x')];
+    this.marked({time, drive: this.drives[d]});
+  }
+
+  /* Mark a span on one drive, or on all without one; null forgets it. */
+  mark(time, drive) {
+    this.span = time;
+    this.on = drive;
+    this.show();
+  }
+
+  show() {
+    this.plots.forEach((plot, d) => {
+      if (!this.span || (this.on && this.on !== this.drives[d])) {
+        plot.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
+        return;
+      }
+      const left = Math.max(plot.valToPos(this.span[0], 'x'), 0);
+      const right = Math.min(plot.valToPos(this.span[1], 'x'), plot.over.clientWidth);
+      plot.setSelect({left, width: Math.max(right - left, 0), top: 0,
+                      height: plot.over.clientHeight}, false);
+    });
+  }
+
+  /* Spans of time in which samples of a scatter lie. */
+  setSpans(spans) {
+    this.spans = spans;
+    for (const plot of this.plots) plot.redraw(false);
+  }
+
+  bands(u) {
+    if (!this.spans || !this.spans.length) return;
+    u.ctx.save();
+    u.ctx.fillStyle = css('--mark');
+    for (const [from, to] of this.spans) {
+      const left = u.valToPos(from, 'x', true);
+      u.ctx.fillRect(left, u.bbox.top, Math.max(u.valToPos(to, 'x', true) - left, 1.5),
+                     u.bbox.height);
+    }
+    u.ctx.restore();
+  }
+
+  read(u, reading) {
+    const k = u.cursor.idx;
+    if (k === null || k === undefined || u.cursor.left < 0) {
+      reading.textContent = '';
+      return;
+    }
+    const say = (v) => (v === null || v === undefined ? '–' : (v >= 0 ? '+' : '−')
+      + Math.abs(v).toFixed(3));
+    reading.textContent = `${u.data[0][k].toFixed(2)} s: ${say(u.data[1][k])} → `
+      + `${say(u.data[2][k])} ${DRIVE_UNIT}`;
+  }
+
+  key(event) {
+    const steps = {ArrowLeft: [-0.1, -0.1], ArrowRight: [0.1, 0.1], '+': [0.1, -0.1],
+                   '-': [-0.125, 0.125]};
+    const step = steps[event.key];
+    if (!step || !event.target.classList.contains('plot')) return;
+    event.preventDefault();
+    const [a, b] = this.range();
+    this.zoom([a + step[0] * (b - a), b + step[1] * (b - a)]);
+  }
+
+  resize() {
+    const width = Math.max(this.root.clientWidth, 100);
+    this.plots.forEach((plot) => {
+      if (plot.width !== width) plot.setSize({width, height: plot.height});
+    });
+    this.show();
+  }
+}

@@ -1,0 +1,55 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Recordings of a session: each once, in metres, with what its numbers rather mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.conventions import find_mistakes
+from pprs_dynamics.measurement.readings import POSITION_UNIT
+from pprs_dynamics.measurement.recording import Recording, read_recording
+from pprs_dynamics.measurement.repeats import find_repeat
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.workbench.errors import SessionError
+
+
+def refuse_repeats(fitted: Mapping[str, Recording], held_out: Mapping[str, Recording]) -> None:
+    """Raise SessionError where a recording holds the samples of another."""
+    repeat = find_repeat(list(fitted.values()), ()) or find_repeat(
+        list(held_out.values()), list(fitted.values()))
+    if repeat is not None:
+        raise SessionError(f'{repeat[1]}, but every recording may be given once')
+
+
+def refuse_paths(paths: Sequence[str]) -> None:
+    """Raise SessionError where a path is given twice."""
+    for path in paths:
+        if paths.count(path) > 1:
+            raise SessionError(f'{path} is given twice, but every recording may be given once')
+
+
+def read(path: str | PathLike[str], model: ForceModel, topic: str | None = None) -> Recording:
+    """Read a recording, with what its numbers rather mean; refuse positions that are no metres."""
+    recording = read_recording(path, model.drives, topic)
+    mistakes = find_mistakes(model, recording)
+    for finding in mistakes:
+        if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
+            raise UnreadableFileError(path, f'{finding.what}, must be metres')
+    return replace(recording, findings=(*mistakes, *recording.findings))
