@@ -151,12 +151,12 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    held = [one for one in diagnosis.effects if one.is_confirmed]
+    held, unit = [e for e in diagnosis.effects if e.is_confirmed], diagnosis.residuals.unit
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{_change(diagnosis, diagnosis.effects[0].error_before, held[-1].error_after)}')
+        f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]])
@@ -165,7 +165,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
-    noise = in_unit(diagnosis.noise_floor, diagnosis.residuals.unit)
+    noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
@@ -180,10 +180,6 @@ def _headline(diagnosis: Diagnosis) -> str:
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
     return f'The model lacks {named}{which}.{fall}{level}{doubt}'
-
-
-def _change(diagnosis: Diagnosis, before: float, after: float) -> str:
-    return change(before, after, diagnosis.residuals.unit)
 
 
 def _doubted(diagnosis: Diagnosis) -> list[str]:
@@ -271,15 +267,15 @@ def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
 
 
 def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
-    fresh = diagnosis.held_out_on == 'validation'
+    fresh, unit = diagnosis.held_out_on == 'validation', diagnosis.residuals.unit
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
-    held_out += _change(diagnosis, found.held_out_before, found.held_out_after)
+    held_out += change(found.held_out_before, found.held_out_after, unit)
     held_out += '' if found.is_confirmed else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'With it the error {_change(diagnosis, found.error_before, found.error_after)}. '
+    return (f'With it the error {change(found.error_before, found.error_after, unit)}. '
             f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
