@@ -94,7 +94,7 @@ class DriveMotion:
 
 
 def smooth_drives(recording: Measured, window: float | None = None,
-                  blocks_per_period: float = 0.0) -> DriveMotion:
+                  blocks_per_period: float = 0.0, unit: str = 'm') -> DriveMotion:
     """Return the motion of a recording's drives, with one window for all of them.
 
     Parameters
@@ -105,6 +105,8 @@ def smooth_drives(recording: Measured, window: float | None = None,
         Duration of the window [s], instead of the choice from the data.
     blocks_per_period : float
         See `block_duration`.
+    unit : str
+        Of positions, for the notes.
 
     Raises
     ------
@@ -121,7 +123,7 @@ def smooth_drives(recording: Measured, window: float | None = None,
     grids, told = _grids(recording, segments)
     stretches = representative([_stretch(recording, part, grid)
                                 for part, grid in zip(segments, grids, strict=True)])
-    smoothing = choose_smoothing(stretches, window)
+    smoothing = choose_smoothing(stretches, window, unit)
     recorded = better_recorded(stretches, smoothing)
     notes = [smoothing.text, *told, *_velocity_notes(recording, recorded)]
 

@@ -179,8 +179,11 @@ def reconstruct(
         order = ', in this order' if len(kinematics.drives) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(kinematics.drives)}{order}', 'shape')
-    per_period = model.blocks_per_period if isinstance(model, ForceModel) else 0.0
-    drives = smooth_drives(recording, window, per_period)
+    if isinstance(model, ForceModel):
+        unit = 'rad' if all(one.turns for one in model.units) else 'm'
+        drives = smooth_drives(recording, window, model.blocks_per_period, unit)
+    else:
+        drives = smooth_drives(recording, window)
     if isinstance(model, ForceModel) and np.any(model.position_error):
         drives = replace(drives, position=drives.position - model.position_error)
     time, total = recording.time[drives.index], len(drives.index)
