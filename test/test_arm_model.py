@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import made_up_arm as arm
@@ -27,7 +28,9 @@ import yaml
 
 from pprs_dynamics import ArmModel, JointMotion, PprsError, load_model
 from pprs_dynamics.effects.base_tilt import BaseTilt
+from pprs_dynamics.effects.drive_effect import DriveRange
 from pprs_dynamics.effects.external_wrench import ExternalWrench
+from pprs_dynamics.effects.force_ripple import ForceRipple
 from pprs_dynamics.effects.payload_inertia import PayloadInertia
 from pprs_dynamics.effects.payload_mass import PayloadMass
 from pprs_dynamics.effects.payload_moment import PayloadMoment
@@ -233,3 +236,13 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
 def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:
     with pytest.raises(UnreadableFileError, match=r'made_up\.urdf'):
         load_model(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))
+
+
+def test_ripple_is_looked_for_where_the_gear_has_it() -> None:
+    """A joint of four turns: the waves of its gear are beyond the grid over its range."""
+    covered = DriveRange(40.0, 0.01, 25.0, 1.0)
+    pitches = [trial['pitch'] for trial in ForceRipple.trials(replace(covered, gear_ratio=101.0))]
+    for pitch in (2 * np.pi / 101, np.pi / 101):
+        assert min(abs(np.array(pitches) / pitch - 1)) < 1e-12
+        without = [trial['pitch'] for trial in ForceRipple.trials(covered)]
+        assert min(abs(np.array(without) / pitch - 1)) > 0.1

@@ -62,12 +62,15 @@ class DriveRange:
         Between the lowest and the highest position [m].
     top_speed : float
         [m/s]
+    gear_ratio : float
+        Turns of the motor per turn of the drive; 1 where no gear is known.
     """
 
     duration: float
     step: float
     stroke: float
     top_speed: float
+    gear_ratio: float = 1.0
 
 
 class DriveEffect(CatalogueEffect):

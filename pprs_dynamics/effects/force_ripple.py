@@ -118,11 +118,16 @@ class ForceRipple(DriveEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return pitches from the stroke down to a 120th of it or 0.8 mm, evenly in stroke / p."""
+        """Return pitches from the stroke down to a 120th of it or 0.8 mm, evenly in stroke / p.
+
+        Of a gear those of one and of two waves a turn of the motor, too.
+        """
         stroke = np.clip(covered.stroke, 1e-5, 10.0)
         most = np.clip(stroke / SHORTEST, 1, MOST)
-        return [{'pitch': float(stroke / periods)}
-                for periods in np.arange(FEWEST, max(most, FEWEST) + STEP / 2, STEP)]
+        of_gear = [TURN / (waves * covered.gear_ratio) for waves in (1, 2)]
+        return [{'pitch': float(pitch)} for pitch in (
+            *(stroke / np.arange(FEWEST, max(most, FEWEST) + STEP / 2, STEP)),
+            *(of_gear if covered.gear_ratio > 1 else ()))]
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

@@ -102,6 +102,12 @@ class ArmModel(ForceModel):
         return gain
 
     @property
+    def gear_ratios(self) -> tuple[float, ...]:
+        """Turns of the motor per turn of each joint."""
+        ratios: tuple[float, ...] = self.values['arm.gear_ratio']
+        return ratios
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return bool(self.values['arm.effort_unit'] == 'A')

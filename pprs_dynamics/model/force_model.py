@@ -161,6 +161,11 @@ class ForceModel(ABC):
         return None
 
     @property
+    def gear_ratios(self) -> tuple[float, ...]:
+        """Turns of the motor per turn of each drive; 1 where no gear is known."""
+        return (1.0,) * len(self.drives)
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return False
