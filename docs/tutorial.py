@@ -22,6 +22,7 @@ reader should look at goes into the text, docs/tutorial_text.md, in place of @NA
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -61,7 +62,7 @@ COMMANDS = {
 
 # Of what a command says: from the first line that begins so to the next that begins so.
 EXCERPTS = {
-    'COMPARE': ('compare', ' ', '1. '), 'WHERE': ('compare', '1. ', 'page'),
+    'COMPARE': ('compare', ' ', '1. '), 'WHERE': ('compare', '1. ', 'Next'),
     'DIAGNOSE': ('diagnose', '╭', 'Why'), 'ADOPT': ('adopt', '╭', 'page'),
     'WRONG': ('wrong', '╭', '  error'), 'AGAIN': ('again', ' ', 'page'),
     'HISTORY': ('history', 'Error', 'picture'),
@@ -90,7 +91,32 @@ def main() -> None:
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
         f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
         f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
+    for page, picture, opened in (
+            ('before', 'compare', ''), ('why', 'diagnose', ''),
+            ('why', 'tutorial_what_if', 'What if')):
+        photograph(folder / f'{page}.html', IMAGES / f'{picture}.png', opened)
     write_page(folder)
+
+
+def photograph(page: Path, picture: Path, opened: str) -> None:
+    """Take a picture of a page in Chromium, of its first screen or of a part that is opened."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=shutil.which('chromium'),
+                                          args=['--no-sandbox'])
+        tab = browser.new_page(viewport={'width': 1280, 'height': 900})
+        tab.goto(page.resolve().as_uri())
+        if opened:
+            summary = tab.locator(f'summary:has-text("{opened}")')
+            summary.click()
+            tab.wait_for_selector('#what-if[data-ready]')
+            summary.evaluate('(one) => one.scrollIntoView()')
+        else:
+            tab.wait_for_selector('.plot[data-drawn]')
+        tab.wait_for_timeout(500)  # [ms], for the last curve
+        tab.screenshot(path=picture)
+        browser.close()
 
 
 def write_page(folder: Path) -> None:

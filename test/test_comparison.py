@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import warnings
 from dataclasses import replace
@@ -23,11 +24,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_up_diagnosis import NOISE, made_up_residuals, statement
+from rich.console import Console
 from scipy.signal import lfilter
 
 from pprs_dynamics.diagnosis.comparison import compare
 from pprs_dynamics.diagnosis.localisation import DriveFindings, Localisation, localise
 from pprs_dynamics.regression.joint_fit import Regression
+from pprs_dynamics.report.tables import comparison_view
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
 from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
@@ -210,3 +213,30 @@ def test_what_a_statement_explains_is_never_put_down_to_noise(
     assert ('on every drive' in found.verdict) == (not found.where)
     assert ('nothing else stands out' in drive.verdict) == (not found.where)
     assert (drive.grade == 'noise') is is_noise
+
+
+@pytest.mark.parametrize('count', [0, 1, 12])
+def test_verdict_places_and_next_step_fit_25_lines_of_80_columns(count: int) -> None:
+    residuals = made_up_residuals()
+    long = ('{}: 62% of its squared error lies at a position of slide_3 between -25.1 and 42.6 mm, '
+            'in 82% of the time; it is shifted there by +0.0844 N in the direction of motion')
+    told = tuple(replace(statement(name), text=long.format(name), mean_square=0.5 * NOISE ** 2)
+                 for name in (*residuals.drives, *residuals.drives))[:count]
+    found = compare(residuals, Localisation(told, {
+        name: DriveFindings(tuple(one for one in told if one.drive == name), None)
+        for name in residuals.drives}))
+    command = 'pprs diagnose a_recording_with_a_long_name.mcap --model robot.yaml --report why.html'
+
+    def printed(details: bool) -> list[str]:
+        screen = Console(width=80, file=io.StringIO())
+        screen.print(comparison_view(found, command, details))
+        assert isinstance(screen.file, io.StringIO)
+        return screen.file.getvalue().splitlines()
+
+    short, whole = printed(False), printed(True)
+    # The command adds a finding of a recording and the name of the page.
+    assert len(short) <= 25 - 2
+    assert max(map(len, [*short, *whole])) <= 80
+    assert ('Next' in ' '.join(short)) is (count > 0)
+    assert ('--details' in ' '.join(short)) is (count == 12)
+    assert all(one.text in ' '.join(' '.join(whole).split()) for one in found.where)

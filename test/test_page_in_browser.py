@@ -64,6 +64,11 @@ READABLE = '''() => {
     contrast = Math.min(contrast, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05));
     size = Math.min(size, parseFloat(style.fontSize));
   }
+  for (const button of document.querySelectorAll('.plot .updatemenu-button')) {
+    const [text, box] = ['text', 'rect'].map(
+      (name) => light(getComputedStyle(button.querySelector(name)).fill));
+    contrast = Math.min(contrast, (Math.max(text, box) + 0.05) / (Math.min(text, box) + 0.05));
+  }
   for (const text of document.querySelectorAll('.plot text, .plot tspan')) {
     size = Math.min(size, parseFloat(getComputedStyle(text).fontSize));
   }
@@ -137,6 +142,9 @@ def test_every_figure_is_drawn_and_all_text_can_be_read(
     seen.unfold()
     assert seen.complaints == []
     assert seen.tab.evaluate('document.documentElement.scrollWidth') <= width
+    captions = '''Math.max(0, ...[...document.querySelectorAll('caption span')].map(
+        (caption) => caption.getBoundingClientRect().right))'''
+    assert seen.tab.evaluate(captions) <= width
     contrast, size = seen.tab.evaluate(READABLE)
     assert contrast >= LEAST_CONTRAST
     assert size >= LEAST_TEXT

@@ -18,8 +18,6 @@ from __future__ import annotations
 
 import argparse
 
-from rich.markup import escape
-
 from pprs_dynamics.commands.arguments import DEFAULT_MODEL, PAGE, add_details, output_file
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings
@@ -29,11 +27,9 @@ from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.comparison_page import comparison_page
 from pprs_dynamics.report.progress import progress_bar
-from pprs_dynamics.report.tables import comparison_table
+from pprs_dynamics.report.tables import comparison_view
 from pprs_dynamics.report.terminal import console, shown
 from pprs_dynamics.residuals.measuring import measure_residuals
-
-MOST_SHOWN = 3  # places without --details
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,25 +50,13 @@ def run(options: argparse.Namespace) -> int:
     with progress_bar(screen, 'where it fails') as progress:
         where = localise(residuals, progress=lambda share: progress(share, 1.0))
     comparison = compare(residuals, where)
-    screen.print(comparison_table(comparison))
-    screen.print(escape(comparison.verdict))
-    told = comparison.where if options.details else comparison.where[:MOST_SHOWN]
-    for number, statement in enumerate(told, start=1):
-        screen.print(f'{number}. {escape(statement.text)}')
-    if not told:
-        screen.print('Nowhere in particular: nothing stands out against noise.')
-    if len(comparison.where) > len(told):
-        screen.print(f'… and {len(comparison.where) - len(told)} more, with --details, --json or '
-                     '--report')
-    if options.details:
-        for drive in comparison.drives.values():
-            screen.print(escape(drive.verdict))
+    files = GivenFiles(tuple(options.recordings), (),
+                       '' if options.model == DEFAULT_MODEL else str(options.model))
+    command = files.command('diagnose', '--report', 'why.html')
+    screen.print(comparison_view(comparison, command, options.details))
     if options.json:
         write_json(options.json, {**comparison.to_json(), 'verdict': comparison.verdict})
     if options.report:
-        files = GivenFiles(tuple(options.recordings), (),
-                           '' if options.model == DEFAULT_MODEL else str(options.model))
-        page = comparison_page(model, recordings, residuals, comparison, notes,
-                               files.command('diagnose', '--report', 'why.html'))
+        page = comparison_page(model, recordings, residuals, comparison, notes, command)
         screen.print(f'page: {shown(page.write(options.report))}')
     return 0

@@ -113,6 +113,11 @@ class Comparison:
         """Where it fails, what explains most of the squared error first, and nothing slight."""
         return _told(self.drives, self.localisation)
 
+    @property
+    def is_beyond_noise(self) -> bool:
+        """Whether there is anything but noise on any drive."""
+        return bool(self.where) or any(one.grade != 'noise' for one in self.drives.values())
+
     def to_json(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
         return {

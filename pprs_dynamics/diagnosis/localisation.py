@@ -37,7 +37,7 @@ from pprs_dynamics.residuals.residuals import Residuals
 from pprs_dynamics.selection.candidates import Prices, UnknownCandidate
 from pprs_dynamics.selection.decisions import DECISIONS, Decisions
 from pprs_dynamics.selection.patterns import Pattern
-from pprs_dynamics.selection.search import with_fast_noise
+from pprs_dynamics.selection.scanned_sets import with_fast_noise
 from pprs_dynamics.selection.unknown import PatternLibrary
 
 MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged

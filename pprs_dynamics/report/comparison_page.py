@@ -69,7 +69,7 @@ def comparison_page(
             if picture is not None:
                 page.figure(picture, f'Where it fails most: {statements[0].drive}. Bars: two '
                             'standard deviations under the noise.')
-    if command and any(drive.grade != 'noise' for drive in comparison.drives.values()):
+    if command and comparison.is_beyond_noise:
         page.command('Find out which physical effect is missing', command)
     if len(statements) > FIRST:
         with page.fold(f'{len(statements) - FIRST} more places'):

@@ -36,6 +36,7 @@ MOST_VALUES = 300_000
 SATURATED = 10.0  # standard deviations at which the map's colour is full
 MOST_ERRORS = 50
 ROW, HEAD = 26, 260  # heights of the map [px]
+LEAST_ROWS = 4  # so that its colour scale has room
 
 _SCRIPT = '''
 const data = JSON.parse(document.getElementById('fleet-data').textContent);
@@ -44,7 +45,7 @@ let shown = data.first;
 function showTrend(robot, quantity) {
   shown = [robot, quantity];
   const trend = data.trends[robot + '\\u0000' + quantity];
-  card.replaceChildren();
+  card.hidden = true;
   if (!trend) { document.getElementById('trend-title').textContent =
     robot + ', ' + quantity + ': not drawn, too many recordings for one page'; return; }
   document.getElementById('trend-title').textContent =
@@ -95,6 +96,7 @@ function showRecording(k) {
       row.insertCell().textContent = text;
   }
   card.append(title, line, table);
+  card.hidden = false;
 }
 function begin() {
   // The page unpacks its library, and draws a figure once it is in view.
@@ -132,7 +134,7 @@ def fleet_page(fleet: FleetTrends, beside: str | None = None) -> Page:
                     'that chance does not explain. Click a field for its trend, and a point there '
                     'for the recording.')
         page.interactive('<h2 id="trend-title">Trend</h2><div id="trend" role="img"></div>'
-                         '<section id="recording" class="card"></section>',
+                         '<section id="recording" class="card" hidden></section>',
                          'fleet-data', json.dumps(_data(fleet, changed, beside), allow_nan=False),
                          _SCRIPT)
     if fleet.errors:
@@ -165,13 +167,13 @@ def fleet_map(fleet: FleetTrends) -> Any:
         x=[x for x, _ in marks], y=[y for _, y in marks], mode='markers', hoverinfo='skip',
         marker={'symbol': 'square-open', 'size': 15, 'color': 'black', 'line': {'width': 2}},
         showlegend=False))
-    button = {'type': 'buttons', 'direction': 'right', 'x': 0, 'y': 1.0, 'xanchor': 'left',
+    button = {'type': 'buttons', 'direction': 'right', 'x': 1.0, 'y': 1.02, 'xanchor': 'right',
               'yanchor': 'bottom', 'buttons': [
                   {'label': label, 'method': 'update',
                    'args': [{'visible': [k == 0, k == 1, True]}]}
-                  for k, label in enumerate(('from its first recordings', "from the fleet"))]}
+                  for k, label in enumerate(('from its start', 'from the fleet'))]}
     figure.update_layout(
-        height=HEAD + ROW * len(robots), updatemenus=[button],
+        height=HEAD + ROW * max(len(robots), LEAST_ROWS), updatemenus=[button],
         xaxis={'tickangle': -60, 'type': 'category', 'automargin': True},
         yaxis={'autorange': 'reversed', 'type': 'category', 'automargin': True},
         margin={'l': 60, 'r': 20, 't': 50, 'b': 140})
@@ -184,7 +186,8 @@ def _field(go: Any, robots: Sequence[str], labels: Sequence[str], values: Array,
         x=labels, y=list(robots), z=[[None if np.isnan(v) else round(float(v), 2) for v in row]
                                      for row in values],
         zmin=-SATURATED, zmax=SATURATED, colorscale='RdBu_r', zmid=0, visible=visible, xgap=1,
-        ygap=1, colorbar={'title': {'text': 'standard<br>deviations'}},
+        ygap=1, colorbar={'title': {'text': 'standard<br>deviations', 'font': {'size': 12}},
+                          'thickness': 14, 'tickvals': [-SATURATED, 0.0, SATURATED]},
         hovertemplate='%{y}<br>%{x}<br>%{z:.1f} standard deviations<extra></extra>')
 
 

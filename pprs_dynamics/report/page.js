@@ -4,7 +4,7 @@
   const dark = matchMedia('(prefers-color-scheme: dark)');
   // Lines that are dark on white, as they are drawn on black.
   const ON_BLACK = {
-    '#666666': '#a9aeb5', '#1a1a1a': '#f2f2f2', '#0072B2': '#56B4E9', '#009E73': '#2fcf9f',
+    '#666666': '#a9aeb5', '#1a1a1a': '#f2f2f2', '#0072B2': '#4C97FF', '#009E73': '#2fcf9f',
     '#D55E00': '#ff8a3d', '#bbbbbb': '#6d737b', '#000000': '#ffffff', '#999999': '#c0c4c9',
   };
   const plots = [...document.querySelectorAll('.plot')];
@@ -56,6 +56,10 @@
     Object.assign(layout, {paper_bgcolor: paper, plot_bgcolor: paper});
     layout.font = {size: 13, color: ink, family: 'system-ui, sans-serif', ...layout.font};
     layout.hoverlabel = {font: {size: 13}, ...layout.hoverlabel};
+    // The button that is active is nearly white in Plotly, whatever the page is.
+    for (const menu of layout.updatemenus ?? []) {
+      Object.assign(menu, {bgcolor: dark.matches ? '#b9bdc2' : '#ffffff', font: {color: '#1a1a1a'}});
+    }
     if (layout.scene) {
       for (const name of ['xaxis', 'yaxis', 'zaxis']) {
         layout.scene[name] = {gridcolor: grid, color: ink, backgroundcolor: paper,

@@ -272,7 +272,7 @@ class Page:
 
 
 def _caption(text: str) -> str:
-    return f'<caption>{escape(text)}</caption>' if text else ''
+    return f'<caption><span>{escape(text)}</span></caption>' if text else ''
 
 
 def _bar(kind: str, share: float) -> str:

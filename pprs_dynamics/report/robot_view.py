@@ -69,13 +69,16 @@ def animate_robot(model: DriveModel, motion: PlatformMotion, title: str) -> Any:
     times = shown.time if shown.time is not None else np.arange(len(shown))
     figure.update_layout(
         title=f'{title}<br><sub>{captions[0]}</sub>', template='plotly_white', height=760,
-        legend={'x': 0.0, 'y': 0.95}, margin={'l': 0, 'r': 0, 't': 70, 'b': 70},
-        scene={'aspectmode': 'data', 'camera': {'eye': {'x': 1.4, 'y': -1.4, 'z': 0.75}},
+        legend={'orientation': 'h', 'x': 0.0, 'y': 1.0, 'yanchor': 'top'},
+        margin={'l': 0, 'r': 0, 't': 70, 'b': 70},
+        scene={'aspectmode': 'data', 'domain': {'y': [0.1, 0.86]},
+               'camera': {'eye': {'x': 1.4, 'y': -1.4, 'z': 0.75}},
                'xaxis_title': 'x [m]', 'yaxis_title': 'y [m]', 'zaxis_title': 'z [m]'},
         updatemenus=[{
-            'type': 'buttons', 'x': 0.02, 'y': 0.06, 'direction': 'left',
+            'type': 'buttons', 'x': 0.0, 'xanchor': 'left', 'y': 0.06, 'direction': 'right',
+            'showactive': False,
             'buttons': [_button('Play', None, 60), _button('Pause', [None], 0)]}],
-        sliders=[{'x': 0.18, 'len': 0.8, 'y': 0.06, 'currentvalue': {'prefix': 'time [s] '},
+        sliders=[{'x': 0.36, 'len': 0.64, 'y': 0.06, 'currentvalue': {'prefix': 'time [s] '},
                   'steps': [_step(f'{time:.2f}', k) for k, time in enumerate(times)]}])
     return figure
 
@@ -120,7 +123,8 @@ def _moving(go: Any, joints: JointPositions, sines: Array, k: int) -> list[Any]:
         hovertext=f'rod {i + 1}: |sin u| = {sines[k, i]:.2f}', hoverinfo='text',
         line={'width': 9, 'color': [sines[k, i]] * 2, 'colorscale': WEAKNESS, 'cmin': 0.0,
               'cmax': 1.0, 'showscale': i == 0,
-              'colorbar': {'title': 'rods: |sin u|<br>0: singular', 'len': 0.5}}) for i in range(3)]
+              'colorbar': {'title': 'rods: |sin u|<br>0: singular', 'len': 0.4, 'thickness': 14,
+                           'x': 1.0, 'xanchor': 'right'}}) for i in range(3)]
     return [
         _lines(go, lifts, LIFT, 'lifts', width=6),
         *rods,

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import accumulate
 from typing import Any
 
 from pprs_dynamics.diagnosis.comparison import Comparison
@@ -25,6 +26,9 @@ from pprs_dynamics.measurement.recording import Summary
 from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.model.reproduction import Claim
 
+# Lines that places take without --details, and characters of a line of 80 columns, which words
+# seldom fill.
+MOST_LINES, LINE = 9, 70
 
 def claims_table(claims: Iterable[Claim]) -> Any:
     """Return the paper's claims against what comes out."""
@@ -88,8 +92,38 @@ def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
             for name, drive in comparison.drives.items()]
 
 
-def comparison_table(comparison: Comparison) -> Any:
-    """Return how wrong the model is, drive by drive."""
+def comparison_view(comparison: Comparison, command: str, details: bool = False) -> Any:
+    """Return how wrong the model is, where, and what to do next.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    command : str
+        That finds out why.
+    details : bool
+        Everything, instead of at most 25 lines of 80 columns.
+    """
+    from rich.console import Group
+    from rich.markup import escape
+
+    lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
+    taken = accumulate(-(-len(line) // LINE) for line in lines)
+    told = [line for line, total in zip(lines, taken, strict=True)
+            if details or total <= MOST_LINES]
+    parts = [_comparison_table(comparison), escape(comparison.verdict), *map(escape, told)]
+    if not lines:
+        parts.append('Nowhere in particular: nothing stands out against noise.')
+    if len(lines) > len(told):
+        parts.append(f'… and {len(lines) - len(told)} more, with --details, --json or --report')
+    if details:
+        parts += [escape(drive.verdict) for drive in comparison.drives.values()]
+    if comparison.is_beyond_noise:
+        parts += ['[bold]Next[/] Find out which physical effect is missing:',
+                  f'  [bold cyan]{escape(command)}[/]']
+    return Group(*parts)
+
+
+def _comparison_table(comparison: Comparison) -> Any:
     from rich.markup import escape
     from rich.table import Table
 

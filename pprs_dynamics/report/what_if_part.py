@@ -42,11 +42,11 @@ noise is larger than with the noise fitted anew, as it is where sets are compare
 changes how others show; with it added or taken away, the figures are only nearly right.</p>
 <div class="sides"><div>
 <p><button type="button">As found</button></p>
-<div class="effects"><table><thead><tr><th scope="col">effect</th><th scope="col">evidence</th></tr>
-</thead><tbody></tbody></table></div></div>
+<div class="effects"><table><thead><tr><th scope="col">effect</th>
+<th scope="col">evidence at this noise</th></tr></thead><tbody></tbody></table></div></div>
 <div><p role="status"></p>
-<div class="scroll"><table class="errors"><caption>Error, rms [N], as given (grey) and with the
-effects ticked (blue); dotted: the noise.</caption><thead><tr>{_HEADINGS}</tr></thead>
+<div class="scroll"><table class="errors"><caption><span>Error, rms [N], as given (grey) and with
+the effects ticked (blue); dotted: the noise.</span></caption><thead><tr>{_HEADINGS}</tr></thead>
 <tbody></tbody></table></div>
 <p class="note">Error over time [s, N]; dotted: two standard deviations of the noise. Drag to zoom,
 on all drives at once; double-click to return.</p><div class="charts"></div></div></div></div>
@@ -86,6 +86,7 @@ def _drive(one: OptionalForces, residuals: Residuals) -> dict[str, Any]:
     at = shown_samples(residuals, one.given, points=POINTS)
     rows = np.concatenate((one.rows, one.error[None], one.given[None]))[:, at]
     rows[:, at < 0] = np.nan
+    rows[-1, ~np.isfinite(rows[-2])] = np.nan  # both curves end where the fit does
     size = np.fmax(np.nanmax(np.abs(rows), axis=1, keepdims=True), 1e-12)
     steps = np.where(np.isfinite(rows), np.round(LARGEST / size * np.nan_to_num(rows)), GAP)
     time = residuals.time[np.where(at < 0, np.roll(at, 1), at)]

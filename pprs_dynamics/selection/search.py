@@ -24,42 +24,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import combinations
 
 import numpy as np
 
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.parallel import each
 from pprs_dynamics.regression.design import Design
-from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.selection.candidates import (
     Candidate,
     CandidateSet,
     EffectCandidate,
-    Placement,
     UnknownCandidate,
     set_key,
 )
 from pprs_dynamics.selection.decisions import Decisions
-from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates
+from pprs_dynamics.selection.scanned_sets import ScannedSets, with_fast_noise
 from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
-# Lowest score of a proposal, and how much worse than the best a replacement may look at the best
-# one's noise: its own noise may favour it by about as much.
-# And how much of what is lost without it a replacement has to make good at that noise.
-PROPOSED, REPLACED, RECOVERED = -12.0, 15.0, 0.9
-
-SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
+# How much worse than the best a replacement may look at the best one's noise (its own noise may
+# favour it by about as much), and how much of what is lost without it it has to make good there.
+REPLACED, RECOVERED = 15.0, 0.9
 
 
-
-class Search(FittedSets):
+class Search(ScannedSets):
     """A search over the candidates of one design.
 
     Parameters
@@ -81,14 +74,17 @@ class Search(FittedSets):
                           for d in self.regression.drives] if with_unknown else [])
         self._report = progress or (lambda share: None)
 
-    def run(self, start: Candidates = ()) -> CandidateSet:
-        """Return the best set that the search reaches."""
+    def run(self, *starts: Candidates) -> CandidateSet:
+        """Return the best set that the search reaches, by effects alone before each further start.
+
+        A pattern of no catalogue stands only beside what effects explain.
+        """
         self.evaluate(())
-        if start:
-            self.refined(self.evaluate(start))
-        else:
-            # Effects first: a pattern of no catalogue stands only beside what effects explain.
+        if starts:
+            self.refined(self.evaluate(starts[0]))
+        for start in starts[1:] or (() if starts else ((),)):
             self._descend(False, 0.0)
+            self.refined(self.evaluate(start))
         if self.patterns:
             self._descend(True, 0.5)
         self._report(1.0)
@@ -103,7 +99,7 @@ class Search(FittedSets):
             before = self.best.cost
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
-                self._try(self._replacements())
+                self._try(self._replacements(self.best))
                 if self.best.cost > before - LEAST_IMPROVEMENT:
                     return
             self._simplify()
@@ -151,55 +147,6 @@ class Search(FittedSets):
                     found += [((*base.candidates, pattern), near) for pattern in patterns]
         return found
 
-    def proposals(self, base: CandidateSet, count: int, drive: int | None = None,
-                  least: float = PROPOSED) -> list[Candidates]:
-        """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
-
-        Parameters
-        ----------
-        base : CandidateSet
-        count : int
-        drive : int, optional
-            Only effects on this one.
-        least : float
-            By which the cost must fall at the set's noise.
-        """
-        scored: list[tuple[float, Callable[[], Candidates]]] = []
-        for effect, found in self._scan(base, drive).items():
-            old = next((c for c in base.effects if c.effect is effect), None)
-            score, chosen = self._best_drives(effect, found, old)
-            if score > least and chosen:
-                scored.append((score, self._joined(base, effect, chosen, old)))
-        scored.sort(key=lambda one: -one[0])
-        return [make() for _, make in scored[:count]]
-
-    def _scan(self, base: CandidateSet, drive: int | None = None,
-              ) -> dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]]:
-        """Return gains less prices of placements, by effect; one for each drive."""
-        library, fit = self.library, base.fit
-        taken = {(c.effect, placement.drive) for c in base.effects for placement in c.placements}
-        found: dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]] = {}
-        drives = tuple(library.local) if drive is None else (drive,)
-        offered = each(lambda d: library.local[d].offers(fit), drives)
-        for d, offers in zip(drives, offered, strict=True):
-            for offer in offers.values():
-                effect = offer.term.effect
-                if (effect, d) not in taken:
-                    price = library.prices.of_placement(
-                        effect, library.local[d].trials[effect.name])
-                    found.setdefault(effect, []).append(
-                        (offer.gain - price, partial(library.full, offer)))
-        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
-        for placement in (*library.structure, *library.spanning) if drive is None else ():
-            key = (placement.term.effect, placement.drive)
-            if key not in taken:
-                net = self.regression.gain(fit, placement.block) - placement.price
-                if key not in best or net > best[key][0]:
-                    best[key] = (net, placement)
-        for (effect, _), (net, placement) in best.items():
-            found.setdefault(effect, []).append((net, partial(_same, placement)))
-        return found
-
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 ) -> CandidateSet | None:
         """Return the best set of one effect alone, on some drives or where it pays.
@@ -231,6 +178,22 @@ class Search(FittedSets):
                 return best
             self.refined(after)
 
+    def rescanned(self, found: CandidateSet) -> CandidateSet:
+        """Return the set with every effect on a drive in the shape that a scan without it finds."""
+        for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.placements
+                          if c.effect.shape and one.drive is not None]:
+            candidate = next(c for c in found.effects if c.effect is effect)
+            others = [one for one in candidate.placements if one.drive != d]
+            rest = tuple(c for c in found.candidates if c is not candidate)
+            less = (*rest, self.library.candidate(effect, others)) if others else rest
+            offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
+            if effect.name in offers:
+                placements = [*others, self.library.full(offers[effect.name])]
+                found = min(found, self.evaluate(
+                    (*rest, self.library.candidate(effect, placements)), found),
+                    key=lambda one: one.cost)
+        return self.refined(found)
+
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate with other coefficients of one placement."""
         for placement in candidate.placements:
@@ -240,37 +203,21 @@ class Search(FittedSets):
                     yield self.library.candidate(candidate.effect, [
                         *rest, self.library.placement(placement.term, names)])
 
-    def _best_drives(
-        self, effect: type[CatalogueEffect],
-        found: list[tuple[float, Callable[[], Placement]]], old: EffectCandidate | None,
-    ) -> tuple[float, list[Callable[[], Placement]]]:
-        """Return the drives on which an effect pays, and the score of all together."""
-        prices = self.library.prices
-        found = sorted(found, key=lambda one: -one[0])
-        if not issubclass(effect, DriveEffect):
-            return found[0][0] - prices.of_name(), [found[0][1]]
-        there = len(old.placements) if old else 0
-        before = prices.of_drives(there) if there else -prices.of_name()
-        nets = np.cumsum([net for net, _ in found])
-        scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
-        best = int(np.argmax(scores))
-        return float(scores[best]), [make for _, make in found[:best + 1]]
+    def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
+                 ) -> CandidateSet:
+        """Return the best of a set and those in which something else stands for one or two."""
+        before = set(self.evaluated)
+        self._try(self._replacements(found))
+        better = [one for key, one in self.evaluated.items()
+                  if key not in before and one.cost < found.total - LEAST_IMPROVEMENT]
+        return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
+                    found)
 
-    def _joined(self, base: CandidateSet, effect: type[CatalogueEffect],
-                chosen: Sequence[Callable[[], Placement]], old: EffectCandidate | None,
-                ) -> Callable[[], Candidates]:
-        def make() -> Candidates:
-            placements = [*(old.placements if old else ()), *(one() for one in chosen)]
-            kept = tuple(c for c in base.candidates if c is not old)
-            return (*kept, self.library.candidate(effect, placements))
-        return make
-
-    def _replacements(self) -> Iterable[tuple[Candidates, CandidateSet]]:
+    def _replacements(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
         """Yield sets in which something else stands for one or two candidates, or for a drive's.
 
-        Under the noise of the best set, so that a replacement that explains as much is seen to.
+        Under the noise of the set, so that a replacement that explains as much is seen to.
         """
-        best = self.best
         rests: list[tuple[Candidates, int | None]] = []
         for size in (1, 2):
             for gone in combinations(best.candidates, size):
@@ -287,7 +234,7 @@ class Search(FittedSets):
                     less = self.library.candidate(candidate.effect, [*others, *kept])
                     rests.append((self._exchanged(best, candidate, less), placement.drive))
         for rest, drive in rests:
-            base = self._at_noise_of(best, rest)
+            base = self.at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
             for candidates in self.proposals(base, REPLACEMENTS, drive, least):
                 yield candidates, best
@@ -347,16 +294,3 @@ class Search(FittedSets):
     @staticmethod
     def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
         return tuple(new if c is old else c for c in found.candidates)
-
-def _same(placement: Placement) -> Placement:
-    return placement
-
-
-def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
-    """Return a fit under the noise that the higher frequencies alone would tell.
-
-    The slow part of a noise spectrum may be what is missing. It only proposes.
-    """
-    amplitudes = fit.amplitudes.copy()
-    amplitudes[:, 1:][:, regression.noise_shapes.is_slow] *= SLOW_LEFT
-    return regression.at(fit.blocks, amplitudes)

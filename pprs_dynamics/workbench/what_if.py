@@ -44,7 +44,8 @@ from pprs_dynamics.selection.expansion import (
     fitted_model,
     linear_prediction,
 )
-from pprs_dynamics.selection.search import Search, with_fast_noise
+from pprs_dynamics.selection.scanned_sets import with_fast_noise
+from pprs_dynamics.selection.search import Search
 
 Place = tuple[int | None, str]
 """Drive, None in the structure, and name of a parameter."""
