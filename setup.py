@@ -45,6 +45,7 @@ setup(
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
+        'arm': ['pin>=3'],
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],

@@ -21,19 +21,23 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pprs_dynamics.errors import PprsError
+    from pprs_dynamics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.mechanism.motion import PlatformMotion
+    from pprs_dynamics.model.arm_model import ArmModel
     from pprs_dynamics.model.axis_model import AxisModel, AxisMotion
     from pprs_dynamics.model.drive_model import DriveForces, DriveModel, ModelState
     from pprs_dynamics.model.model_file import load_model
 
-__all__ = ['AxisModel', 'AxisMotion', 'DriveForces', 'DriveModel', 'ModelState', 'PlatformMotion',
-           'PprsError', 'load_model']
+__all__ = ['ArmModel', 'AxisModel', 'AxisMotion', 'DriveForces', 'DriveModel', 'JointMotion',
+           'ModelState', 'PlatformMotion', 'PprsError', 'load_model']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
+    'ArmModel': 'pprs_dynamics.model.arm_model',
     'AxisModel': 'pprs_dynamics.model.axis_model',
     'AxisMotion': 'pprs_dynamics.model.axis_model',
+    'JointMotion': 'pprs_dynamics.mechanism.joint_motion',
     'DriveForces': 'pprs_dynamics.model.drive_model',
     'DriveModel': 'pprs_dynamics.model.drive_model',
     'ModelState': 'pprs_dynamics.model.drive_model',

@@ -21,7 +21,7 @@ import pytest
 
 from pprs_dynamics import AxisModel
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.diagnosis.quantities import newtons
+from pprs_dynamics.diagnosis.quantities import in_unit
 from pprs_dynamics.diagnosis.rivals import rival_effects
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.recording import Recording
@@ -73,6 +73,6 @@ def test_each_rival_of_the_answer_is_put_into_words(ambiguous: Diagnosis) -> Non
     assert {one.name for one in rivals} == named
     assert len(words.rivals) == len(rivals)
     for said, rival in zip(words.rivals, rivals, strict=True):
-        assert f'{newtons(rival.held_out_after)} on held-out data' in said.why
+        assert f'{in_unit(rival.held_out_after)} on held-out data' in said.why
     assert 'this data cannot tell which' in words.headline
     assert 'next-experiment' in words.command

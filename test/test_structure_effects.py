@@ -36,11 +36,12 @@ from random_states import (
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.effects.catalogue import CATALOGUE
+from pprs_dynamics.effects.effect import PLATFORM
 from pprs_dynamics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.errors import ModelError
 
 EFFECTS = {name: effect for name, effect in CATALOGUE.items()
-           if issubclass(effect, StructureEffect)}
+           if issubclass(effect, StructureEffect) and PLATFORM in effect.acts_in}
 # Forces of some 40 N carry rounding errors near 1e-14 N, and accelerations come by division.
 FORCE_TOLERANCE = 1e-9
 VALUES = {

@@ -110,6 +110,11 @@ class Adoption:
     noise_floors: dict[str, float]
 
     @property
+    def unit(self) -> str:
+        """Unit of errors over all drives."""
+        return self.residuals_before.unit
+
+    @property
     def effect(self) -> str:
         """Name of the effect."""
         return self.request.name
@@ -190,7 +195,7 @@ def adopt(
     else:
         held_out, gains = (fitted.held_out_before, fitted.held_out_after), fitted.block_gains
     promised = linear_error(fitted.search, fitted.found)
-    found += [*objections.of_linearity(promised, rms(after)),
+    found += [*objections.of_linearity(promised, rms(after), after.unit),
               *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
     report(1.0)
     return case.answer(fitted.model, fitted.drives, found, remarks, rivals, fitted.parameters,
@@ -261,7 +266,7 @@ class _Case:
     ) -> Adoption:
         """Return the answer to all objections that were found."""
         adopted = not found or self.force
-        falls = f'{held_out[0]:.4g} to {held_out[1]:.4g} N'
+        falls = f'{held_out[0]:.4g} to {held_out[1]:.4g} {residuals_before.unit}'
         reason = '; '.join(found) or f'the error on {self.held_out} falls from {falls}'
         if not found and not self.validate:
             remarks = [*remarks, 'blocks of the same recordings are weak evidence: give one in '
@@ -292,13 +297,13 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
                      - search.library.prices.of_name())
     refused = [] if evidence > 0 else [
         f'{name} is in the model already, and to fit it anew would gain nothing: the error would '
-        f'go from {rms(before):.4g} to {rms(after):.4g} N (evidence {evidence:.3g}, where 0 is '
-        'the threshold)']
+        f'go from {rms(before):.4g} to {rms(after):.4g} {before.unit} (evidence {evidence:.3g}, '
+        'where 0 is the threshold)']
     held_out = rms(before), hold_out(search, found).error
     if case.validate:
         held_out, gains = case.validated(case.model, fitted, noises)
     if not refused:
-        refused = [*objections.of_linearity(linear_error(search, found), rms(after)),
+        refused = [*objections.of_linearity(linear_error(search, found), rms(after), after.unit),
                    *objections.of_held_out_error(*held_out, gains, case.model, case.held_out)]
     report(1.0)
     effect = next(one for one in fitted.effects if one.name == name)

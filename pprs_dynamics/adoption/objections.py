@@ -29,6 +29,7 @@ from pprs_dynamics.effects.axis_friction import AxisFriction
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.passive_friction import PassiveFriction
+from pprs_dynamics.mechanism.units import common_effort
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.residuals.paired_errors import certainty
 from pprs_dynamics.residuals.residuals import Residuals
@@ -96,18 +97,20 @@ def of_held_out_error(before: float, after: float, gains: Array, model: ForceMod
     where : str
         What was held out, for the sentence.
     """
+    unit = common_effort(model.units)
     sure = certainty(gains)
     asked = FURTHER_ERRORS if any(
         isinstance(effect, CatalogueEffect) for effect in model.effects) else FIRST_ERRORS
     if after < before and sure > asked:
         return []
     if after >= before:
-        return [f'the error on {where} does not fall: {before:.4g} N before, {after:.4g} N after']
-    return [f'the error on {where} falls from {before:.4g} to {after:.4g} N, which is '
+        return [f'the error on {where} does not fall: {before:.4g} {unit} before, '
+                f'{after:.4g} {unit} after']
+    return [f'the error on {where} falls from {before:.4g} to {after:.4g} {unit}, which is '
             f'{sure:.2g} standard errors over blocks, must be more than {asked:g}']
 
 
-def of_linearity(promised: float, found: float) -> list[str]:
+def of_linearity(promised: float, found: float, unit: str) -> list[str]:
     """Return whether a fitted model is far from the linear fit that it was made of.
 
     Columns of shapes and of numbers that bend forces hold near the model only.
@@ -115,12 +118,13 @@ def of_linearity(promised: float, found: float) -> list[str]:
     Parameters
     ----------
     promised, found : float
-        Error on the recordings, of the linear fit and of the model [N].
+        Error on the recordings, of the linear fit and of the model.
+    unit : str
     """
     if found <= BENT * promised:
         return []
-    return [f'fitted with it, the model would leave {found:.4g} N where the fit promises '
-            f'{promised:.4g} N: its parameters are too far from where they started']
+    return [f'fitted with it, the model would leave {found:.4g} {unit} where the fit promises '
+            f'{promised:.4g} {unit}: its parameters are too far from where they started']
 
 
 def of_identifiability(fitted: EffectFit) -> list[str]:

@@ -56,8 +56,8 @@ def diagnosis_key(model: ForceModel, recordings: Sequence[str], topic: str | Non
         Where a recording cannot be read.
     """
     parts = [pprs_dynamics.__version__, sys.version, np.__version__, scipy.__version__,
-             repr(sorted(model.values.items())), type(model).__qualname__, str(topic),
-             *map(fingerprint, recordings), *_code()]
+             repr(sorted(model.values.items())), model.content, type(model).__qualname__,
+             str(topic), *map(fingerprint, recordings), *_code()]
     return hashlib.sha256('\0'.join(parts).encode()).hexdigest()
 
 

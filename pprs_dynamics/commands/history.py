@@ -24,6 +24,7 @@ from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.mechanism.units import common_effort
 from pprs_dynamics.model.ledger import read_steps, without_last_step
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.model.model_writer import write_model
@@ -50,18 +51,18 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     base = check_output(options.output, options.file) if options.undo else options.file
     model = load_model(base)
-    steps = read_steps(model.values)
+    steps, unit = read_steps(model.values), common_effort(model.units)
     if options.undo and not steps:
         print(f'pprs history: {options.file} holds no step that could be taken back',
               file=sys.stderr)
         return 1
-    screen.print(history_view(steps))
+    screen.print(history_view(steps, unit))
     if options.json:
         write_json(options.json, {'steps': [step.to_json() for step in steps]})
     if options.report and options.report.endswith('.png'):
-        screen.print(f'picture: {shown(draw_history(options.report, steps))}')
+        screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')
     elif options.report:
-        page = history_page(Path(options.file).name, steps)
+        page = history_page(Path(options.file).name, steps, unit)
         screen.print(f'page: {shown(page.write(options.report))}')
     if options.undo:
         values, step = without_last_step(model.values)

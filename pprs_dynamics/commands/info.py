@@ -36,10 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    recordings = read_each(options.recordings, options, screen, load_model(options.model))
+    model = load_model(options.model)
+    recordings = read_each(options.recordings, options, screen, model)
     summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
-        screen.print(recording_table(summary))
+        for table in recording_table(summary, model.units):
+            screen.print(table)
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
         if not summary.findings:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from typing import Any
 
 import numpy as np
 from rich.markup import escape
@@ -26,18 +27,25 @@ from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import PAGE, POSES, number, output_file, seed
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings, refuse_inputs
+from pprs_dynamics.experiments.arm_excitation import ArmLimits, excite_arm
 from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.next_experiment import (
     LONGEST,
     PURPOSES,
     SHORTEST,
+    PurposeError,
     check_purpose,
     next_experiment,
 )
+from pprs_dynamics.measurement.joint_motion_files import write_joint_motion
 from pprs_dynamics.measurement.pose_files import write_poses
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.keys import is_arm
+from pprs_dynamics.model.parameter_file import read_parameters
 from pprs_dynamics.report.experiment_page import experiment_page
 from pprs_dynamics.report.experiment_tables import experiment_view
+from pprs_dynamics.report.page import Page
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.terminal import console, shown
 
@@ -50,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser, required=False)
     parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
-                        required=True, help='poses for play_trajectory')
+                        required=True, help='poses for play_trajectory; of an arm, positions, '
+                        'velocities and accelerations of its joints')
     parser.add_argument('--purpose', choices=PURPOSES, default='separate',
                         help='separate: what the recordings leave open (default); commission: '
                         'the first motion of a new robot')
@@ -60,8 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--rate', type=number(1.0, FASTEST, 'Hz'), default=RATE,
                         help='of the poses, as play_trajectory is to play them [Hz] (default 100)')
     parser.add_argument('--velocity', type=number(0.0, 100.0, 'm/s', above=True),
-                        default=LIMITS.velocity,
-                        help=f'limit of every drive [m/s] (default {LIMITS.velocity:g})')
+                        help=f'limit of every drive [m/s] (default {LIMITS.velocity:g}), of an '
+                        "arm's joints [rad/s, m/s] (default that of the URDF)")
     parser.add_argument('--acceleration', type=number(0.0, 1e4, 'm/s^2', above=True),
                         default=LIMITS.acceleration,
                         help=f'limit of every drive [m/s^2] (default {LIMITS.acceleration:g})')
@@ -84,9 +93,12 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     check_purpose(options.purpose, options.recordings)
-    limits = MotionLimits(options.velocity, options.acceleration, options.tilt,
+    base = check_output(options.output, options.model)
+    if is_arm(read_parameters(base)):
+        return _excite_arm(options, screen)
+    limits = MotionLimits(options.velocity or LIMITS.velocity, options.acceleration, options.tilt,
                           options.condition, options.margin)
-    model = DriveModel.load(check_output(options.output, options.model))
+    model = DriveModel.load(base)
     refuse_inputs(options.output, options.recordings)
     recordings = read_recordings(options, screen, model)
     with progress_bar(screen, 'designing') as progress:
@@ -108,4 +120,36 @@ def run(options: argparse.Namespace) -> int:
         page = experiment_page(experiment, motion, command)
         screen.print(f'page: {shown(page.write(options.report))}')
     screen.print(f'[bold]play it[/]: {escape(command)}')
+    return 0
+
+
+def _excite_arm(options: argparse.Namespace, screen: Any) -> int:
+    """Design the first motion of an arm."""
+    model = ArmModel.load(options.model)
+    if options.purpose != 'commission':
+        raise PurposeError(f'purpose {options.purpose}: for an arm only --purpose commission is '
+                           'designed, a motion that excites inertia and friction of all joints')
+    refuse_inputs(options.output, options.recordings)
+    limits = ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
+                       options.margin)
+    with progress_bar(screen, 'designing') as progress:
+        found = excite_arm(model, limits, options.duration, options.seed,
+                           lambda share: progress(share, 1.0))
+    count = int(options.duration * options.rate + 1e-9) + 1
+    write_joint_motion(options.output, model.drives,
+                       found.motion(np.arange(count) / options.rate))
+    screen.print(escape(found.text))
+    assert found.limits is not None
+    screen.print('limits, of what their margin leaves: ' + ', '.join(
+        f'{name} {share:.0%}' for name, share in found.limits.items()))
+    if options.json:
+        write_json(options.json, {**found.to_json(), 'purpose': options.purpose,
+                                  'seed': options.seed, 'rate': options.rate,
+                                  'output': options.output})
+    if options.report:
+        page = Page('The next experiment')
+        page.text(found.text, 'lead')
+        page.table(('limit', 'use'), [(name, f'{share:.0%}')
+                                      for name, share in found.limits.items()])
+        screen.print(f'page: {shown(page.write(options.report))}')
     return 0

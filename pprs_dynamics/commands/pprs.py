@@ -36,8 +36,8 @@ from pprs_dynamics.plain_text import displayed
 from pprs_dynamics.threads import use_one_thread
 
 # Each a module of this folder with a docstring, add_arguments and run.
-COMMANDS = ('adopt', 'compare', 'diagnose', 'history', 'info', 'next-experiment', 'reproduce',
-            'simulate', 'survey', 'trend', 'workbench')
+COMMANDS = ('adopt', 'compare', 'diagnose', 'fit', 'history', 'info', 'next-experiment',
+            'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

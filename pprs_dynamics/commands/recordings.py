@@ -37,7 +37,7 @@ from pprs_dynamics.report.terminal import shown
 def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """Declare RECORDING… and --topic."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
-                        help='rosbag2 folder, .mcap, .db3 or .csv')
+                        help='rosbag2 folder, .mcap, .db3, .csv or .csv.gz')
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
                         'holds several')
 
@@ -86,7 +86,8 @@ def read_each(paths: Sequence[str], options: argparse.Namespace, screen: Any, mo
     recordings = []
     for path in paths:
         with progress_bar(screen, f'reading {displayed(path)}') as progress:
-            recording = read_recording(path, model.drives, options.topic, progress)
+            recording = read_recording(path, model.drives, options.topic, progress, model.gain,
+                                       model.efforts_in_amperes)
             mistakes = find_mistakes(model, recording)
             recordings.append(replace(recording, findings=(*mistakes, *recording.findings)))
     return recordings

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,16 +32,22 @@ from pprs_dynamics.measurement.pose_files import read_poses
 from pprs_dynamics.measurement.recording import Recording, write_recording
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.keys import is_arm
+from pprs_dynamics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.robot_view import write_robot_page
 from pprs_dynamics.report.terminal import console, shown
+from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
+from pprs_dynamics.simulation.arm_run import simulate_arm
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM, draw_effects
 from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import SensorSettings
 
 RATE = 500.0
+NOISE = 0.08  # [N]
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 FEEDFORWARDS = ('friction', 'rigid_body', 'none')
 
@@ -62,8 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--duration', type=number(1.0, LONGEST, 's'), default=40.0,
                         help='of an excitation [s] (default 40)')
     parser.add_argument('--path-seed', type=seed, default=0, help='of an excitation (default 0)')
-    parser.add_argument('--noise', type=number(0.0, 1e3, 'N'), default=0.08,
-                        help='of the efforts, standard deviation [N] (default 0.08)')
+    parser.add_argument('--noise', type=number(0.0, 1e3, 'N'),
+                        help=f'of the efforts, standard deviation [N] (default {NOISE:g}; of an '
+                        'arm [N m, N] half a percent of the largest)')
     parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
                         help='what the robot is driven with (default friction)')
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
@@ -74,6 +82,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     refuse_inputs(options.output, (options.path,))
+    if is_arm(read_parameters(find_file(options.model))):
+        return _run_arm(options, screen)
     model = DriveModel.load(options.model)
     motion = _motion(options)
     forces = model.drive_forces(motion)
@@ -87,7 +97,8 @@ def run(options: argparse.Namespace) -> int:
                                   effort[options.feedforward]),
             effects, seed=options.seed, rate=RATE, truth=False,
             control=ControlSettings(gravity_compensation=options.feedforward == 'none'),
-            sensors=SensorSettings.with_effort_noise(options.noise),
+            sensors=SensorSettings.with_effort_noise(
+                NOISE if options.noise is None else options.noise),
             progress=lambda share: progress(share, 1.0))
     write_recording(options.output, Recording.from_arrays(
         Path(options.output).name, result.time, result.position, result.velocity, result.effort))
@@ -99,6 +110,27 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, _content(options, result))
     hidden = f'{len(effects)} hidden effect{"s" * (len(effects) != 1)}'
     screen.print(f'{len(result.time)} samples at {RATE:g} Hz, {hidden}: {shown(options.output)}')
+    return 0
+
+
+def _run_arm(options: argparse.Namespace, screen: Any) -> int:
+    """Simulate an arm along a random motion."""
+    model = ArmModel.load(options.model)
+    with progress_bar(screen, 'simulating') as progress:
+        result = simulate_arm(
+            model, options.effect, options.seed, options.scale, options.noise, options.duration,
+            options.path_seed, lambda share: progress(share, 1.0))
+    assert result.motion.time is not None
+    write_recording(options.output, Recording.from_arrays(
+        Path(options.output).name, result.motion.time, result.position, None, result.effort,
+        model.drives))
+    if options.json:
+        write_json(options.json, {
+            'recording': options.output, 'samples': len(result.position), 'rate': ARM_RATE,
+            'seed': options.seed, 'effects': list(result.effects), 'notes': []})
+    hidden = f'{len(result.effects)} hidden effect{"s" * (len(result.effects) != 1)}'
+    screen.print(f'{len(result.position)} samples at {ARM_RATE:g} Hz, {hidden}: '
+                 f'{shown(options.output)}')
     return 0
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
-from pprs_dynamics.diagnosis.quantities import listed, newtons, percent
+from pprs_dynamics.diagnosis.quantities import in_unit, listed, percent
 from pprs_dynamics.diagnosis.statements import Statement
 from pprs_dynamics.residuals.residuals import Residuals
 
@@ -63,6 +63,8 @@ class DriveComparison:
     parts : mapping of str to float
         rms of each part of the model, its mean removed [N].
     grade : {'noise', 'good', 'fair', 'poor'}
+    unit : str
+        Of the drive's efforts.
     verdict : str
     """
 
@@ -78,6 +80,7 @@ class DriveComparison:
     unexplained: float
     parts: Mapping[str, float]
     grade: str
+    unit: str
     verdict: str
 
 
@@ -94,6 +97,8 @@ class Comparison:
     verdict : str
     localisation : Localisation
         Where it fails.
+    unit : str
+        Of errors over all drives.
     """
 
     drives: Mapping[str, DriveComparison]
@@ -101,6 +106,7 @@ class Comparison:
     relative: float
     verdict: str
     localisation: Localisation
+    unit: str = 'N'
 
     @property
     def where(self) -> tuple[Statement, ...]:
@@ -149,8 +155,9 @@ def compare(residuals: Residuals, localisation: Localisation | None = None) -> C
     whole = float(np.sqrt(efforts / count))
     constant = all(np.isnan(drive.relative) for drive in drives.values())
     relative = float('nan') if constant else rms / whole
-    told = {one.drive for one in _told(drives, where)}
-    return Comparison(drives, rms, relative, _overall_verdict(drives, told, rms, relative), where)
+    told, unit = {one.drive for one in _told(drives, where)}, residuals.unit
+    return Comparison(drives, rms, relative,
+                      _overall_verdict(drives, told, rms, relative, unit), where, unit)
 
 
 def _compare_drive(
@@ -178,11 +185,12 @@ def _compare_drive(
     parts = {part: _rms(values[known, index] - values[known, index].mean())
              for part, values in residuals.parts.items()}
     grade = _grade(unexplained, floor, swing, constant, parts)
+    unit = residuals.units_of(name).effort
     return DriveComparison(
         rms, relative, bias, peak, swing, explained, len(error),
         float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
-        unexplained, parts, grade, f'{name}: ' + _verdict(
-            rms, swing, relative, floor, unexplained, parts, grade,
+        unexplained, parts, grade, unit, f'{name}: ' + _verdict(
+            rms, swing, relative, floor, unexplained, parts, grade, unit,
             most >= LEAST_SHARE * rms ** 2))
 
 
@@ -201,25 +209,26 @@ def _grade(
 
 def _verdict(
     rms: float, swing: float, relative: float, floor: float, unexplained: float,
-    parts: Mapping[str, float], grade: str, is_told: bool,
+    parts: Mapping[str, float], grade: str, unit: str, is_told: bool,
 ) -> str:
     of = ('of a constant effort' if np.isnan(relative)
-          else f'of {newtons(swing)} ({percent(relative)})')
-    left = f'the model leaves {newtons(rms)} {of}; '
+          else f'of {in_unit(swing, unit)} ({percent(relative)})')
+    left = f'the model leaves {in_unit(rms, unit)} {of}; '
     if rms == 0:
         return f'the model leaves nothing {of}'
     if grade == 'noise':
         return left + ('noise accounts for most of it' if is_told else
                        'noise accounts for it: nothing else stands out in this recording')
-    left += (f'noise accounts for {newtons(floor)}, so {newtons(unexplained)} is unexplained')
+    left += (f'noise accounts for {in_unit(floor, unit)}, so {in_unit(unexplained, unit)} is '
+             'unexplained')
     ranked = sorted(((size, part) for part, size in parts.items() if size > 0), reverse=True)
     below = [(size, part) for size, part in ranked if size < unexplained]
     if below:
         size, part = below[0]
-        left += f' - more than {part.replace("_", " ")} contributes ({newtons(size)})'
+        left += f' - more than {part.replace("_", " ")} contributes ({in_unit(size, unit)})'
     elif ranked:
         size, part = ranked[-1]
-        left += f' - less than {part.replace("_", " ")} contributes ({newtons(size)})'
+        left += f' - less than {part.replace("_", " ")} contributes ({in_unit(size, unit)})'
     return f'{left}: {grade}'
 
 
@@ -230,18 +239,18 @@ def _told(drives: Mapping[str, DriveComparison], where: Localisation) -> tuple[S
 
 
 def _overall_verdict(drives: Mapping[str, DriveComparison], told: Collection[str], rms: float,
-                     relative: float) -> str:
+                     relative: float, unit: str) -> str:
     share = '' if np.isnan(relative) else f' ({percent(relative)} of the effort)'
     beyond = {name: drive for name, drive in drives.items() if drive.grade != 'noise'}
     if not beyond:
         most = f'most of it on {listed(sorted(told))}, for all of it elsewhere' if told else (
             'it on every drive')
-        return f'the model leaves {newtons(rms)}{share}: noise accounts for {most}'
+        return f'the model leaves {in_unit(rms, unit)}{share}: noise accounts for {most}'
     worst = max(beyond, key=lambda name: beyond[name].unexplained)
     where = 'every drive' if len(beyond) == len(drives) > 1 else ', '.join(beyond)
-    return (f'the model leaves {newtons(rms)}{share}: more than noise on {where}; '
-            f'worst on {worst}, {newtons(beyond[worst].unexplained)} unexplained '
-            f'({beyond[worst].grade})')
+    return (f'the model leaves {in_unit(rms, unit)}{share}: more than noise on {where}; '
+            f'worst on {worst}, {in_unit(beyond[worst].unexplained, beyond[worst].unit)} '
+            f'unexplained ({beyond[worst].grade})')
 
 
 def _rms(values: Array) -> float:

@@ -23,7 +23,8 @@ INTERVAL = 2.0  # standard deviations that ± stands for, about 95 %
 # Values below a size are read in another unit: size, factor, name.
 READ_IN = {'m': (1.0, 1e3, 'mm'), 'm/s': (1.0, 1e3, 'mm/s'), 's': (0.1, 1e3, 'ms'),
            'kg': (0.1, 1e3, 'g'), 'rad': (inf, 180 / pi, '°')}
-PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s²'}
+PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s²',
+           'N m s^2/rad^2': 'N m s²/rad²', 'rad/s^2': 'rad/s²'}
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
@@ -44,9 +45,9 @@ def with_uncertainty(value: float, std: float, unit: str) -> str:
     return f'{round(value, decimals):.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
 
 
-def newtons(value: float, digits: int = 3) -> str:
-    """Return a force [N] with as many digits, never as a power of ten."""
-    return f'{plain(value, digits)} N'
+def in_unit(value: float, unit: str = 'N', digits: int = 3) -> str:
+    """Return an effort with as many digits and its unit, never as a power of ten."""
+    return f'{plain(value, digits)} {unit}'
 
 
 def plain(value: float, digits: int = 3) -> str:
@@ -65,12 +66,13 @@ def percent(share: float) -> str:
     return f'{100 * share:.0f}%' if abs(share) >= 0.0995 else f'{plain(100 * share, 2)}%'
 
 
-def change(before: float, after: float) -> str:
-    """Return 'falls from A to B', with digits that show it, or that it does not fall [N]."""
+def change(before: float, after: float, unit: str = 'N') -> str:
+    """Return 'falls from A to B', with digits that show it, or that it does not fall."""
     if after >= before:
-        return f'does not fall ({newtons(before)} before, {newtons(after)} after)'
+        return (f'does not fall ({in_unit(before, unit)} before, {in_unit(after, unit)} '
+                'after)')
     digits = next((n for n in range(3, 7) if plain(before, n) != plain(after, n)), 6)
-    return f'falls from {newtons(before, digits)} to {newtons(after, digits)}'
+    return f'falls from {in_unit(before, unit, digits)} to {in_unit(after, unit, digits)}'
 
 
 def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:

@@ -26,8 +26,8 @@ from pprs_dynamics.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_ste
 from pprs_dynamics.diagnosis.quantities import (
     INTERVAL,
     change,
+    in_unit,
     listed,
-    newtons,
     plain,
     sentence,
     with_drives,
@@ -151,12 +151,12 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    held = [one for one in diagnosis.effects if one.is_confirmed]
+    held, unit = [e for e in diagnosis.effects if e.is_confirmed], diagnosis.residuals.unit
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{change(diagnosis.effects[0].error_before, held[-1].error_after)}')
+        f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]])
@@ -165,7 +165,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
-    noise = newtons(diagnosis.noise_floor)
+    noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
@@ -205,7 +205,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 
 
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
-    card = found.effect.card
+    card = found.effect.card_in(diagnosis.model.kind)
     title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
     lacks = f'The model lacks {title}' if found.is_confirmed else (
         f'Fitted, but not confirmed: {title}')
@@ -221,15 +221,15 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    card = rival.effect.card
+    card = rival.effect.card_in(diagnosis.model.kind)
     title = with_drives(rival.name, rival.drives, diagnosis.residuals.drives)
     held_out = '' if isnan(rival.held_out_after) else (
-        f', and {newtons(rival.held_out_after)} on held-out data')
+        f', and {in_unit(rival.held_out_after, diagnosis.residuals.unit)} on held-out data')
     return Finding(
         f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '
         f'{_parameters(diagnosis, rival)}.',
-        f'With it the error is {newtons(rival.error_after)}{held_out}; the cost of the set is '
-        f'{plain(rival.cost, 2)} above the best one.', sentence(card.causes),
+        f'With it the error is {in_unit(rival.error_after, diagnosis.residuals.unit)}{held_out}; '
+        f'the cost of the set is {plain(rival.cost, 2)} above the best one.', sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like))
 
 
@@ -267,16 +267,16 @@ def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
 
 
 def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
-    fresh = diagnosis.held_out_on == 'validation'
+    fresh, unit = diagnosis.held_out_on == 'validation', diagnosis.residuals.unit
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
-    held_out += change(found.held_out_before, found.held_out_after)
+    held_out += change(found.held_out_before, found.held_out_after, unit)
     held_out += '' if found.is_confirmed else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'With it the error {change(found.error_before, found.error_after)}. {held_out}. '
-            f'Evidence {found.evidence:.0f}, where 0 is the threshold.')
+    return (f'With it the error {change(found.error_before, found.error_after, unit)}. '
+            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
 def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
@@ -315,13 +315,14 @@ def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
             forces.setdefault(drive, {})[parameter.name] = one
     remarks = []
     for drive, both in forces.items():
+        unit = diagnosis.residuals.units_of(drive).effort
         forward, backward = (both[key].value if key in both else 0.0
                              for key in ('force_forward', 'force_backward'))
         remarks.append(
             f'{drive}: the dry part is the same as coulomb_friction of '
-            f'{newtons((forward + backward) / 2)} plus effort_offset of '
-            f'{newtons((forward - backward) / 2)}; data of moving drives cannot tell the one from '
-            'the two, a reading at rest can.')
+            f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
+            f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the one '
+            'from the two, a reading at rest can.')
     return remarks
 
 
@@ -340,8 +341,9 @@ def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:
 
 def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
     return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}, '
-            f'{newtons(one.rms)} rms, is within the model error of {listed(one.of)}: a real '
-            'machine is only nearly of the form that the catalogue gives it. Not adopted')
+            f'{in_unit(one.rms, diagnosis.residuals.unit)} rms, is within the model error of '
+            f'{listed(one.of)}: a real machine is only nearly of the form that the catalogue '
+            'gives it. Not adopted')
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:

@@ -22,20 +22,31 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.selection.candidates import UnknownCandidate
 from pprs_dynamics.selection.patterns import Pattern
 from pprs_dynamics.selection.unknown import PatternLibrary
 
-# How a variable is called, and the unit it is read in: factor from SI, and name.
+# How a variable is called, and the unit it is read in: factor from SI, and name. Those of drives
+# that push, and of those that turn.
 UNITS = {
     'position': (1e3, 'mm'), 'velocity': (1e3, 'mm/s'), 'acceleration': (1.0, 'm/s²'),
     'load': (1.0, 'N'), 'rod_angle': (180 / np.pi, 'deg'), 'platform_x': (1e3, 'mm'),
     'platform_y': (1e3, 'mm'), 'platform_z': (1e3, 'mm'), 'platform_tilt': (180 / np.pi, 'deg'),
     'platform_turn': (180 / np.pi, 'deg'), 'time': (1.0, 's'), 'frequency': (1.0, 'Hz'),
 }
-WORDS = {'load': 'guide load', 'rod_angle': 'rod angle', 'platform_x': 'platform x',
+TURNING = {'position': (180 / np.pi, 'deg'), 'velocity': (1.0, 'rad/s'),
+           'acceleration': (1.0, 'rad/s²'), 'load': (1.0, 'N m')}
+WORDS = {'load': 'load', 'rod_angle': 'rod angle', 'platform_x': 'platform x',
          'platform_y': 'platform y', 'platform_z': 'platform z', 'platform_tilt': 'platform tilt',
          'platform_turn': 'platform turn'}
+
+
+def read_in(variable: str, units: DriveUnits) -> tuple[float, str]:
+    """Return the factor from SI and the unit in which people read a variable of a drive."""
+    name = variable.partition(' of ')[0]
+    found: tuple[float, str] = (TURNING if units.turns and name in TURNING else UNITS)[name]
+    return found
 
 
 @dataclass(frozen=True)
@@ -155,32 +166,36 @@ def _sentence(
     share: float, time: float, shape: Array,
 ) -> str:
     kind, word = pattern.kind, _words(variable)
+    residuals = library.residuals
+    units = residuals.units_of(residuals.drives[library.d])
+    effort = units.effort
     if kind == 'offset':
-        return (f'its error has a mean of {signed:+.3g} N over the whole recording, '
+        return (f'its error has a mean of {signed:+.3g} {effort} over the whole recording, '
                 f'{share:.0%} of its squared error')
     if kind == 'friction':
-        return (f'its error has the sign of the motion, {amplitude:.3g} N: friction is too '
+        return (f'its error has the sign of the motion, {amplitude:.3g} {effort}: friction is too '
                 f'{"small" if signed > 0 else "large"} in the model; this is {share:.0%} of its '
                 'squared error')
     if kind == 'ripple':
-        factor, unit = UNITS['position']
-        return (f'its error repeats about every {pattern.scale * factor:.3g} {unit} of position, '
-                f'{amplitude:.3g} N; this is {share:.0%} of its squared error')
+        factor, place = read_in('position', units)
+        return (f'its error repeats about every {pattern.scale * factor:.3g} {place} of position, '
+                f'{amplitude:.3g} {effort}; this is {share:.0%} of its squared error')
     if kind == 'line':
-        return (f'its error holds a vibration at {pattern.scale:.4g} Hz of {amplitude:.3g} N, '
-                f'{share:.0%} of its squared error')
+        return (f'its error holds a vibration at {pattern.scale:.4g} Hz of {amplitude:.3g} '
+                f'{effort}, {share:.0%} of its squared error')
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
         low, high = _ends(library, variable, shape, kind == 'directed_growth')
-        return (f'its error changes with {word}: {low:+.3g} N at its least, {high:+.3g} N at its '
-                f'greatest{opposed}; this is {share:.0%} of its squared error')
+        return (f'its error changes with {word}: {low:+.3g} {effort} at its least, '
+                f'{high:+.3g} {effort} at its greatest{opposed}; this is '
+                f'{share:.0%} of its squared error')
     place = _place(variable, pattern, library)
     where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'
     if kind == 'scatter':
         return (f'{where}; it scatters there {np.sqrt(pattern.scale):.2g} times as much as '
                 'elsewhere')
     along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
-    return f'{where}; it is shifted there by {signed:+.3g} N{along}'
+    return f'{where}; it is shifted there by {signed:+.3g} {effort}{along}'
 
 
 def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
@@ -188,7 +203,8 @@ def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
     low, high = pattern.limits
     if variable == 'direction':
         return 'in the positive direction' if low >= 0 else 'in the negative direction'
-    factor, unit = UNITS[variable.partition(' of ')[0]]
+    of = variable.partition(' of ')[2] or library.residuals.drives[library.d]
+    factor, unit = read_in(variable, library.residuals.units_of(of))
     word = _words(variable)
     values = library.values(variable)
     speed = pattern.kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')

@@ -20,6 +20,7 @@ import copy
 from dataclasses import replace
 from typing import Any
 
+from pprs_dynamics.mechanism.arm import Arm
 from pprs_dynamics.mechanism.robot import Robot
 
 
@@ -34,3 +35,10 @@ def with_masses(robot: Robot, **masses: Any) -> Robot:
     for name, value in masses.items():
         object.__setattr__(altered, name, value)
     return replace(robot, masses=altered)
+
+
+def with_payload(robot: Robot | Arm, mass: float) -> Robot | Arm:
+    """Return the robot with a mass more [kg]: at the platform's centre, or at the tool."""
+    if isinstance(robot, Arm):
+        return robot.with_payload(mass)
+    return with_masses(robot, payload=robot.masses.payload + mass)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Friction and constant force of a single axis."""
+"""Friction and constant force of drives that carry no load in guides: an axis, an arm's joints."""
 
 from __future__ import annotations
 
@@ -32,24 +32,25 @@ class AxisFriction(Effect):
 
     Parameters
     ----------
-    viscous : float
-        F_v [N s/m].
-    coulomb : float
-        F_c [N].
+    viscous : float or (D,) tuple
+        F_v, of all drives or of each [N s/m, N m s/rad].
+    coulomb : float or (D,) tuple
+        F_c [N, N m].
     """
 
     name: ClassVar[str] = 'active_friction'
-    viscous: float
-    coulomb: float
+    viscous: float | tuple[float, ...]
+    coulomb: float | tuple[float, ...]
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
-        """Return the drive's force, (N, 1) [N]."""
-        force: Array = self.viscous * state.velocity + self.coulomb * state.direction
+        """Return the drives' forces, (N, D) [N, N m]."""
+        force: Array = (np.asarray(self.viscous) * state.velocity
+                        + np.asarray(self.coulomb) * state.direction)
         return force
 
     def dry(self, guide_load: Array) -> Array:
         """Return the dry friction in full motion [N], in the shape of the guide's load."""
-        return np.full_like(guide_load, self.coulomb)
+        return np.full_like(guide_load, np.asarray(self.coulomb))
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,13 @@ class AxisOffset(Effect):
 
     Parameters
     ----------
-    value : float
-        [N]
+    value : float or (D,) tuple
+        [N, N m]
     """
 
     name: ClassVar[str] = 'offset'
-    value: float
+    value: float | tuple[float, ...]
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
-        """Return the drive's force, (N, 1) [N]."""
-        return np.full_like(state.velocity, self.value)
+        """Return the drives' forces, (N, D) [N, N m]."""
+        return np.full_like(state.velocity, np.asarray(self.value))

@@ -26,8 +26,9 @@ from dataclasses import replace
 from math import cos, sin
 from typing import ClassVar
 
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.mechanism.arm import Arm
 from pprs_dynamics.mechanism.robot import Robot
 
 
@@ -35,6 +36,7 @@ class BaseTilt(BodyEffect):
     """Gravity turned by x about the x axis of `base`, then by y about its y axis."""
 
     name: ClassVar[str] = 'base_tilt'
+    acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = True
     linear = tuple(
@@ -49,8 +51,17 @@ class BaseTilt(BodyEffect):
         'the model with a wrong direction',
         'put a spirit level on the base; shim one foot by 5 mm and repeat: the error must change',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
+    arm_card = Card(
+        'g -> R_y(alpha_y) R_x(alpha_x) g, in base',
+        'errors of all joints that depend on the pose alone: the first joint, which carries no '
+        'weight on a level base, shows it best where its axis should be upright',
+        'an arm mounted on a slope, a wall or a moving carriage, gravity in the model with a wrong '
+        'direction',
+        'put a spirit level on the base; let the arm stretch out and turn the first joint: its '
+        'effort at rest must change with the angle',
+        'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
-    def changed(self, robot: Robot) -> Robot:
+    def changed(self, robot: Robot | Arm) -> Robot | Arm:
         """Return the robot under the turned gravity."""
         g_x, g_y, g_z = robot.gravity
         x, y = self.values['x'], self.values['y']

@@ -42,7 +42,9 @@ from pprs_dynamics.effects.guard import guard
 from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.hysteresis import Hysteresis
 from pprs_dynamics.effects.load_friction import LoadFriction
+from pprs_dynamics.effects.payload_inertia import PayloadInertia
 from pprs_dynamics.effects.payload_mass import PayloadMass
+from pprs_dynamics.effects.payload_moment import PayloadMoment
 from pprs_dynamics.effects.payload_offset import PayloadOffset
 from pprs_dynamics.effects.platform_drag import PlatformDrag
 from pprs_dynamics.effects.platform_inertia import PlatformInertia
@@ -78,7 +80,9 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         HomingError,
         Hysteresis,
         LoadFriction,
+        PayloadInertia,
         PayloadMass,
+        PayloadMoment,
         PayloadOffset,
         PlatformDrag,
         PlatformInertia,

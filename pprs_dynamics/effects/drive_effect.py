@@ -24,9 +24,9 @@ from typing import Any, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.effects.effect import CatalogueEffect, names
-from pprs_dynamics.errors import ModelError, UnknownNameError
-from pprs_dynamics.mechanism.robot import AXIS, DRIVES
+from pprs_dynamics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.mechanism.state import DriveStates
 
 
@@ -62,12 +62,15 @@ class DriveRange:
         Between the lowest and the highest position [m].
     top_speed : float
         [m/s]
+    gear_ratio : float
+        Turns of the motor per turn of the drive; 1 where no gear is known.
     """
 
     duration: float
     step: float
     stroke: float
     top_speed: float
+    gear_ratio: float = 1.0
 
 
 class DriveEffect(CatalogueEffect):
@@ -76,6 +79,8 @@ class DriveEffect(CatalogueEffect):
     Its force is linear in the coefficients: the sum of coefficient times column. What is not
     linear (`shape`) enters the columns.
     """
+
+    acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
@@ -165,9 +170,6 @@ class DriveEffect(CatalogueEffect):
         if not isinstance(values, Mapping) or not values:
             raise ModelError(prefix, values, 'map drives to parameters, e.g. lift_1: '
                              f'{{{names(cls.parameters)}}}')
-        for drive in values:
-            if drive not in (*DRIVES, AXIS):
-                raise UnknownNameError('drive', drive, DRIVES, prefix)
         return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
                     for drive, block in values.items()})
 

@@ -41,6 +41,14 @@ class DriveInertia(DriveEffect):
         'force must grow fourfold; a payload would act on all drives and at rest, this does not',
         'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
         'on the inertia of rotors')
+    arm_card = Card(
+        'm q_ddot',
+        'an error that follows the acceleration of this joint alone',
+        'the rotor: its inertia times the square of the gear ratio acts at the joint, often more '
+        'than that of the links; arm.armature holds it',
+        'take it from the data sheet of the motor; move this joint alone, fast: the error must '
+        'grow with the square of the frequency',
+        'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

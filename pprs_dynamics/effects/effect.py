@@ -26,6 +26,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.mechanism.state import MechanismState
 
+# Kinds of models.
+PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -159,7 +162,10 @@ class CatalogueEffect(Effect):
 
     Class attributes
     ----------------
-    card : Card
+    card, arm_card : Card
+        The latter where an arm needs other words.
+    acts_in : set of {'platform', 'axis', 'arm'}
+        The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
     linear, shape : tuple of Parameter
     parameters : tuple of Parameter
         Both.
@@ -185,6 +191,8 @@ class CatalogueEffect(Effect):
     """
 
     card: ClassVar[Card]
+    arm_card: ClassVar[Card | None] = None
+    acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()
     parameters: ClassVar[tuple[Parameter, ...]]
@@ -225,6 +233,11 @@ class CatalogueEffect(Effect):
     @abstractmethod
     def to_file(self) -> dict[str, Any]:
         """Return the block from which `from_file` makes this effect."""
+
+    @classmethod
+    def card_in(cls, kind: str) -> Card:
+        """Return the description for a kind of model."""
+        return cls.arm_card if kind == ARM and cls.arm_card is not None else cls.card
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

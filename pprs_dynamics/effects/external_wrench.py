@@ -25,8 +25,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.mechanism.arm import ArmState
 from pprs_dynamics.mechanism.rigid_body import StructureLoad
 from pprs_dynamics.mechanism.state import MechanismState
 
@@ -35,9 +36,13 @@ MOMENTS = tuple(f'moment_{axis}' for axis in 'xyz')
 
 
 class ExternalWrench(BodyEffect):
-    """The wrench that the drives apply to the world at o: pulled down, force_z is positive."""
+    """The wrench that the drives apply to the world at o, or at an arm's tool.
+
+    Pulled down, force_z is positive.
+    """
 
     name: ClassVar[str] = 'external_wrench'
+    acts_in = frozenset({PLATFORM, ARM})
     bends_columns: ClassVar[bool] = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',
@@ -55,8 +60,16 @@ class ExternalWrench(BodyEffect):
         'and look whether the same force is found. Only accelerations tell a downward force '
         'from a payload',
         'Tsai, Robot Analysis, 1999')
+    arm_card = Card(
+        'tau = J^T (F, M), F and M in base at the origin of the tool',
+        'errors that depend on the pose alone, whatever the speed, in the proportions of the '
+        'Jacobian of the tool',
+        'a hose or cable that pulls at the tool, a balancer, contact with a workpiece',
+        'take away whatever touches the tool and repeat. Only accelerations and turns of the tool '
+        'tell a downward force from a payload',
+        'Tsai, Robot Analysis, 1999')
 
-    def load(self, state: MechanismState) -> StructureLoad:
+    def load(self, state: MechanismState | ArmState) -> StructureLoad:
         """Return the wrench, the same for every sample."""
         wrench = np.array([self.values[p.name] for p in self.parameters])
         samples = len(state.velocity)

@@ -70,6 +70,16 @@ class ForceRipple(DriveEffect):
         'coupling and repeat: cogging moves with the motor',
         'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
         'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
+    arm_card = Card(
+        'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
+        'a wave over the angle of the joint, always at the same places, both ways and at any '
+        'speed; over time its frequency follows the speed',
+        'the gear: the wave generator of a harmonic drive ripples twice a turn of the motor (p is '
+        'pi over the gear ratio), teeth of other gears once a tooth; cogging of the motor',
+        'compare 2 pi / p with the gear ratio and numbers of teeth and poles; creep to and fro: '
+        'peaks must stay in place',
+        'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
+        'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
@@ -108,11 +118,16 @@ class ForceRipple(DriveEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return pitches from the stroke down to a 120th of it or 0.8 mm, evenly in stroke / p."""
+        """Return pitches from the stroke down to a 120th of it or 0.8 mm, evenly in stroke / p.
+
+        Of a gear those of one and of two waves a turn of the motor, too.
+        """
         stroke = np.clip(covered.stroke, 1e-5, 10.0)
         most = np.clip(stroke / SHORTEST, 1, MOST)
-        return [{'pitch': float(stroke / periods)}
-                for periods in np.arange(FEWEST, max(most, FEWEST) + STEP / 2, STEP)]
+        of_gear = [TURN / (waves * covered.gear_ratio) for waves in (1, 2)]
+        return [{'pitch': float(pitch)} for pitch in (
+            *(stroke / np.arange(FEWEST, max(most, FEWEST) + STEP / 2, STEP)),
+            *(of_gear if covered.gear_ratio > 1 else ()))]
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

@@ -28,13 +28,15 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 
 
 class HomingError(MeasurementEffect):
     """The whole mechanism stands elsewhere than its encoders say."""
 
     name: ClassVar[str] = 'homing_error'
+    # No force of an axis depends on its zero.
+    acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = True
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
@@ -46,6 +48,13 @@ class HomingError(MeasurementEffect):
         'a homing switch that moved, a lost encoder count, an index pulse one turn away, a '
         'drive mounted a little aside',
         'home the drive again and repeat; check the zero with a gauge block',
+        'Merlet, Parallel Robots, 2006')
+    arm_card = Card(
+        'measured position = q + z',
+        'an error of this joint and of those before it, that depends on the pose: the weight '
+        'pulls in another direction than the model thinks',
+        'an encoder that lost counts, a joint put together one tooth aside, zeros of another arm',
+        'move to the zero marks of the arm; measure an angle with a level',
         'Merlet, Parallel Robots, 2006')
 
     def position_error(self, drives: Sequence[str]) -> Array:

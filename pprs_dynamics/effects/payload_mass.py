@@ -24,16 +24,18 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from pprs_dynamics.effects.altered_masses import with_masses
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.altered_masses import with_payload
+from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.effects.structure_effect import BodyEffect
+from pprs_dynamics.mechanism.arm import Arm
 from pprs_dynamics.mechanism.robot import Robot
 
 
 class PayloadMass(BodyEffect):
-    """Mass more at the centre of mass, as a point: the inertia about it stays."""
+    """Mass more as a point: at the platform's centre of mass, at the origin of an arm's tool."""
 
     name: ClassVar[str] = 'payload_mass'
+    acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     linear = (Parameter('mass', 'm_+', 'kg', 'mass beyond masses.payload', -1e3, 1e3,
                         scale=0.1),)
@@ -47,7 +49,16 @@ class PayloadMass(BodyEffect):
         'change by just that weight. Only accelerations tell it from a constant downward force, '
         'so move fast',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+    arm_card = Card(
+        'tau -> tau + what moves a mass m_+ at the origin of the tool',
+        'an error of the joints that carry the arm, as large as its weight times its distance from '
+        'each axis, and with it one that follows the accelerations of the tool',
+        'a tool or workpiece that the model was not told of, or one that was taken off; a hose or '
+        'cable that hangs on the wrist',
+        'weigh what hangs on the flange; repeat without it, or with a known weight more. A gain of '
+        'the drives that is wrong by 5 % makes this mass wrong by 5 %',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Robot) -> Robot:
+    def changed(self, robot: Robot | Arm) -> Robot | Arm:
         """Return the robot with the other payload."""
-        return with_masses(robot, payload=robot.masses.payload + self.values['mass'])
+        return with_payload(robot, self.values['mass'])

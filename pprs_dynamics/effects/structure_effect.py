@@ -23,7 +23,6 @@ from typing import Any, Self
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.mechanism.rigid_body import StructureLoad
-from pprs_dynamics.mechanism.robot import Robot
 from pprs_dynamics.mechanism.state import MechanismState
 
 
@@ -62,21 +61,21 @@ class BodyEffect(StructureEffect):
     loads: the model applies it before it evaluates friction.
     """
 
-    def changed(self, robot: Robot) -> Robot:
-        """Return the robot with the effect; by default as it was."""
+    def changed(self, robot: Any) -> Any:
+        """Return the robot, a `Robot` or an `Arm`, with the effect; by default as it was."""
         return robot
 
-    def load(self, state: MechanismState) -> StructureLoad | None:
+    def load(self, state: Any) -> StructureLoad | None:
         """Return a load beside bodies and gravity; None, the default, for none."""
         return None
 
-    def apply(self, state: MechanismState) -> MechanismState:
-        """Return the state with the effect in its rigid body."""
+    def apply(self, state: Any) -> Any:
+        """Return the state, a `MechanismState` or an `ArmState`, with the effect in its bodies."""
         return state.loaded(self.changed(state.robot), self.load(state))
 
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return the change of the rigid body's drive forces [N], (N, 6)."""
-        added: Array = self.apply(state).rigid_body.force - state.rigid_body.force
+    def force(self, state: Any, memory: Any = None) -> Array:
+        """Return the change of the rigid body's drive forces [N, N m], (N, D)."""
+        added: Array = self.apply(state).rigid_force - state.rigid_force
         return added
 
 

@@ -32,12 +32,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from scipy.linalg import null_space
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.mechanism.joint_series import resting_series
 from pprs_dynamics.mechanism.motion import PlatformMotion
 
 FREEDOMS = 6  # x, y, z [m]; turns about z, then y, then x [rad]
@@ -74,7 +73,7 @@ class FourierFamily:
         Each is about the excursion of one series that satisfies the conditions.
         """
         rows = np.reshape(parameters, (FREEDOMS, -1))
-        coefficients = np.stack([_resting(tuple(row.tolist())) @ own
+        coefficients = np.stack([resting_series(tuple(row.tolist())) @ own
                                  for row, own in zip(self.harmonics, rows, strict=True)])
         K = self.harmonics.shape[1]
         return FourierPath(self.duration, self.harmonics, coefficients[:, :K],
@@ -144,20 +143,6 @@ def joined_motion(paths: Sequence[FourierPath], time: Array) -> PlatformMotion:
             'linear_acceleration', 'angular_acceleration'))
     times = np.concatenate([time + k * pause for k in range(len(paths))])
     return PlatformMotion(position, orientation, v, omega, a, epsilon, times)
-
-
-@cache
-def _resting(harmonics: tuple[int, ...]) -> Array:
-    """Return a basis of all (a, b) that start and end at rest, each of unit peak, (2 K, p)."""
-    k = np.array(harmonics, dtype=float)
-    zero = np.zeros_like(k)
-    conditions = np.stack([np.concatenate(row) for row in (
-        (zero, k / k.max()), ((k / k.max()) ** 2, zero), (zero, (k / k.max()) ** 3))])
-    basis = null_space(conditions)
-    angle = 2 * np.pi * k[:, None] * np.arange(GRID) / GRID
-    waves = np.concatenate((np.cos(angle) - 1, np.sin(angle)))
-    result: Array = basis / np.abs(basis.T @ waves).max(axis=1)
-    return result
 
 
 def _quaternions(psi: Array, theta: Array, phi: Array) -> Array:

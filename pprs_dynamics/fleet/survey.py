@@ -205,7 +205,8 @@ def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
 
 def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
     model = _model(job.model, tuple(job.values.items()))
-    recording = read_recording(path, model.drives, job.topic)
+    recording = read_recording(path, model.drives, job.topic, None, model.gain,
+                               model.efforts_in_amperes)
     summary = describe(recording)
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}

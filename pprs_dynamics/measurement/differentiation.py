@@ -187,7 +187,7 @@ def representative(stretches: Sequence[Stretch]) -> list[Stretch]:
 
 
 def choose_smoothing(
-    stretches: Sequence[Stretch], duration: float | None = None,
+    stretches: Sequence[Stretch], duration: float | None = None, unit: str = 'm',
 ) -> Smoothing:
     """Return the window that leaves the least error in accelerations.
 
@@ -202,6 +202,8 @@ def choose_smoothing(
         Long enough for the shortest window.
     duration : float, optional
         Take this window [s], and only say what it leaves.
+    unit : str
+        Of the positions.
 
     References
     ----------
@@ -230,8 +232,8 @@ def choose_smoothing(
     text = (
         f'velocities and accelerations come from polynomials of order {ORDER} through the '
         f'positions over {window * step:.3g} s ({window} samples, cut-off {chosen.cut_off:.3g} '
-        f'Hz), {given}: positions have {_rms(noise) * 1e6:.2g} um rms of noise, accelerations '
-        f'keep {_rms(errors[window]):.2g} m/s^2 rms of error')
+        f'Hz), {given}: positions have {_rms(noise) * 1e6:.2g} u{unit} rms of noise, accelerations '
+        f'keep {_rms(errors[window]):.2g} {unit}/s^2 rms of error')
     return Smoothing(window * step, noise, noise * chosen.noise_gain(1), errors[window], text)
 
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
+from pprs_dynamics.measurement.bandwidth import motion_bandwidth
 from pprs_dynamics.measurement.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
@@ -34,7 +35,7 @@ from pprs_dynamics.measurement.differentiation import (
     representative,
 )
 from pprs_dynamics.measurement.sampling_grid import SamplingGrid, find_grid
-from pprs_dynamics.measurement.treatment import block_length
+from pprs_dynamics.measurement.treatment import block_duration, block_length
 
 # Where fewer blocks than this share of the measured samples' have an effort in every sample,
 # efforts come less often than positions, and blocks are single samples.
@@ -92,7 +93,8 @@ class DriveMotion:
     notes: tuple[str, ...]
 
 
-def smooth_drives(recording: Measured, window: float | None = None) -> DriveMotion:
+def smooth_drives(recording: Measured, window: float | None = None,
+                  blocks_per_period: float = 0.0, unit: str = 'm') -> DriveMotion:
     """Return the motion of a recording's drives, with one window for all of them.
 
     Parameters
@@ -101,6 +103,10 @@ def smooth_drives(recording: Measured, window: float | None = None) -> DriveMoti
         Or anything with its arrays and segments.
     window : float, optional
         Duration of the window [s], instead of the choice from the data.
+    blocks_per_period : float
+        See `block_duration`.
+    unit : str
+        Of positions, for the notes.
 
     Raises
     ------
@@ -117,7 +123,7 @@ def smooth_drives(recording: Measured, window: float | None = None) -> DriveMoti
     grids, told = _grids(recording, segments)
     stretches = representative([_stretch(recording, part, grid)
                                 for part, grid in zip(segments, grids, strict=True)])
-    smoothing = choose_smoothing(stretches, window)
+    smoothing = choose_smoothing(stretches, window, unit)
     recorded = better_recorded(stretches, smoothing)
     notes = [smoothing.text, *told, *_velocity_notes(recording, recorded)]
 
@@ -126,10 +132,12 @@ def smooth_drives(recording: Measured, window: float | None = None) -> DriveMoti
     block_starts: list[np.ndarray] = []
     index: list[np.ndarray] = []
     count = 0
-    block = _block(recording, segments, grids, notes)
+    duration = block_duration(motion_bandwidth(stretches, smoothing) if blocks_per_period
+                              else 0.0, blocks_per_period)
+    block = _block(recording, segments, grids, duration, notes)
     for part, grid in zip(segments, grids, strict=True):
         filter_ = smoothing.polynomial(grid.step)
-        kept, starts = _blocks(grid, filter_.half, block or block_length(grid.step))
+        kept, starts = _blocks(grid, filter_.half, block or block_length(grid.step, duration))
         if len(starts):
             parts.append(_drive_motion(recording, part, grid, filter_, kept, recorded))
             block_starts.append(starts + count)
@@ -146,7 +154,7 @@ def smooth_drives(recording: Measured, window: float | None = None) -> DriveMoti
     q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return DriveMotion(
         q, q_dot, q_ddot, np.concatenate(index), spans, np.concatenate(block_starts),
-        block or block_length(longest.step), smoothing, recorded, tuple(notes))
+        block or block_length(longest.step, duration), smoothing, recorded, tuple(notes))
 
 
 def _grids(
@@ -191,13 +199,13 @@ def _velocity_notes(recording: Measured, recorded: np.ndarray) -> list[str]:
 
 def _block(
     recording: Measured, segments: Sequence[slice], grids: Sequence[SamplingGrid],
-    notes: list[str],
+    duration: float, notes: list[str],
 ) -> int | None:
     """Return 1 where efforts are too sparse for blocks, else None."""
     measured = whole = 0
     for part, grid in zip(segments, grids, strict=True):
         known = np.isfinite(recording.effort[part])
-        block = block_length(grid.step)
+        block = block_length(grid.step, duration)
         measured += int(known.sum())
         count = len(known) // block * block
         whole += block * int(known[:count].reshape(-1, block, known.shape[1]).all(axis=1).sum())
@@ -205,7 +213,7 @@ def _block(
         notes.append('efforts come less often than positions: single samples are compared, '
                      'without a mean')
         return 1
-    block = block_length(grids[0].step)
+    block = block_length(grids[0].step, duration)
     notes.append(f'effort and model are both averaged over blocks of {block} samples; a block '
                  'with a missing effort does not count')
     return None

@@ -26,14 +26,16 @@ from pprs_dynamics.errors import ConvergenceError
 from pprs_dynamics.measurement.drive_motion import DriveMotion
 from pprs_dynamics.measurement.samples import Progress
 from pprs_dynamics.mechanism.forward_motion import find_pose_jumps, solve_forward_motion
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import AXIS, DRIVES, Geometry
-from pprs_dynamics.model.axis_model import AxisModel, AxisMotion
+from pprs_dynamics.mechanism.robot import DRIVES, Geometry
+from pprs_dynamics.model.arm_model import ArmModel
+from pprs_dynamics.model.axis_model import AxisModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
-Motion = PlatformMotion | AxisMotion
+Motion = PlatformMotion | JointMotion
 
 
 class FollowedMotion(NamedTuple):
@@ -70,24 +72,30 @@ class Kinematics(Protocol):
 
 
 def kinematics_of(model: ForceModel | Geometry) -> Kinematics:
-    """Return the kinematics of a model of either kind, or of a 3-PPRS's geometry."""
-    if isinstance(model, AxisModel):
-        return AxisKinematics()
+    """Return the kinematics of a model of any kind, or of a 3-PPRS's geometry."""
+    if isinstance(model, (AxisModel, ArmModel)):
+        return JointKinematics(model.drives)
     if isinstance(model, DriveModel):
         return PlatformKinematics(model.robot.geometry)
     assert isinstance(model, Geometry)
     return PlatformKinematics(model)
 
 
-class AxisKinematics:
-    """A single axis: its motion is the drive's."""
+class JointKinematics:
+    """A single axis or an arm: its motion is the drives'.
 
-    drives = (AXIS,)
+    Parameters
+    ----------
+    drives : tuple of str
+    """
+
+    def __init__(self, drives: tuple[str, ...]) -> None:
+        self.drives = drives
 
     def follow(self, time: Array, drives: DriveMotion,
                progress: Progress | None = None) -> FollowedMotion:
-        """Return the drive's motion."""
-        return FollowedMotion(AxisMotion(drives.position, drives.velocity, drives.acceleration),
+        """Return the drives' motion."""
+        return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
                               np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
 
 

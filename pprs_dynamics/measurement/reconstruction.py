@@ -33,6 +33,7 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.differentiation import Smoothing
 from pprs_dynamics.measurement.drive_motion import Measured, smooth_drives
 from pprs_dynamics.measurement.followed_motion import CHUNK, Motion, kinematics_of
+from pprs_dynamics.measurement.rests import find_rests
 from pprs_dynamics.measurement.samples import Progress
 from pprs_dynamics.measurement.treatment import Treatment
 from pprs_dynamics.mechanism.robot import Geometry
@@ -45,7 +46,7 @@ class Chunk:
 
     Parameters
     ----------
-    motion : PlatformMotion or AxisMotion
+    motion : PlatformMotion or JointMotion
         With times.
     samples, blocks : slice
         Its place in the reconstruction, before and after treatment.
@@ -72,10 +73,10 @@ class Reconstruction:
         [s].
     position, velocity, acceleration : (N, D) arrays
         Of the drives, smoothed [m, m/s, m/s^2].
-    motion : PlatformMotion or AxisMotion
+    motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
-        As measured [N]; NaN where it was not.
+        As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
     index : (N,) int array
         The samples' places in the recording.
     segments : tuple of slice
@@ -91,6 +92,8 @@ class Reconstruction:
         See `ForwardKinematics`.
     jumps : (J,) int array
         Samples before which the pose jumps.
+    gain : (D,) array
+        By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
         Samples of the recording's segments that are not here: edges and short segments.
     notes : tuple of str
@@ -116,9 +119,19 @@ class Reconstruction:
     dropped: int
     notes: tuple[str, ...]
     start: float
+    gain: Array
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def recorded_share(self, model: ForceModel) -> Array:
+        """Return by what a model's efforts are multiplied to be those of the recording, (D,).
+
+        1, but for currents that another gain than the model's made efforts of.
+        """
+        if model.gain is None:
+            return np.ones_like(self.gain)
+        return np.where(np.isfinite(self.gain), self.gain / np.asarray(model.gain), 1.0)
 
     def chunks(self, samples: int = CHUNK) -> Iterator[Chunk]:
         """Yield whole blocks of at most about `samples` samples, segment by segment."""
@@ -166,21 +179,49 @@ def reconstruct(
         order = ', in this order' if len(kinematics.drives) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(kinematics.drives)}{order}', 'shape')
-    drives = smooth_drives(recording, window)
+    if isinstance(model, ForceModel):
+        unit = 'rad' if all(one.turns for one in model.units) else 'm'
+        drives = smooth_drives(recording, window, model.blocks_per_period, unit)
+    else:
+        drives = smooth_drives(recording, window)
     if isinstance(model, ForceModel) and np.any(model.position_error):
         drives = replace(drives, position=drives.position - model.position_error)
     time, total = recording.time[drives.index], len(drives.index)
+    effort = _efforts(model, recording)[drives.index]
     followed = kinematics.follow(time, drives, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
              *followed.notes(time)]
+    rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
+    if np.any(rests):
+        shares = (f'{name} {share:.0%}' for name, share in zip(
+            kinematics.drives, rests.mean(axis=0), strict=True) if share >= 0.005)
+        notes.append('efforts of drives that stand do not count, static friction holds any: '
+                     + (', '.join(shares) or 'less than 0.5% of the time'))
     return Reconstruction(
         time, drives.position, drives.velocity, drives.acceleration, followed.motion,
-        recording.effort[drives.index], drives.index, drives.segments,
+        effort, drives.index, drives.segments,
         Treatment(drives.block_starts, total), drives.smoothing, drives.block,
         drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
-        float(recording.time[0]))
+        float(recording.time[0]), _applied_gain(recording))
+
+
+def _applied_gain(recording: Measured) -> Array:
+    """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
+    gain: Array | None = getattr(recording, 'gain', None)
+    return np.full(len(recording.drives), np.nan) if gain is None else gain
+
+
+def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
+    """Return the efforts of a recording, NaN where a drive stands."""
+    effort = recording.effort
+    if isinstance(model, ForceModel) and model.rest_speed:
+        effort = effort.copy()
+        for part in recording.segments:
+            step = float(np.median(np.diff(recording.time[part])))
+            effort[part][find_rests(recording.position[part], step, model.rest_speed)] = np.nan
+    return effort
 
 
 def treated_forces(
@@ -207,12 +248,15 @@ def treated_forces(
         See `DriveModel.drive_forces`.
     """
     treated: dict[str, Array] = {}
+    share = reconstruction.recorded_share(model)
     state = model.initial_state(reconstruction.start)
     for chunk in reconstruction.chunks():
         if chunk.is_start:
             state = model.initial_state(reconstruction.start)
         forces = model.measured(model.drive_forces(chunk.motion, state), state)
-        for name, values in {**forces.parts, 'total': forces.total, **more(forces)}.items():
+        efforts = {name: values * share
+                   for name, values in {**forces.parts, 'total': forces.total}.items()}
+        for name, values in {**efforts, **more(forces)}.items():
             if name not in treated:
                 treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
             treated[name][chunk.blocks] = chunk.treat(values)

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
@@ -57,6 +58,9 @@ class Recording:
         Whole seconds that `time` counts from: 0 for clocks that start near 0.
     source : str
         Format and topic.
+    gain : (D,) array or None
+        By which recorded currents were multiplied [N m/A, N/A]; NaN for drives whose efforts were
+        recorded, None where all were.
 
     Raises
     ------
@@ -74,6 +78,7 @@ class Recording:
     segments: tuple[slice, ...] = field(default=())
     epoch: int = 0
     source: str = ''
+    gain: Array | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.drives))
@@ -190,7 +195,8 @@ class Summary:
 
 def read_recording(
     path: str | PathLike[str], drives: tuple[str, ...] = DRIVES, topic: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, gain: Sequence[float] | None = None,
+    in_amperes: bool = False,
 ) -> Recording:
     """Read a rosbag2 directory, a bare .mcap or .db3 file, or a CSV: the content decides.
 
@@ -203,11 +209,16 @@ def read_recording(
         Of sensor_msgs/JointState, or prefix of CSV columns; needed where there are several.
     progress : callable, optional
         Called with (done, total) now and then.
+    gain : (D,) sequence, optional
+        Effort per ampere, for what was recorded as a current.
+    in_amperes : bool
+        Whether efforts are currents, too; columns named `current` always are.
 
     Raises
     ------
     UnreadableFileError
-        Where the file is missing, damaged, of another kind, or lacks a drive.
+        Where the file is missing, damaged, of another kind, or lacks a drive; and for currents
+        without a gain.
     MissingLibraryError
         For a bag, where rosbags is not installed.
     """
@@ -223,12 +234,28 @@ def read_recording(
         if isinstance(error, UnreadableFileError):
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
-    recording = _judged(displayed(path.name), samples)
+    samples, applied = _as_efforts(path, samples, gain, in_amperes)
+    recording = replace(_judged(displayed(path.name), samples), gain=applied)
     if not len(recording.time):
         raise UnreadableFileError(
             path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '
             'finite positions of all drives')
     return recording
+
+
+def _as_efforts(path: Path, samples: Samples, gain: Sequence[float] | None, in_amperes: bool,
+                ) -> tuple[Samples, Array | None]:
+    """Return samples with currents times the gain, and the gain where it was applied."""
+    currents = np.array(samples.in_amperes or [False] * len(samples.drives)) | in_amperes
+    if not np.any(currents):
+        return samples, None
+    if gain is None:
+        names = ', '.join(np.array(samples.drives)[currents])
+        raise UnreadableFileError(path, f'there are currents of {names}, but only the model of an '
+                                  'arm has a gain, by which they become efforts')
+    applied: Array = np.where(currents, np.asarray(gain), np.nan)
+    efforts = np.where(currents, samples.effort * np.asarray(gain), samples.effort)
+    return replace(samples, effort=efforts, in_amperes=()), applied
 
 
 def write_recording(

@@ -120,6 +120,8 @@ class Samples:
         Format and topic, for people.
     findings : tuple of Finding
         What the reader of the file has to tell.
+    in_amperes : tuple of D bool
+        Drives whose `effort` is a current [A]; () for none.
     """
 
     drives: tuple[str, ...]
@@ -130,6 +132,7 @@ class Samples:
     epoch: int = 0
     source: str = ''
     findings: tuple[Finding, ...] = field(default=())
+    in_amperes: tuple[bool, ...] = ()
 
     def take(self, index: Indices | Mask) -> Samples:
         """Return the samples of an index or mask."""

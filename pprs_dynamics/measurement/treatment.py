@@ -18,6 +18,9 @@ Samples of effort are noisy and correlated; means of 0.01 s keep all that moves 
 and a fifth of the samples. The mean is linear and the same for both sides of a comparison. Were
 only one of them filtered, each reversal of a drive would leave a difference that looks like
 friction.
+
+Arms move ten times as slowly as a parallel robot, and their currents hold the ripple of motor and
+gear: blocks follow the motion there, as the model says.
 """
 
 from __future__ import annotations
@@ -26,12 +29,27 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 
-BLOCK_DURATION = 0.01  # [s]
+BLOCK_DURATION, LONGEST_BLOCK = 0.01, 0.05  # [s]
 
 
-def block_length(step: float) -> int:
-    """Return how many samples, `step` apart [s], make a block."""
-    return max(1, round(BLOCK_DURATION / step))
+def block_duration(bandwidth: float, blocks_per_period: float) -> float:
+    """Return how long blocks are [s].
+
+    Parameters
+    ----------
+    bandwidth : float
+        Of the motion [Hz].
+    blocks_per_period : float
+        Of a motion at that frequency; 0 where blocks are of `BLOCK_DURATION` whatever moves.
+    """
+    if not blocks_per_period:
+        return BLOCK_DURATION
+    return min(max(1 / (blocks_per_period * bandwidth), BLOCK_DURATION), LONGEST_BLOCK)
+
+
+def block_length(step: float, duration: float = BLOCK_DURATION) -> int:
+    """Return how many samples, `step` apart [s], make a block of a duration [s]."""
+    return max(1, round(duration / step))
 
 
 class Treatment:

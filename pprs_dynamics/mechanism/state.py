@@ -170,6 +170,11 @@ class MechanismState:
                             self.kinematics.inverse_table, self.printed, self.load)
 
     @property
+    def rigid_force(self) -> Array:
+        """Frictionless drive forces [N], (N, 6)."""
+        return self.rigid_body.force
+
+    @property
     def time(self) -> Array | None:
         """Times of the samples [s], (N,), where known."""
         return self.motion.time

@@ -29,52 +29,23 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.axis_friction import AxisFriction, AxisOffset
-from pprs_dynamics.effects.drive_effect import DriveEffect
-from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.effects.homing_error import HomingError
-from pprs_dynamics.effects.load_friction import LoadFriction
+from pprs_dynamics.effects.effect import SINGLE_AXIS
 from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.mechanism.robot import AXIS
 from pprs_dynamics.model.effects_block import added_effects
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
-from pprs_dynamics.model.keys import AXIS_KEYS, is_axis
+from pprs_dynamics.model.keys import AXIS_KEYS, is_arm, is_axis
 from pprs_dynamics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
-
-@dataclass(frozen=True)
-class AxisMotion:
-    """N samples of the drive's motion.
-
-    Parameters
-    ----------
-    position, velocity, acceleration : (N, 1) arrays
-        [m, m/s, m/s^2]
-    time : (N,) array, optional
-        [s]
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    time: Array | None = None
-
-    def __len__(self) -> int:
-        return len(self.position)
-
-    def __getitem__(self, samples: slice) -> AxisMotion:
-        return AxisMotion(self.position[samples], self.velocity[samples],
-                          self.acceleration[samples],
-                          None if self.time is None else self.time[samples])
-
-    def with_time(self, time: Array) -> AxisMotion:
-        """Return the motion at given times."""
-        return AxisMotion(self.position, self.velocity, self.acceleration, time)
+# The motion of an axis is that of its only drive.
+AxisMotion = JointMotion
 
 
 @dataclass(frozen=True)
-class AxisState(AxisMotion):
+class AxisState(JointMotion):
     """A motion with the quantities that effects on drives take."""
 
     reversal: Reversal = field(default_factory=Reversal)
@@ -117,6 +88,7 @@ class AxisModel(ForceModel):
         See `ForceModel`; friction and offset are the first effects.
     """
 
+    kind: ClassVar[str] = SINGLE_AXIS
     title: ClassVar[str] = 'a single axis'
     drives: ClassVar[tuple[str, ...]] = (AXIS,)
     keys = AXIS_KEYS
@@ -149,24 +121,15 @@ class AxisModel(ForceModel):
             a 3-PPRS.
         """
         with source_of_errors(source):
-            if not is_axis(parameters):
+            if not is_axis(parameters) or is_arm(parameters):
                 raise ModelError('axis.mass', MISSING, 'be given: this needs a single axis')
             values = checked_values(parameters)
             friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])
             effects = (friction, AxisOffset(values['axis.offset']),
-                       *added_effects(parameters, cls))
+                       *added_effects(parameters, cls, cls.drives))
             return cls(mass=values['axis.mass'], gravity=values['axis.gravity'], effects=effects,
                        reversal=Reversal(values['friction.reversal_velocity']), values=values,
                        source=source)
-
-    @classmethod
-    def offers(cls, effect: type[CatalogueEffect]) -> bool:
-        """Return whether an effect can act here: in the drive, and not by load or by zero.
-
-        No force of the axis depends on where its zero is, and its guide's load is constant, so
-        that load_friction is coulomb_friction.
-        """
-        return issubclass(effect, DriveEffect) and effect not in (HomingError, LoadFriction)
 
     def drive_forces(self, motion: AxisMotion, state: ModelState | None = None) -> AxisForces:
         """Return the forces that the drive must apply for a motion.

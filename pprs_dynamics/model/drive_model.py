@@ -26,7 +26,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.active_friction import ActiveFriction
-from pprs_dynamics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.effects.effect import PLATFORM, Effect
 from pprs_dynamics.effects.passive_friction import (
     IndependentChainsFriction,
     JointFriction,
@@ -42,7 +42,7 @@ from pprs_dynamics.mechanism.robot import DRIVES, Geometry, Masses, Robot
 from pprs_dynamics.mechanism.state import MechanismState, solve_mechanism
 from pprs_dynamics.model.effects_block import added_effects
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
-from pprs_dynamics.model.keys import KEYS, is_axis
+from pprs_dynamics.model.keys import KEYS, is_arm, is_axis
 from pprs_dynamics.model.limits import Limits
 from pprs_dynamics.model.one_pass import FORCES, OnePass
 from pprs_dynamics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
@@ -119,6 +119,7 @@ class DriveModel(ForceModel):
         See `ForceModel`; the paper's friction comes first.
     """
 
+    kind: ClassVar[str] = PLATFORM
     title: ClassVar[str] = 'a 3-PPRS'
     drives: ClassVar[tuple[str, ...]] = DRIVES
     keys = KEYS
@@ -159,10 +160,12 @@ class DriveModel(ForceModel):
             a single axis.
         """
         with source_of_errors(source):
-            axis = next((name for name in parameters if is_axis((name,))), None)
-            if axis is not None:
-                raise ModelError(axis, parameters[axis], 'not be given: this needs a 3-PPRS, and '
-                                 'a single axis is for pprs compare, diagnose, adopt and history')
+            other = next((name for name in parameters if is_axis((name,)) or is_arm((name,))),
+                         None)
+            if other is not None:
+                kind = 'a serial arm' if is_arm((other,)) else 'a single axis'
+                raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
+                                 f'{kind} is for pprs compare, diagnose, adopt, fit and history')
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:
@@ -172,16 +175,12 @@ class DriveModel(ForceModel):
                           Masses(**_group(values, 'masses.')), values['gravity'])
             limits = Limits(**_group(values, 'limits.'))
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
-                       _passive_friction(values, limits), *added_effects(parameters, cls))
+                       _passive_friction(values, limits),
+                       *added_effects(parameters, cls, cls.drives))
             _require_bodies(robot, effects)
             reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
                        equations=values['equations'], values=values, source=source)
-
-    @classmethod
-    def offers(cls, effect: type[CatalogueEffect]) -> bool:
-        """Return True: the catalogue is that of this robot."""
-        return True
 
     def mechanism(self, motion: PlatformMotion) -> MechanismState:
         """Return drive motion, Jacobians and frictionless forces for a platform motion.

@@ -31,9 +31,9 @@ LISTS = ('effects.active', 'effects.measured')
 
 
 def added_effects(
-    parameters: Mapping[str, Any], kind: type[ForceModel],
+    parameters: Mapping[str, Any], kind: type[ForceModel], drives: tuple[str, ...],
 ) -> Iterator[CatalogueEffect]:
-    """Yield the effects that are active in a model of a kind, all blocks checked."""
+    """Yield the effects that are active in a model of a kind with drives, all blocks checked."""
     active = parameters.get('effects.active', [])
     if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
         raise ModelError('effects.active', active, 'be a list of names of effects')
@@ -49,7 +49,7 @@ def added_effects(
         found = find_effect(name)
         if found is None:
             raise UnknownNameError('effect', name, catalogue(), 'effects')
-        _check_place(name, block, found, kind)
+        _check_place(name, block, found, kind, drives)
         # A block that is not active is checked all the same, but may still be incomplete.
         effect = found.from_file(block, complete=name in active)
         if name in active:
@@ -62,14 +62,14 @@ def added_effects(
 
 
 def _check_place(name: str, block: Any, effect: type[CatalogueEffect],
-                 kind: type[ForceModel]) -> None:
+                 kind: type[ForceModel], drives: tuple[str, ...]) -> None:
     """Raise ModelError where an effect is not one of this kind of model, or on another drive."""
     if not kind.offers(effect):
         raise ModelError(f'effects.{name}', block, 'be an effect that acts in ' + kind.title)
     if issubclass(effect, DriveEffect) and isinstance(block, Mapping):
         for drive in block:
-            if drive not in kind.drives:
-                raise UnknownNameError('drive', drive, kind.drives, f'effects.{name}')
+            if drive not in drives:
+                raise UnknownNameError('drive', drive, drives, f'effects.{name}')
 
 
 def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
@@ -88,9 +88,9 @@ def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> 
         target = name.removeprefix('tolerances.')
         if target == name:
             continue
-        if target not in keys or keys[target].choices:
+        if target not in keys or not keys[target].is_number:
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
-                                                 if not keys[key].choices])
+                                                 if keys[key].is_number])
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
             raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
 

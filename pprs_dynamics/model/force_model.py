@@ -34,6 +34,7 @@ from pprs_dynamics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.mechanism.reversal import Reversal
 from pprs_dynamics.mechanism.state import DriveStates
+from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.model.keys import Key
 
 RIGID_BODY = 'rigid_body'
@@ -114,26 +115,78 @@ class ForceModel(ABC):
 
     Class attributes
     ----------------
+    kind : {'platform', 'axis', 'arm'}
+        Effects say in which kinds they act.
     title : str
         What it is a model of, for a sentence.
+
+    Attributes
+    ----------
     drives : tuple of D str
     keys : dict of str to Key
         Of its files.
     """
 
+    kind: ClassVar[str]
     title: ClassVar[str]
-    drives: ClassVar[tuple[str, ...]]
-    keys: ClassVar[dict[str, Key]]
 
     effects: tuple[Effect, ...]
     reversal: Reversal
     values: Mapping[str, Any] = field(default_factory=dict)
     source: str = ''
 
-    @classmethod
+    @property
     @abstractmethod
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+
+    @property
+    @abstractmethod
+    def keys(self) -> dict[str, Key]:
+        """Keys of its files, by name."""
+
+    @property
+    def units(self) -> tuple[DriveUnits, ...]:
+        """Units of the drives' quantities."""
+        return (DriveUnits(),) * len(self.drives)
+
+    @property
+    def content(self) -> str:
+        """What the model is built from beside its values: a hash of further files."""
+        return ''
+
+    @property
+    def gain(self) -> tuple[float, ...] | None:
+        """Effort per ampere of each drive; None for a model without."""
+        return None
+
+    @property
+    def gear_ratios(self) -> tuple[float, ...]:
+        """Turns of the motor per turn of each drive; 1 where no gear is known."""
+        return (1.0,) * len(self.drives)
+
+    @property
+    def efforts_in_amperes(self) -> bool:
+        """Whether efforts of recordings are currents."""
+        return False
+
+    @property
+    def rest_speed(self) -> float:
+        """Speed below which a drive that stays there stands, and its effort tells nothing.
+
+        0 where efforts at rest count as well.
+        """
+        return 0.0
+
+    @property
+    def blocks_per_period(self) -> float:
+        """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
+        return 0.0
+
+    @classmethod
     def offers(cls, effect: type[CatalogueEffect]) -> bool:
         """Return whether an effect of the catalogue can act in what this is a model of."""
+        return cls.kind in effect.acts_in
 
     @abstractmethod
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:

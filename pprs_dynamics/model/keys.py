@@ -20,8 +20,9 @@ The file loader, the nodes' parameter descriptors and the documentation read thi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from pprs_dynamics.errors import ModelError
@@ -51,6 +52,10 @@ class Key:
         True where 0 is not allowed either.
     choices : tuple of str
         Words that are allowed, for a key that holds one; () for numbers.
+    is_text : bool
+        True for a name, or a list of names.
+    may_be_empty : bool
+        True for a list that says nothing where it is empty.
     default : object
         Value where a file is silent; None where the file must have it.
     """
@@ -63,13 +68,23 @@ class Key:
     upper: float = math.inf
     positive: bool = False
     choices: tuple[str, ...] = ()
+    is_text: bool = False
+    may_be_empty: bool = False
     default: Any = None
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it holds numbers, not words."""
+        return not (self.choices or self.is_text)
 
     @property
     def rule(self) -> str:
         """The requirement on a value, completing "must ..."."""
         if self.choices:
             return f'be one of {", ".join(self.choices)} ({self.description})'
+        if self.is_text:
+            form = 'be a name' if self.size is None else 'be a list of names'
+            return f'{form} ({self.description})'
         form = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
         return self._described(f'{form} {self._bounds}' if self._bounds else form)
 
@@ -95,12 +110,19 @@ class Key:
                 raise ModelError(self.name, value, self.rule)
             return value
         if self.size is None:
-            return self._number(value, value)
+            return self._name(value, value) if self.is_text else self._number(value, value)
         if isinstance(value, (str, bytes)) or not hasattr(value, '__len__'):
             raise ModelError(self.name, value, self.rule)
-        if len(value) != self.size:
+        if len(value) != self.size and not (self.may_be_empty and not len(value)):
             raise ModelError(self.name, list(value), self.rule)
+        if self.is_text:
+            return tuple(self._name(element, list(value)) for element in value)
         return tuple(self._number(element, list(value)) for element in value)
+
+    def _name(self, element: Any, value: Any) -> str:
+        if not isinstance(element, str) or not element:
+            raise ModelError(self.name, value, self.rule)
+        return element
 
     def _number(self, element: Any, value: Any) -> float:
         if isinstance(element, bool) or not isinstance(element, (int, float)):
@@ -176,6 +198,51 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 )}
 
 
+EFFORT_UNITS = ('N m', 'N', 'A')
+ARM_URDF, ARM_JOINTS, ARM_GAIN = 'arm.urdf', 'arm.joints', 'arm.gain'
+
+
+@cache
+def arm_keys(count: int) -> dict[str, Key]:
+    """Return the keys of a serial arm with that many joints."""
+    zeros, ones = (0.0,) * count, (1.0,) * count
+
+    def joints(name: str, description: str, unit: str = '', **more: Any) -> Key:
+        return Key(name, f'{description}, of each of arm.joints', unit, size=count,
+                   **{'default': zeros, **more})
+
+    def links(name: str, description: str, unit: str, each: int) -> Key:
+        return Key(name, f'{description}; without it, as the URDF says', unit, size=each * count,
+                   may_be_empty=True, default=())
+
+    return {key.name: key for key in (
+        Key(ARM_URDF, "path of the arm's URDF, from the folder of this file", is_text=True),
+        Key('arm.base', 'link that stands', is_text=True),
+        Key('arm.tool', 'link that carries the load', is_text=True),
+        Key(ARM_JOINTS, 'revolute and prismatic joints that are driven', size=count,
+            is_text=True),
+        joints(ARM_GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
+               default=ones),
+        joints('arm.gear_ratio', 'turns of the motor per turn of the joint', '', positive=True,
+               default=ones),
+        Key('arm.effort_unit', 'unit of the efforts of recordings; A: times arm.gain',
+            choices=EFFORT_UNITS, default=EFFORT_UNITS[0]),
+        Key('arm.gravity', 'gravity in the base', 'm/s^2', size=3, default=(0.0, 0.0, -9.81)),
+        joints('arm.armature', 'inertia of the rotor, seen at the joint', 'kg m^2, kg', lower=0),
+        links('links.mass', 'mass of what each joint moves up to the next', 'kg', 1),
+        links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m', 3),
+        links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2', 6),
+        joints('friction.viscous', 'F_v, viscous friction', 'N m s/rad, N s/m', lower=0),
+        joints('friction.coulomb', 'F_c, dry friction', 'N m, N', lower=0),
+        joints('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
+        Key('friction.reversal_velocity', 'width in which sgn turns over', 'rad/s, m/s',
+            positive=True, default=0.01),
+        joints('friction.reversal_velocities',
+               'width in which sgn turns over; 0: friction.reversal_velocity', 'rad/s, m/s',
+               lower=0),
+    )}
+
+
 # Blocks whose keys are not listed one by one.
 ADDED = ('effects.', 'tolerances.', 'history.')
 
@@ -185,9 +252,21 @@ def is_axis(names: Iterable[str]) -> bool:
     return any(name.startswith('axis.') for name in names)
 
 
-def keys_of(names: Iterable[str]) -> dict[str, Key]:
-    """Return the keys of the kind of model that some of its keys belong to."""
-    return AXIS_KEYS if is_axis(names) else KEYS
+def is_arm(names: Iterable[str]) -> bool:
+    """Return whether keys are those of a serial arm."""
+    return any(name.startswith('arm.') for name in names)
+
+
+def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
+    """Return the keys of the kind of model that some keys and values belong to."""
+    if is_arm(parameters):
+        joints = parameters.get(ARM_JOINTS, ())
+        return arm_keys(len(joints) if isinstance(joints, (list, tuple)) and joints else 1)
+    return AXIS_KEYS if is_axis(parameters) else KEYS
+
+
+# Names of all keys of the model, of whatever kind.
+NAMES = frozenset({*KEYS, *AXIS_KEYS, *arm_keys(1)})
 
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.

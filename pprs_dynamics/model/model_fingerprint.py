@@ -21,9 +21,12 @@ import json
 from typing import Any
 
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.keys import ARM_URDF
 
 
 def fingerprint(model: ForceModel) -> str:
     """Return the SHA-256 of the values in force, which changes with every parameter."""
     values: dict[str, Any] = dict(model.values)
+    if model.content:
+        values[ARM_URDF] = model.content  # wherever the file lies
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()

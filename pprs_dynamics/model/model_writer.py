@@ -41,7 +41,7 @@ from pprs_dynamics.effects.catalogue import find_effect
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.atomic_file import write_text
-from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, as_list, keys_of
+from pprs_dynamics.model.keys import ARM_JOINTS, ARM_URDF, Key, as_list, keys_of
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.parameter_file import other_nodes, parse_parameters, read_parameters
 
@@ -74,12 +74,17 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
     UnreadableFileError
         Where a file cannot be read or written.
     """
+    folder = Path(path).absolute().parent
+    if ARM_URDF in values:
+        # Files say where the URDF is from where they are.
+        urdf = Path(base or path).absolute().parent / values[ARM_URDF]
+        values = {**values, ARM_URDF: os.path.relpath(urdf, folder)}
     if base is None:
-        write_text(path, format_model(values))
+        write_text(path, format_model(values, str(path)))
         return
     refuse_same_file(path, base)
     write_text(path, edit_model(Path(base).read_text(encoding='utf-8'),
-                                {**kept_parameters(base), **values}))
+                                {**kept_parameters(base), **values}, str(path)))
 
 
 def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> None:
@@ -97,24 +102,31 @@ def kept_parameters(base: str | PathLike[str]) -> dict[str, Any]:
             if key not in keys and key.split('.')[0] not in (*WRITTEN, 'tolerances')}
 
 
-def format_model(values: Mapping[str, Any]) -> str:
+def format_model(values: Mapping[str, Any], path: str = '') -> str:
     """Return a complete model file, its keys in order and with their units.
+
+    Parameters
+    ----------
+    values : mapping
+    path : str
+        Of the file that it is for; paths in values count from its folder.
 
     Raises
     ------
     ModelError
         For values that are no model.
     """
-    build_model(values)
-    ordered = {key: values[key] for key in keys_of(values) if key in values}
+    build_model(values, path)
+    keys = keys_of(values)
+    ordered = {key: values[key] for key in keys if key in values}
     ordered.update((key, value) for key, value in values.items() if key not in ordered
                    and not key.startswith(tuple(f'{block}.' for block in WRITTEN)))
-    lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH),
+    lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH, keys),
              *_written_blocks(values)]
     return _verified('\n'.join(lines) + '\n', values)
 
 
-def edit_model(text: str, values: Mapping[str, Any]) -> str:
+def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
     """Return the text of a model file with other values.
 
     Parameters
@@ -124,13 +136,15 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
     values : mapping
         All flat keys and values that it shall hold; keys that it does not hold and that have
         their default stay out.
+    path : str
+        See `format_model`.
 
     Raises
     ------
     ModelError
         For values that are no model.
     """
-    build_model(values)
+    build_model(values, path)
     old = parse_parameters(text)
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()
@@ -143,7 +157,7 @@ def edit_model(text: str, values: Mapping[str, Any]) -> str:
         pass
     # A file of a form that cannot be edited in place.
     others = other_nodes(text)
-    return format_model(values) + (yaml.safe_dump(others, sort_keys=False) if others else '')
+    return format_model(values, path) + (yaml.safe_dump(others, sort_keys=False) if others else '')
 
 
 class _NotEditableError(Exception):
@@ -179,8 +193,16 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
         if key.value.split('.')[0] in WRITTEN:
             changes.append((starts[key.start_mark.line], starts[_last_line(node) + 1], ''))
     indent = block.value[0][0].start_mark.column
-    blocks = '\n'.join([*(f'{" " * indent}{key}: {_value(value)}' for key, value in new.items()),
-                        *_written_blocks(wanted, indent)])
+    there = {key.value.split('.')[0] for key, _ in block.value}
+    keys = keys_of(wanted)
+    whole = {key: value for key, value in new.items()
+             if key in keys and key.split('.')[0] not in there}
+    shift = ' ' * (indent - DEPTH * len(INDENT))
+    blocks = '\n'.join([
+        *(f'{" " * indent}{key}: {_value(value)}' for key, value in new.items()
+          if key not in whole),
+        *(shift + line for line in _lines(whole, DEPTH, keys)),
+        *_written_blocks(wanted, indent)])
     if not text.endswith('\n') and end == len(lines):
         blocks = '\n' + blocks
     changes.append((starts[end], starts[end], blocks + '\n' * bool(blocks)))
@@ -230,26 +252,28 @@ def _last_line(node: yaml.Node) -> int:
 def _written_blocks(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
     found = {key: values[key] for block in WRITTEN for key in sorted(
         (key for key in values if key.startswith(f'{block}.')),
-        key=lambda key: _rank(key, values.get('effects.active') or ()))}
-    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH)]
+        key=lambda key: _rank(key, values))}
+    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
 
 
-def _rank(key: str, active: Sequence[str]) -> tuple[int, ...]:
+def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
     """Return where a key of the written blocks stands: effects as added, drives in order.
 
     `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
     and a node takes no effect whose parameters it does not have.
     """
+    active, drives = values.get('effects.active') or (), values.get(ARM_JOINTS, DRIVES)
     block, name, *rest = key.split('.')
     if block != 'effects':
         return (2,)
     if not rest:
         return (1,)
     order = active.index(name) if name in active else len(active)
-    return (0, order, DRIVES.index(rest[0]) if rest[0] in DRIVES else -1)
+    return (0, order, list(drives).index(rest[0]) if rest[0] in drives else -1)
 
 
-def _lines(values: Mapping[str, Any], depth: int, prefix: str = '') -> list[str]:
+def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],
+           prefix: str = '') -> list[str]:
     """Return flat keys as nested lines, each followed by what it is."""
     found: list[str] = []
     done = set()
@@ -262,16 +286,16 @@ def _lines(values: Mapping[str, Any], depth: int, prefix: str = '') -> list[str]
         start = INDENT * depth + f'{name}:'
         below = {k: v for k, v in values.items() if k.startswith(f'{prefix}{name}.')}
         if below:
-            found += [start, *_lines(below, depth + 1, f'{prefix}{name}.')]
+            found += [start, *_lines(below, depth + 1, keys, f'{prefix}{name}.')]
             continue
         line = f'{start} {_value(values[key])}'
-        comment = _comment(key)
+        comment = _comment(key, keys)
         found.append(f'{line.ljust(COMMENT_COLUMN)}  # {comment}' if comment else line)
     return found
 
 
-def _comment(key: str) -> str:
-    known = KEYS.get(key) or AXIS_KEYS.get(key)
+def _comment(key: str, keys: Mapping[str, Key]) -> str:
+    known = keys.get(key)
     if known is not None:
         return known.description + (f' [{known.unit}]' if known.unit else '')
     block, _, rest = key.partition('.')

@@ -24,7 +24,7 @@ from typing import Any
 
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.model.bounded_yaml import parse, read_text
-from pprs_dynamics.model.keys import ADDED, AXIS_KEYS, KEYS
+from pprs_dynamics.model.keys import ADDED, NAMES
 
 DEFAULT_MODEL = 'config/paper.yaml'
 
@@ -103,7 +103,7 @@ def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
     if '/**' in blocks:
         for node, block in blocks.items():
             for key, _ in _flatten(block) if node != '/**' else ():
-                if key in KEYS or key in AXIS_KEYS or key.startswith(ADDED):
+                if key in NAMES or key.startswith(ADDED):
                     raise UnreadableFileError(
                         path, f'{key} of the model stands under {node}: put it under /**, for '
                         'every node and command alike')

@@ -24,8 +24,7 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.model.effects_block import check_tolerances
 from pprs_dynamics.model.keys import (
     ADDED,
-    AXIS_KEYS,
-    KEYS,
+    NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
     keys_of,
@@ -72,7 +71,7 @@ def _require_known(parameters: Mapping[str, Any]) -> None:
 
 def is_known(name: str) -> bool:
     """Return whether a model file may hold a key of that name."""
-    return name in KEYS or name in AXIS_KEYS or _is_for_others(name)
+    return name in NAMES or _is_for_others(name)
 
 
 def _is_for_others(name: str) -> bool:

@@ -29,7 +29,7 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, LARGEST, NODE_KEYS, Key, is_axis
+from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, LARGEST, NODE_KEYS, Key, is_arm, is_axis
 from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.model.parameter_values import is_known
 from pprs_dynamics.nodes.provenance import names_given
@@ -142,7 +142,7 @@ def declare_model(node: Node) -> list[str]:
     """
     defaults = default_parameters()
     given = overrides(node)
-    if is_axis(given):
+    if is_axis(given) or is_arm(given):
         DriveModel.from_parameters(given)  # refuses it
     if any(name.startswith('geometry.') for name in given):
         # Somebody's own robot: what is missing must not become the paper's in silence.

@@ -23,12 +23,15 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.measurement.reconstruction import Reconstruction
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.axis_model import AxisModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel, Forces
+from pprs_dynamics.model.keys import ARM_GAIN
+from pprs_dynamics.regression.arm_sensitivities import ArmSensitivities
 from pprs_dynamics.regression.axis_sensitivities import AxisSensitivities
 from pprs_dynamics.regression.platform_sensitivities import PlatformSensitivities
-from pprs_dynamics.regression.sensitivities import Sensitivities
+from pprs_dynamics.regression.sensitivities import NUMBERS, Sensitivities
 from pprs_dynamics.regression.terms import FullRate
 
 COLUMN = 'column '
@@ -44,7 +47,9 @@ def stacked_columns(tables: list[dict[str, Array]], count: int) -> dict[str, Arr
 
 
 def sensitivities_of(model: ForceModel, given: ForceModel) -> Sensitivities:
-    """Return the sensitivities of a model of either kind."""
+    """Return the sensitivities of a model of any kind."""
+    if isinstance(model, ArmModel):
+        return ArmSensitivities(model, given)
     if isinstance(model, AxisModel):
         return AxisSensitivities(model, given)
     assert isinstance(model, DriveModel)
@@ -54,8 +59,13 @@ def sensitivities_of(model: ForceModel, given: ForceModel) -> Sensitivities:
 class ColumnCollector:
     """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
 
-    def __init__(self, sensitivities: Sensitivities) -> None:
+    def __init__(self, sensitivities: Sensitivities, reconstruction: Reconstruction) -> None:
         self.sensitivities = sensitivities
+        # A gain changes nothing of efforts that were not recorded as currents.
+        self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
+                             if number.key == ARM_GAIN
+                             and np.isnan(reconstruction.gain[number.element])]
+        self.share = reconstruction.recorded_share(sensitivities.model)
         self.sensors = [effect.name for effect in sensitivities.model.effects
                         if isinstance(effect, MeasurementEffect)]
         self.kept: list[tuple[Array, ...]] = []
@@ -65,8 +75,10 @@ class ColumnCollector:
         effort = forces.total - sum((forces.parts[name] for name in self.sensors),
                                     np.zeros_like(forces.total))
         self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
-        return {COLUMN + name: column.transpose(1, 0, 2).reshape(len(s.velocity), -1)
-                for name, column in self.sensitivities.columns(forces).items()}
+        columns = self.sensitivities.columns(forces)
+        columns[NUMBERS][self.without_gain] = 0.0
+        return {COLUMN + name: (self.share * column).transpose(1, 0, 2).reshape(len(s.velocity), -1)
+                for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:
         """Return what the drives did, with positions as the mechanism has them."""

@@ -153,12 +153,12 @@ class Design:
                 if progress is not None:
                     progress((k + done / total) / len(reconstructions))
 
-            collector = ColumnCollector(sensitivities)
+            collector = ColumnCollector(sensitivities, reconstruction)
             tables.append(treated_table(model, reconstruction, report, collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
         stacked = stacked_columns(tables, len(model.drives))
-        residuals = join_tables(model.drives, tables)
+        residuals = join_tables(model, tables)
         count = len(model.drives)
         structure = tuple(
             Term(effect, None, {}, _by_drive(stacked[effect.name], count),
@@ -206,7 +206,8 @@ class Design:
         longest = max(self.recordings, key=lambda recording: len(recording.time))
         return DriveRange(float(longest.time[-1] - longest.time[0]),
                           float(np.median(np.diff(longest.time))),
-                          float(np.ptp(position)), float(np.abs(velocity).max()))
+                          float(np.ptp(position)), float(np.abs(velocity).max()),
+                          self.given.gear_ratios[drive])
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive: it may act, and is not there."""

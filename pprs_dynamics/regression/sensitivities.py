@@ -83,9 +83,16 @@ def known_numbers(model: ForceModel) -> tuple[Number, ...]:
             continue
         value = model.values[key]
         elements = enumerate(value) if isinstance(value, tuple) else [(None, value)]
-        found += [Number(key, element, one, abs(one) * tolerance / DEVIATIONS, model.keys[key].unit)
-                  for element, one in elements if one]
+        found += [Number(key, element, one, abs(one) * tolerance / DEVIATIONS,
+                         _unit(model, key, element)) for element, one in elements if one]
     return tuple(found)
+
+
+def _unit(model: ForceModel, key: str, element: int | None) -> str:
+    """Return the unit of a number; of a joint's, that of its kind."""
+    turning, *pushing = model.keys[key].unit.split(', ')
+    turns = element is None or element >= len(model.drives) or model.units[element].turns
+    return turning if turns or not pushing else pushing[0]
 
 
 class Sensitivities(ABC):

@@ -56,8 +56,8 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                               answer.noise_floor),
                      *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
                        for name in errors)],
-                    'Error on the recordings, rms [N], before (grey) and with it (blue); dotted: '
-                    'the noise.')
+                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with it '
+                    '(blue); dotted: the noise.')
         most = max(answer.noise_floors, key=lambda name: errors[name] - fallen[name], default='')
         if most:
             page.figure(before_and_after(before, after, before.drives.index(most),
@@ -66,7 +66,8 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                         over_time=True)
     if command and answer.adopted:
         page.command('See what is still missing', command)
-    page.table(('error on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
+    page.table(('error on', f'before [{answer.unit}]', f'after [{answer.unit}]', 'change'),
+               error_rows(answer),
                caption='What was fitted to, and what decides.')
     page.bullets(answer.remarks)
     if answer.parameters:

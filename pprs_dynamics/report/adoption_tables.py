@@ -26,7 +26,7 @@ from rich.panel import Panel
 from rich.table import Table
 
 from pprs_dynamics.adoption.adopt import VALIDATION, Adoption
-from pprs_dynamics.diagnosis.quantities import counted, newtons, plain, with_uncertainty
+from pprs_dynamics.diagnosis.quantities import counted, in_unit, plain, with_uncertainty
 
 MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2
@@ -43,8 +43,8 @@ def _brief(answer: Adoption) -> Iterator[Any]:
     held = 'held-out recordings' if answer.held_out_on == VALIDATION else 'held-out blocks'
     for label, before, after in (('recordings', answer.error_before, answer.error_after),
                                  (held, answer.held_out_before, answer.held_out_after)):
-        yield f'  error on {label}: {plain(before)} → {plain(after)} N'
-    yield f'  noise: {newtons(answer.noise_floor)}'
+        yield f'  error on {label}: {plain(before)} → {plain(after)} {answer.unit}'
+    yield f'  noise: {in_unit(answer.noise_floor, answer.unit)}'
     rows = parameter_rows(answer)
     for key, text in rows[:MOST_SHOWN]:
         yield f'  {escape(key)} = {escape(text)}'
@@ -78,7 +78,7 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
 
 
 def error_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
-    """Return what was measured on, errors before and after [N], and their change."""
+    """Return what was measured on, errors before and after, and their change."""
     held = ('validation recordings' if answer.held_out_on == VALIDATION
             else 'held-out blocks of the recordings')
     return [(label, f'{before:.3f}', f'{after:.3f}',
@@ -90,8 +90,9 @@ def error_rows(answer: Adoption) -> list[tuple[str, str, str, str]]:
 def _parts(answer: Adoption) -> Iterator[Any]:
     yield _verdict(answer)
     yield _table('Error, rms over samples and drives',
-                 ('on', 'before [N]', 'after [N]', 'change'), error_rows(answer),
-                 f'the noise is {newtons(answer.noise_floor)}')
+                 ('on', f'before [{answer.unit}]', f'after [{answer.unit}]', 'change'),
+                 error_rows(answer),
+                 f'the noise is {in_unit(answer.noise_floor, answer.unit)}')
     rows = parameter_rows(answer)
     if rows:
         yield _table(f'{answer.effect}, ± two standard deviations', ('parameter', 'value'), rows)

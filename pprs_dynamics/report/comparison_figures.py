@@ -24,7 +24,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.comparison import Comparison
-from pprs_dynamics.diagnosis.statements import UNITS, WORDS, Statement
+from pprs_dynamics.diagnosis.statements import WORDS, Statement, read_in
+from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.report.page import plotly_objects
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.profiles import Profile, error_profile, error_spectrum
@@ -43,7 +44,11 @@ MARGIN = {'l': 70, 'r': 15, 't': 30, 'b': 40}
 LEGEND = {'orientation': 'h', 'y': 1.02, 'x': 0.0, 'yanchor': 'bottom', 'xanchor': 'left'}
 # The unit stands at the last tick and in what the cursor shows.
 SECONDS = {'ticksuffix': ' s', 'showticksuffix': 'last', 'hoverformat': '.3f'}
-IN_NEWTONS = '%{y:.3f} N'
+
+
+def hover(units: DriveUnits) -> str:
+    """Return what the cursor shows of an effort."""
+    return f'%{{y:.3f}} {units.effort}'
 
 
 def thinned(time: Array, *curves: Array, points: int = POINTS) -> tuple[Array, ...]:
@@ -80,24 +85,25 @@ def over_time(residuals: Residuals, drive: int, worst: list[tuple[float, float]]
 
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06,
                            row_heights=[0.6, 0.4])
+    units = residuals.units_of(residuals.drives[drive])
     time, measured, model = curves_of(residuals, residuals.measured[:, drive],
                                       residuals.model[:, drive])
     for name, values, colour, row in (
             ('measured', measured, MEASURED, 1), ('model', model, MODEL, 1),
             ('measured minus model', measured - model, ERROR, 2)):
         figure.add_trace(go.Scatter(x=time, y=values, name=name, mode='lines',
-                                    hovertemplate=IN_NEWTONS,
+                                    hovertemplate=hover(units),
                                     line={'color': colour, 'width': 1.3}), row=row, col=1)
     for start, end in worst:
         figure.add_vrect(x0=start, x1=end, fillcolor=MARK, opacity=0.25, line_width=0)
-    return in_two_rows(figure, residuals.drives[drive])
+    return in_two_rows(figure, residuals.drives[drive], units)
 
 
-def in_two_rows(figure: Any, drive: str) -> Any:
+def in_two_rows(figure: Any, drive: str, units: DriveUnits) -> Any:
     """Lay out efforts above errors over one time axis."""
     figure.update_xaxes(**SECONDS)
-    figure.update_yaxes(title_text='effort [N]', row=1, col=1)
-    figure.update_yaxes(title_text='error [N]', row=2, col=1)
+    figure.update_yaxes(title_text=f'effort [{units.effort}]', row=1, col=1)
+    figure.update_yaxes(title_text=f'error [{units.effort}]', row=2, col=1)
     figure.update_xaxes(title_text='time [s]', row=2, col=1)
     figure.update_layout(height=400, hovermode='x unified', margin={**MARGIN, 't': 55},
                          legend={**LEGEND, 'title': {'text': f'<b>{drive}</b>'}})
@@ -128,28 +134,30 @@ def against_variables(residuals: Residuals, comparison: Comparison) -> list[tupl
     for name in VARIABLES:
         if residuals.variable(name, 0) is None:
             continue
-        factor, label = axis_of(name)
         figure = go.Figure()
         for drive, drive_name in enumerate(residuals.drives):
             noise = comparison.localisation.drives[drive_name].noise
             profile = None if noise is None else error_profile(residuals, drive, name, noise)
             if profile is not None:
-                figure.add_trace(_means(go, profile, factor, name, {'drive': drive_name}))
+                figure.add_trace(_means(go, profile, name, residuals, drive_name,
+                                        {'drive': drive_name}))
         figure.add_hline(y=0, line={'color': MEASURED, 'width': 0.8})
         figure.update_layout(height=240, margin={**MARGIN, 't': 10}, showlegend=False,
-                             xaxis_title=label, yaxis_title='mean error [N]')
+                             xaxis_title=axis_of(name, residuals)[1],
+                             yaxis_title=f'mean error [{residuals.unit}]')
         figures.append((figure, f'Against {WORDS.get(name, name)}.'))
     return figures
 
 
-def _means(go: Any, profile: Profile, factor: float, variable: str, meta: Any = None) -> Any:
+def _means(go: Any, profile: Profile, variable: str, residuals: Residuals, drive: str,
+           meta: Any = None) -> Any:
+    factor, unit = read_in(variable, residuals.units_of(variable.partition(' of ')[2] or drive))
     middle = factor * (profile.edges[1:] + profile.edges[:-1]) / 2
     return go.Scatter(
         x=middle, y=profile.mean, mode='lines+markers', line={'color': ERROR}, meta=meta,
         marker={'size': 5}, name='mean', error_y={
             'type': 'data', 'array': 2 * profile.uncertainty, 'width': 0, 'thickness': 1},
-        hovertemplate=f'%{{x:.4g}} {UNITS[variable.partition(" of ")[0]][1]}: '
-                      '%{y:.3f} N<extra></extra>')
+        hovertemplate=f'%{{x:.4g}} {unit}: {hover(residuals.units_of(drive))}<extra></extra>')
 
 
 def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str,
@@ -174,21 +182,23 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     profile = _profile(residuals, drive, variable, noise)
     if profile is None:
         return None
-    factor, label = axis_of(variable)
+    units = residuals.units_of(statement.drive)
+    factor, label = axis_of(variable, residuals, statement.drive)
     figure = go.Figure()
     if statement.kind == 'scatter':
         middle = factor * (profile.edges[1:] + profile.edges[:-1]) / 2
         figure.add_trace(go.Scatter(x=middle, y=profile.rms, mode='lines+markers', name='rms',
-                                    hovertemplate=IN_NEWTONS, line={'color': ERROR}))
+                                    hovertemplate=hover(units), line={'color': ERROR}))
     else:
-        figure.add_trace(_means(go, profile, factor, variable))
+        figure.add_trace(_means(go, profile, variable, residuals, statement.drive))
     if statement.range is not None and statement.variable == variable:
         low, high = (factor * end for end in statement.range)
         figure.add_vrect(x0=low, x1=high, fillcolor=MARK, opacity=0.15, line_width=0)
     figure.add_hline(y=0, line={'color': MEASURED, 'width': 0.8})
     kind = 'rms' if statement.kind == 'scatter' else 'mean'
     figure.update_layout(height=300, margin={**MARGIN, 't': 15}, showlegend=False,
-                         xaxis_title=label, yaxis_title=f'{kind} {what} on {statement.drive} [N]')
+                         xaxis_title=label,
+                         yaxis_title=f'{kind} {what} on {statement.drive} [{units.effort}]')
     return figure
 
 
@@ -206,6 +216,7 @@ def _profile(residuals: Residuals, drive: int, variable: str, noise: NoiseSpectr
 
 def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what: str) -> Any:
     go = plotly_objects()
+    unit = _power(residuals.units_of(statement.drive).effort)
     found = error_spectrum(residuals, residuals.drives.index(statement.drive), noise)
     keep = found.frequency > 0
     figure = go.Figure()
@@ -213,7 +224,7 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
                                 ('noise', found.background, MEASURED)):
         figure.add_trace(go.Scatter(
             x=found.frequency[keep], y=power[keep], mode='lines', name=name,
-            line={'color': colour, 'width': 1.2}, hovertemplate='%{y:.3g} N²/Hz'))
+            line={'color': colour, 'width': 1.2}, hovertemplate=f'%{{y:.3g}} {unit}'))
     if statement.range is not None:
         figure.add_vrect(x0=0.98 * statement.range[0], x1=1.02 * statement.range[1],
                          fillcolor=MARK, opacity=0.3, line_width=0)
@@ -221,16 +232,23 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
         height=300, margin=MARGIN, legend=LEGEND, hovermode='x unified',
         xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
                'showticksuffix': 'last'},
-        yaxis={'type': 'log', 'title': f'{what} on {statement.drive} [N²/Hz]',
+        yaxis={'type': 'log', 'title': f'{what} on {statement.drive} [{unit}]',
                'exponentformat': 'e', 'dtick': 1})
     return figure
 
 
-def axis_of(variable: str) -> tuple[float, str]:
-    """Return factor from SI and label of an axis."""
+def _power(unit: str) -> str:
+    return f'({unit})²/Hz' if ' ' in unit else f'{unit}²/Hz'
+
+
+def axis_of(variable: str, residuals: Residuals, drive: str = '') -> tuple[float, str]:
+    """Return factor from SI and label of an axis: of one drive, or of all."""
     name, of, other = variable.partition(' of ')
-    factor, unit = UNITS[name]
-    return factor, f'{WORDS.get(name, name)}{of}{other} [{unit}]'
+    chosen = other or drive
+    found = list(dict.fromkeys(read_in(name, residuals.units_of(one)) for one in (
+        (chosen,) if chosen else residuals.drives)))
+    unit = ' or '.join(unit for _, unit in found)
+    return found[0][0], f'{WORDS.get(name, name)}{of}{other} [{unit}]'
 
 
 def over_workspace(residuals: Residuals) -> Any | None:
@@ -278,12 +296,13 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
             figure.add_trace(go.Scatter(
                 x=frequency, y=values, name=f'{name}: {label}', mode='lines',
                 meta={'drive': name}, line={'color': colour, 'width': 1.2},
-                hovertemplate='%{y:.3g} N²/Hz'))
+                hovertemplate=f'%{{y:.3g}} {_power(residuals.units_of(name).effort)}'))
     figure.update_layout(
         height=360, margin=MARGIN, legend=LEGEND, hovermode='x unified',
         xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
                'showticksuffix': 'last'},
-        yaxis={'type': 'log', 'title': 'power [N²/Hz]', 'exponentformat': 'e', 'dtick': 1})
+        yaxis={'type': 'log', 'title': f'power [{_power(residuals.unit)}]',
+               'exponentformat': 'e', 'dtick': 1})
     return figure
 
 

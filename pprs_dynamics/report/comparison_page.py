@@ -25,11 +25,9 @@ from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.report import comparison_figures as figures
 from pprs_dynamics.report.page import ErrorRow, Page
-from pprs_dynamics.report.tables import comparison_rows
+from pprs_dynamics.report.tables import comparison_headings, comparison_rows
 from pprs_dynamics.residuals.residuals import Residuals
 
-HEADINGS = ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained', 'noise [N]',
-            'independent samples')
 FIRST = 3  # statements on the first screen
 
 
@@ -60,7 +58,7 @@ def comparison_page(
         with page.block():
             page.errors([ErrorRow(name, drive.rms, None, drive.noise_floor)
                          for name, drive in comparison.drives.items()],
-                        'Error, rms [N]; dotted: the noise.')
+                        f'Error, rms [{comparison.unit}]; dotted: the noise.')
             if statements:
                 page.bullets([one.text for one in statements[:FIRST]], numbered=True)
             else:
@@ -77,7 +75,7 @@ def comparison_page(
         with page.fold(f'{len(statements) - FIRST} more places'):
             page.bullets([one.text for one in statements[FIRST:]])
     with page.fold('Drive by drive'):
-        page.table(HEADINGS, comparison_rows(comparison),
+        page.table(comparison_headings(comparison), comparison_rows(comparison),
                    [drive.grade for drive in comparison.drives.values()])
         page.bullets([drive.verdict for drive in comparison.drives.values()])
     with page.fold('Over time'):

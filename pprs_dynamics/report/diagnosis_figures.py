@@ -27,7 +27,6 @@ from pprs_dynamics.diagnosis.rivals import RivalEffect
 from pprs_dynamics.diagnosis.statements import Statement
 from pprs_dynamics.report.comparison_figures import (
     ERROR,
-    IN_NEWTONS,
     LEGEND,
     LINES,
     MARGIN,
@@ -37,6 +36,7 @@ from pprs_dynamics.report.comparison_figures import (
     along,
     axis_of,
     curves_of,
+    hover,
     in_two_rows,
 )
 from pprs_dynamics.report.page import plotly_objects
@@ -52,6 +52,7 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
 
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06,
                            row_heights=[0.55, 0.45])
+    units = before.units_of(before.drives[drive])
     time, measured, given, found = curves_of(
         before, before.measured[:, drive], before.model[:, drive], after.model[:, drive])
     for name, values, colour, row in (
@@ -61,10 +62,10 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
             ('error with what was found', measured - found, AFTER, 2)):
         figure.add_trace(go.Scatter(
             x=time, y=values, name=name, mode='lines', showlegend=row == 1,
-            hovertemplate=IN_NEWTONS, line={'color': colour, 'width': 1.2}), row=row, col=1)
+            hovertemplate=hover(units), line={'color': colour, 'width': 1.2}), row=row, col=1)
     for level in (-2 * floor, 2 * floor):
         figure.add_hline(y=level, row=2, col=1, line={'color': FLOOR, 'width': 1, 'dash': 'dot'})
-    return in_two_rows(figure, before.drives[drive])
+    return in_two_rows(figure, before.drives[drive], units)
 
 
 def contributions(residuals: Residuals, forces: dict[str, Any]) -> Any:
@@ -87,10 +88,12 @@ def contributions(residuals: Residuals, forces: dict[str, Any]) -> Any:
         for number, (name, values) in enumerate(zip(acting, curves, strict=True)):
             figure.add_trace(go.Scatter(
                 x=time, y=values, name=name, mode='lines', showlegend=True,
-                meta={'drive': drive_name}, hovertemplate=IN_NEWTONS,
+                meta={'drive': drive_name},
+                hovertemplate=hover(residuals.units_of(drive_name)),
                 line={'color': LINES[number % len(LINES)], 'width': 1.3}))
     figure.update_layout(height=320, margin=MARGIN, legend=LEGEND, hovermode='x unified',
-                         xaxis={'title': 'time [s]', **SECONDS}, yaxis_title='force [N]')
+                         xaxis={'title': 'time [s]', **SECONDS},
+                         yaxis_title=f'force [{residuals.unit}]')
     return figure
 
 
@@ -104,32 +107,35 @@ def effect_pictures(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
     part = partial_residual(diagnosis, found)
     residuals = diagnosis.residuals
     drive = residuals.drives[part.drive]
+    units = residuals.units_of(drive)
     without = 'measured, all but this in the model'
     figures = []
     if part.profile is not None:
         middle = (part.profile.edges[1:] + part.profile.edges[:-1]) / 2
-        factor, label = axis_of(part.variable)
+        factor, label = axis_of(part.variable, residuals, drive)
         figure = go.Figure([
             go.Scatter(x=factor * middle, y=part.profile.mean, mode='markers', name=without,
-                       marker={'color': MEASURED, 'size': 6}, hovertemplate=IN_NEWTONS,
+                       marker={'color': MEASURED, 'size': 6}, hovertemplate=hover(units),
                        error_y={'type': 'data', 'array': 2 * part.profile.uncertainty,
                                 'width': 0, 'thickness': 1}),
             go.Scatter(x=factor * middle, y=part.fitted, mode='lines', name=found.name,
-                       hovertemplate=IN_NEWTONS, line={'color': MODEL, 'width': 2})])
+                       hovertemplate=hover(units), line={'color': MODEL, 'width': 2})])
         figure.update_layout(height=320, margin=MARGIN, legend=LEGEND, xaxis_title=label,
                              hovermode='x unified', yaxis={
-                                 'title': f'force on {drive} [N]', 'rangemode': 'tozero'})
+                                 'title': f'force on {drive} [{units.effort}]',
+                                 'rangemode': 'tozero'})
         figures.append((figure, f'{found.name} on {drive}: means over bins with two standard '
                         'deviations, and the fitted effect.'))
     time = residuals.time[part.span]
     figure = go.Figure([
         go.Scatter(x=time, y=values[part.span].astype(np.float32), name=name, mode='lines',
-                   hovertemplate=IN_NEWTONS, line={'color': colour, 'width': width})
+                   hovertemplate=hover(units), line={'color': colour, 'width': width})
         for name, values, colour, width in ((without, part.error, MEASURED, 1.0),
                                             (found.name, part.force, MODEL, 2.0))])
     figure.update_layout(height=320, margin=MARGIN, legend=LEGEND, hovermode='x unified',
                          xaxis={'title': 'time [s]', **SECONDS},
-                         yaxis={'title': f'force on {drive} [N]', 'rangemode': 'tozero'})
+                         yaxis={'title': f'force on {drive} [{units.effort}]',
+                                'rangemode': 'tozero'})
     figures.append((figure, f'{found.name} on {drive}, where it changes most.'))
     return figures
 
@@ -144,6 +150,7 @@ def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:
 def evidence_bars(diagnosis: Diagnosis) -> Any:
     """Return the evidence for each candidate for the first place."""
     go = plotly_objects()
+    unit = diagnosis.residuals.unit
     ranked = sorted(diagnosis.candidates, key=lambda one: one.evidence)
     adopted = {one.name for one in diagnosis.effects}
     rivals = {name for names in diagnosis.indistinguishable for name in names[1:]}
@@ -153,7 +160,8 @@ def evidence_bars(diagnosis: Diagnosis) -> Any:
         x=[one.evidence for one in ranked], y=[one.name for one in ranked], orientation='h',
         marker={'color': colours}, text=[f'{one.evidence:.0f}' for one in ranked],
         textposition='outside', cliponaxis=False,
-        hovertext=[f'error after: {one.error_after:.3f} N' for one in ranked], hoverinfo='text'))
+        hovertext=[f'error after: {one.error_after:.3f} {unit}' for one in ranked],
+        hoverinfo='text'))
     figure.add_vline(x=0, line={'color': FLOOR, 'width': 1.2, 'dash': 'dash'})
     lowest, highest = (end(0.0, *(one.evidence for one in ranked)) for end in (min, max))
     reach = highest - lowest or 1.0

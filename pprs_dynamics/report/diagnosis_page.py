@@ -21,7 +21,7 @@ from pathlib import Path
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.error_steps import ErrorStep, error_steps
-from pprs_dynamics.diagnosis.quantities import newtons
+from pprs_dynamics.diagnosis.quantities import in_unit
 from pprs_dynamics.diagnosis.rivals import RivalEffect
 from pprs_dynamics.diagnosis.sentences import (
     Finding,
@@ -45,8 +45,6 @@ METHOD = (
     'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
     'and prices for effects, drives, shapes and patterns that were tried. Evidence of an effect '
     'is by how much the cost rises without it.')
-EFFECTS = ('effect', 'evidence', 'error before [N]', 'after [N]', 'held out before [N]',
-           'after [N]', 'on')
 PARAMETERS = ('effect', 'drive', 'symbol', '± two standard deviations', 'parameter')
 SETS = ('cost', 'set')
 
@@ -114,8 +112,9 @@ def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> Non
                      diagnosis.noise_floor)]
     rows += [ErrorRow(name, first.drives[d], last.drives[d] if fell else None, floors[name])
              for d, name in enumerate(diagnosis.residuals.drives) if name in floors]
-    page.errors(rows, 'Error, rms [N], before (grey) and with what was found (blue); dotted: the '
-                'noise.' if fell else 'Error, rms [N]; dotted: the noise.')
+    unit = diagnosis.residuals.unit
+    page.errors(rows, f'Error, rms [{unit}], before (grey) and with what was found (blue); dotted: '
+                'the noise.' if fell else f'Error, rms [{unit}]; dotted: the noise.')
 
 
 def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
@@ -133,14 +132,16 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
 
 def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
               rivals: Sequence[RivalEffect]) -> None:
+    kind = diagnosis.model.kind
     if words.effects:
         with page.fold('What was found, why, and how to confirm it'):
             for finding, one in zip(words.effects, diagnosis.effects, strict=True):
-                page.card(finding.title, _lines(finding, one.effect.card.equation),
+                page.card(finding.title, _lines(finding, one.effect.card_in(kind).equation),
                           figures.effect_pictures(diagnosis, one))
                 for said, rival in zip(words.rivals, rivals, strict=True):
                     if rival.of == one.name:
-                        page.card(said.title, _lines(said, rival.effect.card.equation),
+                        page.card(said.title,
+                                  _lines(said, rival.effect.card_in(kind).equation),
                                   figures.effect_pictures(diagnosis, rival))
     if words.unexplained:
         with page.fold('What no effect of the catalogue explains'):
@@ -176,19 +177,25 @@ def _sets(page: Page, diagnosis: Diagnosis) -> None:
                         'a rival. Grey: explains less, or nothing beside what was found.')
 
 
+def _effect_headings(unit: str) -> tuple[str, ...]:
+    return ('effect', 'evidence', f'error before [{unit}]', f'after [{unit}]',
+            f'held out before [{unit}]', f'after [{unit}]', 'on')
+
+
 def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
     if not diagnosis.effects:
         return
+    unit = diagnosis.residuals.unit
     where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
              else 'blocks of the same recordings, the weaker evidence')
     with page.fold('What each effect does to the error'):
         if len(steps) > 2:
             page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
                          for k, step in enumerate(steps)],
-                        'Error over all drives, rms [N], as one after the other is added; both '
-                        f'ends are what a comparison says, the noise is '
-                        f'{newtons(diagnosis.noise_floor)}.')
-        page.table(EFFECTS, [
+                        f'Error over all drives, rms [{unit}], as one after the other is added; '
+                        f'both ends are what a comparison says, the noise is '
+                        f'{in_unit(diagnosis.noise_floor, unit)}.')
+        page.table(_effect_headings(unit), [
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
              f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
              sites(one.drives, diagnosis)) for one in diagnosis.effects],

@@ -55,7 +55,7 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
     yield _verdict(diagnosis, words)
     if diagnosis.effects:
-        yield _plain_table(('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
+        yield _plain_table(_headings(diagnosis),
                            _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
         lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
                  for effect, drive, text in _joined(fitted_values(diagnosis))]
@@ -88,7 +88,7 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
                 else 'blocks of the same recordings')
         yield _table(f'Those that lower the error most first; held out: {held}',
-                     ('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
+                     _headings(diagnosis),
                      _effect_rows(diagnosis), right=(2, 3, 4))
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
         yield _finding(number, finding)
@@ -100,7 +100,8 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield _table('The best sets of effects, and their costs above the best', ('cost', 'set'),
                      [(cost, escape(text)) for text, cost in set_rows(diagnosis)])
     if diagnosis.candidates:
-        yield _table('Each effect alone', ('effect', 'on', 'evidence', 'error after [N]'),
+        yield _table('Each effect alone', (
+            'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'),
                      [_ranked(one, diagnosis) for one in diagnosis.candidates], right=(2, 3))
     yield from _list('Within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
@@ -109,6 +110,11 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
     if words.command:
         yield f'  [bold cyan]{escape(words.command)}[/]'
+
+
+def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    unit = diagnosis.residuals.unit
+    return ('effect', 'on', f'error [{unit}]', f'held out [{unit}]', 'evidence')
 
 
 def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:

@@ -22,21 +22,21 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.model.ledger import Step
-from pprs_dynamics.report.comparison_figures import IN_NEWTONS, LEGEND, LINES, MARGIN
+from pprs_dynamics.report.comparison_figures import LEGEND, LINES, MARGIN
 from pprs_dynamics.report.figures import BLUE, GREY, RED, finish, pyplot_module, save
 from pprs_dynamics.report.history_tables import noise_of
 from pprs_dynamics.report.page import plotly_objects
 
 
 def _levels(steps: Sequence[Step]) -> tuple[list[str], list[float], list[float], float]:
-    """Return labels, errors on recordings and on held-out data, and the noise, [N]."""
+    """Return labels, errors on recordings and on held-out data, and the noise."""
     labels = ['before', *(f'{number}. {step.effect}' for number, step in enumerate(steps, 1))]
     return (labels, [steps[0].error_before, *(step.error_after for step in steps)],
             [steps[0].held_out_before, *(step.held_out_after for step in steps)],
             noise_of(steps))
 
 
-def falling_error_by_drive(steps: Sequence[Step]) -> Any:
+def falling_error_by_drive(steps: Sequence[Step], unit: str) -> Any:
     """Return the error on every drive that was measured all along, after each step."""
     go = plotly_objects()
     labels = _levels(steps)[0]
@@ -46,14 +46,14 @@ def falling_error_by_drive(steps: Sequence[Step]) -> Any:
             errors = [steps[0].drive_errors_before[number],
                       *(step.drive_errors_after[step.measured.index(drive)] for step in steps)]
             figure.add_trace(go.Scatter(x=labels, y=errors, name=drive, mode='lines+markers',
-                                        hovertemplate=IN_NEWTONS,
+                                        hovertemplate=f'%{{y:.3f}} {unit}',
                                         line={'color': LINES[number % len(LINES)]}))
-    figure.update_layout(height=360, yaxis={'title': 'error, rms [N]', 'rangemode': 'tozero'},
+    figure.update_layout(height=360, yaxis={'title': f'error, rms [{unit}]', 'rangemode': 'tozero'},
                          margin=MARGIN, legend=LEGEND)
     return figure
 
 
-def draw_history(path: str | PathLike[str], steps: Sequence[Step]) -> Path:
+def draw_history(path: str | PathLike[str], steps: Sequence[Step], unit: str = 'N') -> Path:
     """Draw the falling error into a PNG file."""
     drawing = pyplot_module()
     figure, axis = drawing.subplots(figsize=(8, 4), layout='constrained')
@@ -64,6 +64,6 @@ def draw_history(path: str | PathLike[str], steps: Sequence[Step]) -> Path:
         axis.bar([place + 0.2 for place in places], held, 0.4, color=RED, label='held out')
         axis.axhline(noise, ls='--', color=GREY, label=f'noise {noise:.3g}')
         axis.set_xticks(list(places), labels, rotation=20, ha='right')
-    axis.set(ylabel='error, rms [N]', title='Error of the model as effects were added')
+    axis.set(ylabel=f'error, rms [{unit}]', title='Error of the model as effects were added')
     finish(axis)
     return save(drawing, figure, path)

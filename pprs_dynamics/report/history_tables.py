@@ -31,9 +31,9 @@ from pprs_dynamics.model.ledger import NOT_KNOWN, Step
 BAR = 24  # characters, of the largest error
 
 
-def history_view(steps: Sequence[Step]) -> Group:
+def history_view(steps: Sequence[Step], unit: str = 'N') -> Group:
     """Return the ledger: the error's fall first, then what each step was made from."""
-    return Group(*_parts(steps))
+    return Group(*_parts(steps, unit))
 
 
 def step_rows(steps: Sequence[Step]) -> list[tuple[str, ...]]:
@@ -45,7 +45,7 @@ def step_rows(steps: Sequence[Step]) -> list[tuple[str, ...]]:
 
 
 def noise_of(steps: Sequence[Step]) -> float:
-    """Return the noise as the last diagnosis had it [N]."""
+    """Return the noise as the last diagnosis had it."""
     return steps[-1].noise_floor
 
 
@@ -74,11 +74,11 @@ def details(step: Step) -> list[str]:
     return [one for one in found if one]
 
 
-def _parts(steps: Sequence[Step]) -> Iterator[Any]:
+def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:
     if not steps:
         yield 'No effect was added to this model yet.'
         return
-    table = Table(title='Error of the model, rms [N], as effects were added',
+    table = Table(title=f'Error of the model, rms [{unit}], as effects were added',
                   title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
     for heading in ('', 'effect', 'error', 'held out', ''):
         table.add_column(heading, justify='right' if heading in ('error', 'held out') else 'left',

@@ -23,6 +23,7 @@ from typing import Any
 from pprs_dynamics.diagnosis.comparison import Comparison
 from pprs_dynamics.diagnosis.quantities import percent
 from pprs_dynamics.measurement.recording import Summary
+from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.model.reproduction import Claim
 
 # Lines that places take without --details, and characters of a line of 80 columns, which words
@@ -44,8 +45,13 @@ def claims_table(claims: Iterable[Claim]) -> Any:
     return table
 
 
-def recording_table(summary: Summary) -> Any:
-    """Return what is in a recording, drive by drive."""
+def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
+    """Return what is in a recording, drive by drive; drives of one kind in one table."""
+    return [_recording_table(summary, kind, [name for name, one in zip(
+        summary.drives, units, strict=True) if one == kind]) for kind in dict.fromkeys(units)]
+
+
+def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
     from rich.markup import escape
     from rich.table import Table
 
@@ -53,9 +59,12 @@ def recording_table(summary: Summary) -> Any:
         f'{summary.name}: {summary.used} of {summary.samples} samples in {len(summary.segments)} '
         f'segment{"s" * (len(summary.segments) != 1)}, {summary.duration:.2f} s at '
         f'{summary.rate:.6g} Hz'), caption=escape(summary.source))
-    for heading in ('drive', 'position [m]', 'velocity [m/s]', 'effort [N]', 'measured'):
+    position = units.of('m')
+    for heading in ('drive', f'position [{position}]', f'velocity [{position}/s]',
+                    f'effort [{units.effort}]', 'measured'):
         table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
-    for drive, found in summary.drives.items():
+    for drive in drives:
+        found = summary.drives[drive]
         table.add_row(escape(drive), _span(found.position), _span(found.velocity),
                       _span(found.effort), f'{found.measured:.1%}')
     return table
@@ -63,6 +72,16 @@ def recording_table(summary: Summary) -> Any:
 
 def _span(bounds: tuple[float, float] | None) -> str:
     return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
+
+
+EFFORTS = ('rms', 'bias', 'peak', 'noise')
+
+
+def comparison_headings(comparison: Comparison) -> tuple[str, ...]:
+    """Return the headings of `comparison_rows`."""
+    unit = comparison.unit
+    return ('drive', *(f'{name} [{unit}]' if name in EFFORTS else name for name in (
+        'rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')))
 
 
 def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
@@ -110,8 +129,11 @@ def _comparison_table(comparison: Comparison) -> Any:
 
     colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
     table = Table(box=None, padding=(0, 1))
-    for heading in ('drive', 'rms [N]', 'relative', 'bias [N]', 'peak [N]', 'explained',
-                    'noise [N]'):
+    # One unit for all: names of joints need the room.
+    short = len(comparison.unit) > 1
+    for heading in comparison_headings(comparison)[:7]:
+        if short and not heading.startswith('rms'):
+            heading = heading.partition(' [')[0]
         table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
     for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
         table.add_row(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])

@@ -78,7 +78,7 @@ def measure_residuals(
         notes += reconstruction.notes
         # Motion at full rate takes several times the room of all that follows.
         del reconstruction
-    return join_tables(model.drives, tables), tuple(notes)
+    return join_tables(model, tables), tuple(notes)
 
 
 def treated_table(
@@ -113,8 +113,8 @@ def treated_table(
     return table
 
 
-def join_tables(drives: tuple[str, ...], tables: list[dict[str, Array]]) -> Residuals:
-    """Return the residuals of recordings one after the other, from their tables."""
+def join_tables(model: ForceModel, tables: list[dict[str, Array]]) -> Residuals:
+    """Return the residuals of a model on recordings one after the other, from their tables."""
     start, segments = 0.0, 0.0
     for table in tables:
         table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
@@ -129,7 +129,7 @@ def join_tables(drives: tuple[str, ...], tables: list[dict[str, Array]]) -> Resi
         elif name.startswith(SHARED):
             variables[name.removeprefix(SHARED)] = joined.pop(name)[:, 0]
     time, segment = joined.pop('time'), joined.pop('segment').astype(int)
-    measured, model = joined.pop('measured'), joined.pop('total')
+    measured, total = joined.pop('measured'), joined.pop('total')
     steps = np.diff(time)[np.diff(segment) == 0]
-    return Residuals(drives, time, segment, measured, model, joined, variables,
-                     float(np.median(steps)))
+    return Residuals(model.drives, time, segment, measured, total, joined, variables,
+                     float(np.median(steps)), model.units)

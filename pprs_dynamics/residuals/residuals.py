@@ -24,6 +24,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.mechanism.units import DriveUnits, common_effort
 
 # A gap of a few samples is bridged by a straight line; over more, noise is a new stretch.
 LONGEST_BRIDGE = 10
@@ -67,6 +68,8 @@ class Residuals:
         velocity; derived from it where absent); common to all platform_x and so on.
     period : float
         Time between samples [s].
+    units : tuple of DriveUnits
+        Of the drives; drives that push where they are not given.
 
     Raises
     ------
@@ -82,6 +85,7 @@ class Residuals:
     parts: Mapping[str, Array] = field(default_factory=dict)
     variables: Mapping[str, Array] = field(default_factory=dict)
     period: float = 0.01
+    units: tuple[DriveUnits, ...] = ()
 
     def __post_init__(self) -> None:
         samples, width = len(self.time), len(self.drives)
@@ -104,6 +108,15 @@ class Residuals:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def unit(self) -> str:
+        """Unit of efforts and errors over all drives."""
+        return common_effort(self.units)
+
+    def units_of(self, drive: str) -> DriveUnits:
+        """Return the units of a drive's quantities."""
+        return self.units[self.drives.index(drive)] if self.units else DriveUnits()
 
     @property
     def error(self) -> Array:
@@ -151,7 +164,8 @@ class Residuals:
         return Residuals(
             self.drives, mean(self.time), segment, measured, mean(self.model),
             {name: mean(part) for name, part in self.parts.items()},
-            {name: mean(array) for name, array in self.variables.items()}, self.period * factor)
+            {name: mean(array) for name, array in self.variables.items()}, self.period * factor,
+            self.units)
 
 
 def find_stretches(

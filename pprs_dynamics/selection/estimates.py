@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.regression.base_columns import KnownNumber, PresentCoefficient, within
+from pprs_dynamics.regression.design import Design
 from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate, Placement
 from pprs_dynamics.selection.reversal_widths import place_of
 from pprs_dynamics.selection.search import Search
@@ -146,6 +147,7 @@ def _of_placement(search: Search, placement: Placement, c: Array, covariance: Ar
                   ) -> tuple[dict[str, Estimate], list[str]]:
     effect, term = placement.term.effect, placement.term
     prefix = '' if placement.drive is None else f'{search.design.drives[placement.drive]}.'
+    unit_of = _units(search.design, placement.drive)
     values = placement.values(c)
     size = placement.block.size
     found, bound = {}, []
@@ -159,19 +161,29 @@ def _of_placement(search: Search, placement: Placement, c: Array, covariance: Ar
             slope[k] = (placement.values(moved)[parameter.name] - values[parameter.name]) / step
         variance = float(slope @ covariance[:size, :size] @ slope)
         found[prefix + parameter.name] = Estimate(
-            within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5, parameter.unit)
+            within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
+            unit_of(parameter.unit))
         if not parameter.lower <= values[parameter.name] <= parameter.upper:
             bound.append(prefix + parameter.name)
     for k, parameter in enumerate(effect.shape):
         value = float(term.shape[parameter.name])
         amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
         found[prefix + parameter.name] = Estimate(
-            within(parameter, value), parameter.spread(amount, value), parameter.unit)
+            within(parameter, value), parameter.spread(amount, value),
+            unit_of(parameter.unit))
         trials = sorted({trial[parameter.name] for trial in _trials(search, placement)})
         if len(trials) > 2 and not (trials[0] + AT_EDGE * abs(trials[0]) < value
                                     < trials[-1] - AT_EDGE * abs(trials[-1])):
             bound.append(prefix + parameter.name)
     return found, bound
+
+
+def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
+    """Return what makes units of a drive's parameters from those of a drive that pushes."""
+    if drive is None:
+        return lambda unit: unit
+    name = drive if isinstance(drive, str) else design.drives[drive]
+    return design.residuals.units_of(name).of
 
 
 def _trials(search: Search, placement: Placement) -> Sequence[Mapping[str, float]]:
@@ -197,7 +209,8 @@ def estimate_present(search: Search, found: CandidateSet, fitted: ForceModel, na
     units = {p.name: p.unit for p in getattr(effect, 'parameters', ())}
     prefix = f'effects.{name}.'
     return {key: Estimate(float(value), known.get(key, float('nan')),
-                          units[key.rpartition('.')[2]])
+                          _units(search.design, key.rpartition('.')[0] or None)(
+                              units[key.rpartition('.')[2]]))
             for full, value in fitted.values.items() if full.startswith(prefix)
             for key in [full.removeprefix(prefix)]}
 
@@ -224,7 +237,8 @@ def calibrations(search: Search, found: CandidateSet, widths: Mapping[int, float
                 column.value(float(found.fit.coefficients[k])), std, number.unit))
     before = np.broadcast_to(design.given.reversal.velocity, len(design.drives))
     # Widths are told without an uncertainty: the fits allow for all of them anyway.
-    return calibrated + [Calibration(*place_of(design, d), float(before[d]), width, 0.0, 'm/s')
-                         for d, width in widths.items() if width != before[d]]
+    return calibrated + [
+        Calibration(*place_of(design, d), float(before[d]), width, 0.0, _units(design, d)('m/s'))
+        for d, width in widths.items() if width != before[d]]
 
 

@@ -91,7 +91,7 @@ class PatternLibrary:
             residuals.drives, residuals.time[index], residuals.segment[index],
             residuals.measured[index], residuals.model[index], {},
             {name: values[index] for name, values in residuals.variables.items()},
-            residuals.period)
+            residuals.period, residuals.units)
 
     @cached_property
     def _scanned(self) -> list[_Scanned]:

@@ -47,7 +47,8 @@ def refuse_paths(paths: Sequence[str]) -> None:
 
 def read(path: str | PathLike[str], model: ForceModel, topic: str | None = None) -> Recording:
     """Read a recording, with what its numbers rather mean; refuse positions that are no metres."""
-    recording = read_recording(path, model.drives, topic)
+    recording = read_recording(path, model.drives, topic, None, model.gain,
+                               model.efforts_in_amperes)
     mistakes = find_mistakes(model, recording)
     for finding in mistakes:
         if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):

@@ -1,0 +1,56 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Units of drives: of those that push, and of those that turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+# Units of a drive that pushes, and of the same quantity of one that turns.
+TURNED = {'m': 'rad', 'm/s': 'rad/s', 'm/s^2': 'rad/s^2', 'N': 'N m', 'kg': 'kg m^2',
+          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad'}
+
+
+@dataclass(frozen=True)
+class DriveUnits:
+    """Units of one drive's quantities.
+
+    Parameters
+    ----------
+    turns : bool
+        Whether it is revolute.
+    """
+
+    turns: bool = False
+
+    def of(self, unit: str) -> str:
+        """Return the unit of a quantity of which this is the unit where a drive pushes."""
+        return TURNED.get(unit, unit) if self.turns else unit
+
+    @property
+    def effort(self) -> str:
+        """Unit of efforts."""
+        return self.of('N')
+
+    @property
+    def position(self) -> str:
+        """Unit of positions."""
+        return self.of('m')
+
+
+def common_effort(units: Sequence[DriveUnits]) -> str:
+    """Return the unit of errors over all drives: that of their efforts, or of both kinds."""
+    return ' or '.join(sorted({one.effort for one in units})) or 'N'

@@ -1,0 +1,152 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Physics that is in a simulated arm and not in its model, in forms of its own.
+
+Sizes are drawn in units of each joint's largest effort and speed, to fit arms of any size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+
+STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
+
+
+@dataclass(frozen=True)
+class JointMoment:
+    """One joint along a motion, (N,) each, and its scales.
+
+    Parameters
+    ----------
+    time, position, velocity, acceleration, load : (N,) arrays
+    effort, speed : float
+        Largest effort and speed of the motion.
+    gear_ratio : float
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    load: Array
+    effort: float
+    speed: float
+    gear_ratio: float
+
+    @property
+    def sign(self) -> Array:
+        """v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
+        width = STEEPNESS * self.speed
+        sign: Array = self.velocity / np.sqrt(self.velocity ** 2 + width ** 2)
+        return sign
+
+
+@dataclass(frozen=True)
+class JointForm:
+    """A hidden force on a joint.
+
+    Parameters
+    ----------
+    form : str
+        Its equation.
+    draw : callable
+        From a random generator and a moment: parameters, the size first.
+    force : callable
+        From parameters and a moment: the force, (N,).
+    """
+
+    form: str
+    draw: Callable[[np.random.Generator, JointMoment], dict[str, float]]
+    force: Callable[[Mapping[str, float], JointMoment], Array]
+
+
+def _share(low: float, high: float) -> Callable[[np.random.Generator], float]:
+    return lambda rng: float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+SIZE = _share(0.03, 0.1)  # of the largest effort
+
+
+FORMS: dict[str, JointForm] = {
+    'viscous_friction': JointForm(
+        'c v_1 asinh(v / v_1)',
+        lambda rng, m: {'coefficient': SIZE(rng) * m.effort / m.speed,
+                        'thinning_velocity': 2 * m.speed},
+        lambda p, m: p['coefficient'] * p['thinning_velocity'] * np.arcsinh(
+            m.velocity / p['thinning_velocity'])),
+    'coulomb_friction': JointForm(
+        'F v / sqrt(v^2 + w^2)',
+        lambda rng, m: {'force': SIZE(rng) * m.effort}, lambda p, m: p['force'] * m.sign),
+    'asymmetric_friction': JointForm(
+        'c v for v > 0, else 0', lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed},
+        lambda p, m: p['coefficient'] * np.maximum(m.velocity, 0.0)),
+    'stribeck_friction': JointForm(
+        'F exp(-|v| / v_s) v / sqrt(v^2 + w^2)',
+        lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'velocity': 0.1 * m.speed},
+        lambda p, m: p['force'] * np.exp(-np.abs(m.velocity) / p['velocity']) * m.sign),
+    'quadratic_friction': JointForm(
+        'c v |v|', lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed ** 2},
+        lambda p, m: p['coefficient'] * m.velocity * np.abs(m.velocity)),
+    'load_friction': JointForm(
+        'dmu |tau|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2)',
+        lambda rng, m: {'coefficient': 2 * SIZE(rng), 'reference': m.effort},
+        lambda p, m: p['coefficient'] * np.cbrt(m.load ** 2 * p['reference']) * m.sign),
+    'friction_drift': JointForm(
+        'F exp(-t / T) v / sqrt(v^2 + w^2)',
+        lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'time': 0.3 * float(m.time[-1])},
+        lambda p, m: p['force'] * np.exp(-m.time / p['time']) * m.sign),
+    'effort_offset': JointForm(
+        'constant', lambda rng, m: {'force': SIZE(rng) * m.effort},
+        lambda p, m: np.full_like(m.time, p['force'])),
+    'drive_spring': JointForm(
+        'k (q - q_0)', lambda rng, m: {'stiffness': SIZE(rng) * m.effort / float(
+            np.ptp(m.position)) * 2, 'zero': float(np.mean(m.position))},
+        lambda p, m: p['stiffness'] * (m.position - p['zero'])),
+    'force_ripple': JointForm(
+        'A sin(2 pi q / p + phi) + A / 4 sin(4 pi q / p)',
+        lambda rng, m: {'force': 0.5 * SIZE(rng) * m.effort, 'phase': float(rng.uniform(0, 6)),
+                        'pitch': np.pi / m.gear_ratio if m.gear_ratio > 1 else float(
+                            np.ptp(m.position)) / 12},
+        lambda p, m: p['force'] * (np.sin(2 * np.pi * m.position / p['pitch'] + p['phase'])
+                                   + 0.25 * np.sin(4 * np.pi * m.position / p['pitch']))),
+    'drive_inertia': JointForm(
+        'm a', lambda rng, m: {'mass': 2 * SIZE(rng) * m.effort / float(
+            np.abs(m.acceleration).max())},
+        lambda p, m: p['mass'] * m.acceleration),
+}
+# Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
+OF_ARM = ('payload_mass', 'base_tilt', 'external_wrench', 'effort_gain')
+NAMES = (*FORMS, *OF_ARM)
+
+
+def require_known(names: tuple[str, ...]) -> None:
+    """Raise HiddenEffectError for a name that no hidden effect of an arm has."""
+    for name in names:
+        if name not in NAMES:
+            raise HiddenEffectError(f'{name} is no hidden effect of an arm, must be one of '
+                                    f'{", ".join(NAMES)}')
+
+
+def truth(name: str, drives: list[str] | None, parameters: Mapping[str, Any], form: str,
+          ) -> dict[str, Any]:
+    """Return what was hidden, as data for JSON."""
+    return {'name': name, 'drives': drives, 'parameters': dict(parameters), 'form': form}
