@@ -43,6 +43,7 @@ from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.hidden_forces import Vibration
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.prescribed import PrescribedPlant, Readings
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
@@ -61,6 +62,7 @@ SCALES = (0.01, 3.0)
 SCALES_OF = {'hysteresis': (0.5, 3.0)}
 SCALINGS, SCALED = 8, 0.03  # rounds, and relative error of the strength that is good enough
 PINK = '1/f'
+VIBRATIONS = (0.3, 50.0)  # [Hz], of the row of that name
 
 
 @dataclass(frozen=True)
@@ -217,6 +219,7 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
                      'snr_by_drive': (one.by_drive * NOISE / deviation).tolist()}
                     for one in found],
         'noise': deviation, 'noise_floor': float(np.sqrt(np.mean(place.treat(noise) ** 2))),
+        'noise_by_drive': np.sqrt(np.mean(place.treat(noise) ** 2, axis=0)).tolist(),
         'drive_width': list(place.settings.drive_width),
         'passive_width': place.settings.passive_width,
         'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.to_json()}
@@ -267,12 +270,22 @@ def _draw(case: Case, place: Scene, name: str) -> _Drawn:
     return drawn
 
 
+def _effect(case: Case, name: str, what: str, scale: float) -> HiddenEffect:
+    """Return the effect that a case draws; in the row `vibration` at any frequency."""
+    effect = draw_effect(name, case.rng(what), scale)
+    if case.row != 'vibration':
+        return effect
+    frequency = float(np.exp(case.rng(f'frequency {what}').uniform(*np.log(VIBRATIONS))))
+    return Vibration({drive: {**own, 'frequency': frequency}
+                      for drive, own in effect.parameters.items()})
+
+
 def _scaled(case: Case, place: Scene, name: str, what: str, wanted: float) -> _Drawn:
     refit, scale = place.refit(case.noise), 1.0
     past: list[tuple[float, float]] = []
     rays = {}
     for _ in range(SCALINGS):
-        effect = draw_effect(name, case.rng(what), scale)
+        effect = _effect(case, name, what, scale)
         ray = refit.beyond(place.contribution(effect))
         strength = ray.strength()
         past.append((scale, strength))
@@ -285,7 +298,7 @@ def _scaled(case: Case, place: Scene, name: str, what: str, wanted: float) -> _D
             break
         scale = following
     scale, strength = min(past, key=lambda pair: abs(np.log(max(pair[1], 1e-9) / wanted)))
-    effect = draw_effect(name, case.rng(what), scale)
+    effect = _effect(case, name, what, scale)
     near = abs(strength / wanted - 1) < SCALED
     return _Drawn(effect, scale, strength, rays[scale].by_drive(),
                   NOISE if near else NOISE * strength / wanted)

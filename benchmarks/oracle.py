@@ -24,11 +24,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.selection.decisions import DECISIONS
-from pprs_dynamics.selection.expansion import Selection, linear_prediction
+from pprs_dynamics.selection.expansion import Selection, linear_error
 from pprs_dynamics.selection.search import Search
 
 RIVALS = 6  # proposals that are fitted
@@ -53,6 +51,5 @@ def consult(selection: Selection, truth: Mapping[str, Any]) -> dict[str, Any]:
     base = replace(nothing, fit=search.regression.at((), own.fit.amplitudes))
     rivals = [search.refined(search.evaluate(one, own)).cost
               for one in search.proposals(base, RIVALS) if one[0].name != effect.name]
-    left = design.residuals.measured - linear_prediction(search, own)
-    return {'best_error': float(np.sqrt(np.nanmean(left ** 2))),
+    return {'best_error': linear_error(search, own),
             'separable': min(rivals, default=nothing.cost) > own.cost + DECISIONS.rival_margin}

@@ -54,7 +54,8 @@ NOISES: tuple[float | str, ...] = (0.0, 0.9, 0.98, 0.997, 0.999, PINK)
 SLOW_NOISES = (0.98, 0.997)
 WIDTHS = (0.2, 0.5, 2.0, 5.0)
 SETS_PER_SEED = 3  # pairs, and triples
-ROWS = ('effects', 'nothing', 'width', 'pairs', 'unknown', 'slow')
+ROWS = ('effects', 'nothing', 'width', 'pairs', 'unknown', 'vibration', 'slow')
+VIBRATIONS_PER_SEED = 5
 # Of what a diagnosis says, this many candidates are kept.
 CANDIDATES = 6
 
@@ -74,6 +75,10 @@ def cases(rows: Iterable[str], seeds: int, nothing: int, snrs: Iterable[float],
             found += [Case(row, (), s, width=WIDTHS[s % len(WIDTHS)]) for s in empty]
         elif row == 'pairs':
             found += [Case(row, names, s, 0.0) for s in drawn for names in _sets(s)]
+        elif row == 'vibration':
+            found += [Case(row, ('vibration',), VIBRATIONS_PER_SEED * s + k, snr)
+                      for s in drawn for k in range(VIBRATIONS_PER_SEED) for snr in levels
+                      if snr >= 1]
         elif row == 'slow':
             found += [Case(row, (name,), s, snr, noise) for s in drawn
                       for name in IN_CATALOGUE for snr in levels if snr == 1
@@ -106,13 +111,16 @@ def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> di
         diagnosis = diagnose(model, [recording])
         seconds = time.perf_counter() - start
         said = diagnosis.to_json()
+        left = {drive: float(error) for drive, error in zip(
+            model.drives, np.sqrt(np.nanmean(np.square(diagnosis.remaining), axis=0)),
+            strict=True)}
         selection = getattr(diagnosis, 'selection', None)
         oracle = consult(selection, truth) if selection else {}
     except Exception:  # the table counts it, and the run goes on
         return {'name': case.name, 'row': case.row, 'failed': traceback.format_exc()}
     said = {**said, 'candidates': said.get('candidates', [])[:CANDIDATES]}
     outcome = {'name': case.name, 'row': case.row, 'truth': truth, 'said': said,
-               'seconds': seconds, 'oracle': oracle}
+               'seconds': seconds, 'left': left, 'oracle': oracle}
     return {**outcome, 'judged': judge(outcome)}
 
 

@@ -22,10 +22,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up_diagnosis import NOISE, made_up_residuals, statement
 from scipy.signal import lfilter
 
 from pprs_dynamics.diagnosis.comparison import compare
-from pprs_dynamics.diagnosis.localisation import Localisation, localise
+from pprs_dynamics.diagnosis.localisation import DriveFindings, Localisation, localise
 from pprs_dynamics.regression.joint_fit import Regression
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.profiles import error_profile, error_spectrum
@@ -189,3 +190,23 @@ def test_a_drive_that_drifts_far_more_than_its_peers_is_told() -> None:
     assert ('drive_2', 'time') in [(one.drive, one.variable)
                                    for one in found.localisation.statements]
     assert found.drives['drive_2'].grade != 'noise'
+
+
+@pytest.mark.parametrize(('share', 'is_noise'), [(0.5, False), (0.05, True), (0.001, True)])
+def test_what_a_statement_explains_is_never_put_down_to_noise(
+    share: float, is_noise: bool,
+) -> None:
+    residuals = made_up_residuals()
+    error = residuals.error[:, 1]
+    told = replace(statement('slide_2'), mean_square=share * float(np.mean(error ** 2)))
+    # A spectrum that takes all of the error for noise.
+    loud = NoiseSpectrum(np.array([1.0]), np.array([4 * NOISE ** 2, 0.0]), residuals.period)
+    where = Localisation((told,), {name: DriveFindings((told,) if name == 'slide_2' else (), loud)
+                                   for name in residuals.drives})
+    found = compare(residuals, where)
+    drive = found.drives['slide_2']
+    assert drive.noise_floor ** 2 <= (1 - share) * drive.rms ** 2 * (1 + 1e-9)
+    assert found.where == ((told,) if share >= 0.01 else ())
+    assert ('on every drive' in found.verdict) == (not found.where)
+    assert ('nothing else stands out' in drive.verdict) == (not found.where)
+    assert (drive.grade == 'noise') is is_noise

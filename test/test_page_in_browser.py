@@ -24,24 +24,18 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
-from made_up_diagnosis import (
-    NOISE,
-    found_effect,
-    made_up_diagnosis,
-    made_up_residuals,
-    ranked_sets,
-)
+from made_up_diagnosis import NOISE, made_up_diagnosis, made_up_residuals
+from made_up_pages import made_up_pages
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.diagnosis.comparison import compare
-from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.report.comparison_page import comparison_page
 from pprs_dynamics.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.report.robot_view import write_robot_page
 
+PAGES = ('diagnosis', 'comparison', 'adoption', 'history', 'experiment', 'fleet', 'robot')
 MOST_BYTES = 4_000_000
 FIRST_PAINT = 500.0  # [ms]
 LEAST_CONTRAST, LEAST_TEXT = 4.5, 12.0  # WCAG 2.2 AA; [px]
@@ -80,20 +74,12 @@ READABLE = '''() => {
 @pytest.fixture(scope='module')
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp('pages')
-    diagnosis = made_up_diagnosis(
-        effects=(found_effect('coulomb_friction', ('lift_2', 'slide_1')),),
-        sets=ranked_sets('coulomb_friction', 'hysteresis'))
-    words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
-    found = diagnosis_page(diagnosis, words, made_up_residuals(), ['my run.mcap'])
-    comparison = compare(diagnosis.residuals)
-    where = comparison_page(DriveModel.load(), [], diagnosis.residuals, comparison, ['so'],
-                            'pprs diagnose run.mcap')
     path = Excitation(duration=4.0, seed=1)
     write_robot_page(folder / 'robot.html', DriveModel.load(),
                      path.motion(np.arange(0.0, 4.0, 0.02)), 'The robot')
-    return {'diagnosis': found.write(folder / 'diagnosis.html'),
-            'comparison': where.write(folder / 'comparison.html'),
-            'robot': folder / 'robot.html'}
+    return {'robot': folder / 'robot.html',
+            **{name: page.write(folder / f'{name}.html')
+               for name, page in made_up_pages(folder).items()}}
 
 
 @pytest.fixture(scope='module')
@@ -115,7 +101,7 @@ def see(browser: Any, pages: dict[str, Path]) -> Iterator[Any]:
 
 
 @needs_browser
-@pytest.mark.parametrize('name', ['diagnosis', 'comparison', 'robot'])
+@pytest.mark.parametrize('name', PAGES)
 def test_text_is_painted_at_once_and_the_file_is_small(
     see: Any, pages: dict[str, Path], name: str,
 ) -> None:
@@ -130,7 +116,7 @@ def test_text_is_painted_at_once_and_the_file_is_small(
 
 
 @needs_browser
-@pytest.mark.parametrize('name', ['diagnosis', 'comparison'])
+@pytest.mark.parametrize('name', ['diagnosis', 'comparison', 'adoption'])
 def test_one_screen_has_verdict_fall_picture_and_the_command(see: Any, name: str) -> None:
     seen = see(name)
     seen.drawn(1)
@@ -141,7 +127,7 @@ def test_one_screen_has_verdict_fall_picture_and_the_command(see: Any, name: str
 
 
 @needs_browser
-@pytest.mark.parametrize('name', ['diagnosis', 'comparison', 'robot'])
+@pytest.mark.parametrize('name', PAGES)
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 @pytest.mark.parametrize('width', [1280, 390])
 def test_every_figure_is_drawn_and_all_text_can_be_read(
@@ -199,7 +185,7 @@ def test_menus_open_on_the_worst_drive_and_go_together(see: Any) -> None:
 
 @needs_browser
 def test_landmarks_labels_captions_and_one_tab_stop_per_figure(see: Any) -> None:
-    for name in ('diagnosis', 'comparison'):
+    for name in PAGES:
         seen = see(name)
         figures = seen.unfold()
         for landmark in ('header h1', 'main'):

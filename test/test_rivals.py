@@ -21,6 +21,7 @@ import pytest
 
 from pprs_dynamics import AxisModel
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.diagnosis.quantities import newtons
 from pprs_dynamics.diagnosis.rivals import rival_effects
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.recording import Recording
@@ -61,6 +62,7 @@ def test_a_rival_has_the_value_that_explains_the_same(ambiguous: Diagnosis) -> N
             left = rival.force - best.force
             assert np.sqrt(np.mean(left ** 2)) < 0.1 * np.sqrt(np.mean(best.force ** 2))
             assert rival.error_after == pytest.approx(best.error_after, rel=0.05)
+            assert rival.held_out_after == pytest.approx(best.held_out_after, rel=0.05)
             assert 0 <= rival.cost < 10
 
 
@@ -70,5 +72,7 @@ def test_each_rival_of_the_answer_is_put_into_words(ambiguous: Diagnosis) -> Non
     named = {name for names in ambiguous.indistinguishable for name in names[1:]}
     assert {one.name for one in rivals} == named
     assert len(words.rivals) == len(rivals)
+    for said, rival in zip(words.rivals, rivals, strict=True):
+        assert f'{newtons(rival.held_out_after)} on held-out data' in said.why
     assert 'this data cannot tell which' in words.headline
     assert 'next-experiment' in words.command

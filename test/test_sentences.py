@@ -117,7 +117,7 @@ def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption
     worse = made_up_diagnosis(effects=(found_effect('hysteresis', held_out_after=0.3),))
     words = word_diagnosis(worse)
     assert 'lacks' not in words.headline
-    assert 'hysteresis lowers the error of the fit, but not the one on held-out' in words.headline
+    assert 'hysteresis was fitted as well, but the error on held-out' in words.headline
     assert 'Fitted, but not confirmed: hysteresis' in words.effects[0].what
     assert 'do not adopt it' in words.effects[0].why
     assert words.following.startswith('Do not add hysteresis')
@@ -321,7 +321,7 @@ def test_one_pattern_on_all_drives_is_one_finding() -> None:
 
 def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:
     found = found_effect('external_wrench', None)
-    rival = RivalEffect('base_tilt', found.effect, None, found.parameters, 0.0521, 3.24,
+    rival = RivalEffect('base_tilt', found.effect, None, found.parameters, 0.0521, 0.0533, 3.24,
                         found.force, made_up_residuals().error)
     words = word_diagnosis(ambiguous(), rivals=(rival,))
     said, = words.rivals

@@ -43,10 +43,9 @@ from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.residuals.paired_errors import block_gains, rms
 from pprs_dynamics.residuals.residuals import Residuals
-from pprs_dynamics.selection.candidates import CandidateSet
 from pprs_dynamics.selection.decisions import DECISIONS, Decisions
 from pprs_dynamics.selection.estimates import Calibration, Estimate, estimate_present
-from pprs_dynamics.selection.expansion import fitted_model, linear_prediction
+from pprs_dynamics.selection.expansion import fitted_model, linear_error
 from pprs_dynamics.selection.held_out import hold_out
 from pprs_dynamics.selection.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.selection.search import Search
@@ -190,7 +189,7 @@ def adopt(
         held_out, gains = case.validated(fitted.plain, fitted.model, diagnosis.noise)
     else:
         held_out, gains = (fitted.held_out_before, fitted.held_out_after), fitted.block_gains
-    promised = _linear_error(fitted.search, fitted.found)
+    promised = linear_error(fitted.search, fitted.found)
     found += [*objections.of_linearity(promised, rms(after)),
               *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
     report(1.0)
@@ -275,12 +274,6 @@ class _Case:
             self.diagnosis.noise_floors)
 
 
-def _linear_error(search: Search, found: CandidateSet) -> float:
-    """Return the error of a set's linear prediction, over samples and drives [N]."""
-    error = search.regression.residuals.measured - linear_prediction(search, found)
-    return float(np.sqrt(np.nanmean(error ** 2)))
-
-
 def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     """Return the model with what it has fitted anew, where that gains anything."""
     design = Design.of(case.start, case.recordings,
@@ -305,7 +298,7 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     if case.validate:
         held_out, gains = case.validated(case.model, fitted, noises)
     if not refused:
-        refused = [*objections.of_linearity(_linear_error(search, found), rms(after)),
+        refused = [*objections.of_linearity(linear_error(search, found), rms(after)),
                    *objections.of_held_out_error(*held_out, gains, case.model, case.held_out)]
     report(1.0)
     effect = next(one for one in fitted.effects if one.name == name)

@@ -39,6 +39,7 @@ from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.diagnosis.next_step import GivenFiles
 from pprs_dynamics.diagnosis.rivals import rival_effects
 from pprs_dynamics.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.diagnosis.what_if import what_if
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.model_file import load_model
 from pprs_dynamics.report.diagnosis_page import diagnosis_page
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
     keep(diagnosis_key(model, options.recordings, options.topic), diagnosis)
-    rivals = rival_effects(diagnosis)
+    rivals = rival_effects(diagnosis, validate)
     words = word_diagnosis(diagnosis, GivenFiles(
         tuple(options.recordings), tuple(options.validate),
         '' if options.model == DEFAULT_MODEL else str(options.model)), rivals)
@@ -86,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
         with progress_bar(screen, 'page') as progress:
             after, _ = measure_residuals(diagnosis.adopted, recordings, progress)
             page = diagnosis_page(diagnosis, words, after, [one.name for one in recordings],
-                                  [one.name for one in validate], rivals)
+                                  [one.name for one in validate], rivals, what_if(diagnosis))
         screen.print(f'page: {shown(page.write(options.report))}')
     if options.adopt_all:
         return adopt_what_was_found(options, model, recordings, validate, diagnosis, screen)

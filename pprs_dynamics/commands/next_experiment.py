@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 
 import numpy as np
 from rich.markup import escape
@@ -100,10 +101,11 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, {**experiment.to_json(), 'purpose': options.purpose,
                                   'seed': options.seed, 'rate': options.rate,
                                   'output': options.output})
+    command = shlex.join([
+        'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
+        '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     if options.report:
-        page = experiment_page(experiment, motion)
+        page = experiment_page(experiment, motion, command)
         screen.print(f'page: {shown(page.write(options.report))}')
-    screen.print('[bold]play it[/]: ' + escape(
-        f'ros2 run pprs_dynamics play_trajectory --ros-args -p source:=csv -p '
-        f'file:={options.output} -p rate:={options.rate} -p lead_in:=3.0'))
+    screen.print(f'[bold]play it[/]: {escape(command)}')
     return 0

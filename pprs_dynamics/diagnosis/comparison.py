@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.localisation import Localisation, localise
-from pprs_dynamics.diagnosis.quantities import newtons, percent
+from pprs_dynamics.diagnosis.quantities import listed, newtons, percent
 from pprs_dynamics.diagnosis.statements import Statement
 from pprs_dynamics.residuals.residuals import Residuals
 
@@ -105,10 +105,7 @@ class Comparison:
     @property
     def where(self) -> tuple[Statement, ...]:
         """Where it fails, what explains most of the squared error first, and nothing slight."""
-        shares = {one: one.mean_square / max(self.drives[one.drive].rms ** 2, 1e-300)
-                  for one in self.localisation.statements if one.drive in self.drives}
-        told = [one for one, share in shares.items() if share >= LEAST_SHARE]
-        return tuple(sorted(told, key=lambda one: -one.mean_square))
+        return _told(self.drives, self.localisation)
 
     def to_json(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
@@ -147,7 +144,8 @@ def compare(residuals: Residuals, localisation: Localisation | None = None) -> C
     whole = float(np.sqrt(efforts / count))
     constant = all(np.isnan(drive.relative) for drive in drives.values())
     relative = float('nan') if constant else rms / whole
-    return Comparison(drives, rms, relative, _overall_verdict(drives, rms, relative), where)
+    told = {one.drive for one in _told(drives, where)}
+    return Comparison(drives, rms, relative, _overall_verdict(drives, told, rms, relative), where)
 
 
 def _compare_drive(
@@ -167,6 +165,10 @@ def _compare_drive(
     floor = rms if noise is None else min(rms, noise.rms_at(residuals.period))
     if level is not None:
         floor = float(np.sqrt(max(floor ** 2 - level.mean_square, 0.0)))
+    # What a statement explains is no noise, even where a spectrum takes its peaks for some.
+    most = max((one.mean_square for one in (findings.statements if findings is not None else ())
+                if one.kind not in ('scatter', 'level')), default=0.0)
+    floor = min(floor, float(np.sqrt(max(rms ** 2 - most, 0.0))))
     unexplained = float(np.sqrt(max(rms ** 2 - floor ** 2, 0.0)))
     parts = {part: _rms(values[known, index] - values[known, index].mean())
              for part, values in residuals.parts.items()}
@@ -174,8 +176,9 @@ def _compare_drive(
     return DriveComparison(
         rms, relative, bias, peak, swing, explained, len(error),
         float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
-        unexplained, parts, grade,
-        f'{name}: {_verdict(rms, swing, relative, floor, unexplained, parts, grade)}')
+        unexplained, parts, grade, f'{name}: ' + _verdict(
+            rms, swing, relative, floor, unexplained, parts, grade,
+            most >= LEAST_SHARE * rms ** 2))
 
 
 def _grade(
@@ -193,7 +196,7 @@ def _grade(
 
 def _verdict(
     rms: float, swing: float, relative: float, floor: float, unexplained: float,
-    parts: Mapping[str, float], grade: str,
+    parts: Mapping[str, float], grade: str, is_told: bool,
 ) -> str:
     of = ('of a constant effort' if np.isnan(relative)
           else f'of {newtons(swing)} ({percent(relative)})')
@@ -201,7 +204,8 @@ def _verdict(
     if rms == 0:
         return f'the model leaves nothing {of}'
     if grade == 'noise':
-        return left + 'noise accounts for it: nothing else stands out in this recording'
+        return left + ('noise accounts for most of it' if is_told else
+                       'noise accounts for it: nothing else stands out in this recording')
     left += (f'noise accounts for {newtons(floor)}, so {newtons(unexplained)} is unexplained')
     ranked = sorted(((size, part) for part, size in parts.items() if size > 0), reverse=True)
     below = [(size, part) for size, part in ranked if size < unexplained]
@@ -214,11 +218,20 @@ def _verdict(
     return f'{left}: {grade}'
 
 
-def _overall_verdict(drives: Mapping[str, DriveComparison], rms: float, relative: float) -> str:
+def _told(drives: Mapping[str, DriveComparison], where: Localisation) -> tuple[Statement, ...]:
+    told = [one for one in where.statements if one.drive in drives
+            and one.mean_square >= LEAST_SHARE * drives[one.drive].rms ** 2]
+    return tuple(sorted(told, key=lambda one: -one.mean_square))
+
+
+def _overall_verdict(drives: Mapping[str, DriveComparison], told: Collection[str], rms: float,
+                     relative: float) -> str:
     share = '' if np.isnan(relative) else f' ({percent(relative)} of the effort)'
     beyond = {name: drive for name, drive in drives.items() if drive.grade != 'noise'}
     if not beyond:
-        return f'the model leaves {newtons(rms)}{share}: noise accounts for it on every drive'
+        most = f'most of it on {listed(sorted(told))}, for all of it elsewhere' if told else (
+            'it on every drive')
+        return f'the model leaves {newtons(rms)}{share}: noise accounts for {most}'
     worst = max(beyond, key=lambda name: beyond[name].unexplained)
     where = 'every drive' if len(beyond) == len(drives) > 1 else ', '.join(beyond)
     return (f'the model leaves {newtons(rms)}{share}: more than noise on {where}; '

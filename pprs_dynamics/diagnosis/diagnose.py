@@ -45,7 +45,7 @@ from pprs_dynamics.selection.expansion import (
     Selection,
     exact_forces,
     fitted_model,
-    linear_prediction,
+    linear_error,
     select,
 )
 from pprs_dynamics.selection.form import Remainder, without_remainders
@@ -210,20 +210,18 @@ class _Answer:
     def _effects(self, remaining: Array) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
         search = self.search
-        measured = search.regression.residuals.measured
         without = {c: self._without(c) for c in self.kept.effects}
         evidence = {c: one.total - self.kept.total for c, one in without.items()}
         # First what lowers the error most: that matters first to whoever compensates it.
-        ordered = sorted(self.kept.effects, key=lambda c: -_rms(
-            measured - linear_prediction(search, without[c])))
+        ordered = sorted(self.kept.effects, key=lambda c: -linear_error(
+            search, without[c]))
         if not ordered:
             return []
         unknown = self.kept.unknowns
         steps = [search.evaluate((*ordered[:k], *unknown), self.kept)
                  for k in range(len(ordered))] + [self.kept]
         errors = [_rms(self.selection.first.design.residuals.error),
-                  *(_rms(measured - linear_prediction(search, step))
-                    for step in steps[1:-1]), _rms(remaining)]
+                  *(linear_error(search, step) for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.selection.first.design.given
             models = [given, *(fitted_model(search, step) for step in steps[1:])]
@@ -297,8 +295,8 @@ class _Answer:
 
     def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:
-        error = _rms(search.regression.residuals.measured - linear_prediction(search, found))
-        return RankedEffect(candidate.name, self._names(candidate), evidence, error)
+        return RankedEffect(candidate.name, self._names(candidate), evidence,
+                            linear_error(search, found))
 
     def _sets(self) -> tuple[RankedSet, ...]:
         found: dict[frozenset[str], RankedSet] = {}

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +24,15 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.residuals.paired_errors import rms
+from pprs_dynamics.selection.candidates import CandidateSet
 from pprs_dynamics.selection.estimates import Estimate, estimate
-from pprs_dynamics.selection.expansion import linear_prediction
+from pprs_dynamics.selection.expansion import fitted_model, linear_prediction
+from pprs_dynamics.selection.held_out import hold_out
+from pprs_dynamics.selection.search import Search
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,8 @@ class RivalEffect:
     parameters : dict of str to Estimate
     error_after : float
         With it in place of the adopted one [N].
+    held_out_after : float
+        The same on held-out data [N]; NaN where it is no model that can be evaluated there.
     cost : float
         Of its set, above the best one's.
     force, remaining : (M, D) array
@@ -51,6 +61,7 @@ class RivalEffect:
     drives: tuple[str, ...] | None
     parameters: dict[str, Estimate]
     error_after: float
+    held_out_after: float
     cost: float
     force: Array
     remaining: Array
@@ -61,8 +72,16 @@ class RivalEffect:
         return self.effect.name
 
 
-def rival_effects(diagnosis: Diagnosis) -> tuple[RivalEffect, ...]:
-    """Return each rival that a diagnosis names, from the best set that holds it."""
+def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
+                  ) -> tuple[RivalEffect, ...]:
+    """Return each rival that a diagnosis names, from the best set that holds it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    validate : sequence of Recording, optional
+        Those of the diagnosis; without them held-out errors are taken on blocks.
+    """
     selection = diagnosis.selection
     if selection is None:
         return ()
@@ -83,6 +102,16 @@ def rival_effects(diagnosis: Diagnosis) -> tuple[RivalEffect, ...]:
             of, candidate.effect,
             None if drives is None else tuple(search.design.drives[d] for d in drives),
             estimate(search, best, candidate).parameters,
-            float(np.sqrt(np.nanmean(remaining ** 2))), best.cost - selection.best.cost,
+            float(np.sqrt(np.nanmean(remaining ** 2))), _held_out(search, best, validate),
+            best.cost - selection.best.cost,
             best.force(candidate, measured.shape), remaining))
     return tuple(found)
+
+
+def _held_out(search: Search, found: CandidateSet, validate: Sequence[Recording]) -> float:
+    if not validate:
+        return hold_out(search, found).error
+    try:
+        return rms(measure_residuals(fitted_model(search, found), validate)[0])
+    except PprsError:
+        return float('nan')

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.found_effects import FoundEffect, RankedEffect, WithinModelError
@@ -189,8 +190,8 @@ def _doubted(diagnosis: Diagnosis) -> list[str]:
 def _doubt(diagnosis: Diagnosis) -> str:
     names = _doubted(diagnosis)
     return '' if not names else (
-        f' {listed(names)} lower{"s" * (len(names) == 1)} the error of the fit, but not the one on '
-        'held-out data.')
+        f' {listed(names)} {"was" if len(names) == 1 else "were"} fitted as well, but the error '
+        f'on held-out data does not fall with {"it" if len(names) == 1 else "them"}.')
 
 
 def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
@@ -222,10 +223,12 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
     card = rival.effect.card
     title = with_drives(rival.name, rival.drives, diagnosis.residuals.drives)
+    held_out = '' if isnan(rival.held_out_after) else (
+        f', and {newtons(rival.held_out_after)} on held-out data')
     return Finding(
         f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '
         f'{_parameters(diagnosis, rival)}.',
-        f'With it the error is {newtons(rival.error_after)}, and the cost of the set is '
+        f'With it the error is {newtons(rival.error_after)}{held_out}; the cost of the set is '
         f'{plain(rival.cost, 2)} above the best one.', sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like))
 
@@ -342,7 +345,9 @@ def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
-    after = with_uncertainty(one.after, one.std, one.unit)
+    # Widths of reversals come without an uncertainty: no more digits than they can have.
+    after = with_uncertainty(one.after, one.std, one.unit) if one.std else (
+        f'about {with_uncertainty(float(f"{one.after:.2g}"), 0.0, one.unit)}')
     moved = f'{one.label}: {with_uncertainty(one.before, 0.0, one.unit)} becomes {after}'
     tolerance = diagnosis.model.values.get(f'tolerances.{one.key}')
     if not tolerance:

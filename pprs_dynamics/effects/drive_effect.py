@@ -89,6 +89,15 @@ class DriveEffect(CatalogueEffect):
         """
 
     @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return how real forms depart from this one: per deviation, a change of each column.
+
+        They take part in every fit of the effect, in proportion to its force, with coefficients
+        of unit prior, so that they can neither make an effect nor hide another.
+        """
+        return ()
+
+    @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
         """Return the shape parameters to try first; they are refined between them."""
         return ({},)

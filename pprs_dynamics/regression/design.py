@@ -61,7 +61,6 @@ from pprs_dynamics.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
-    reversal_columns,
 )
 from pprs_dynamics.regression.terms import FullRate, Point, Term
 from pprs_dynamics.residuals.measuring import join_tables, treated_table
@@ -300,28 +299,6 @@ class Design:
             after = coefficients @ self.drive_rows(term.effect, term.drive, moved)
             slopes.append((after - before) / SHAPE_STEP)
         return np.stack(slopes)
-
-    def reversal_rows(self, term: Term, coefficients: Array) -> Array:
-        """Return what a term's friction changes by where it turns over otherwise, (w, M) [N].
-
-        None, (0, M), for what is no friction or knows its past.
-        """
-        effect = term.effect
-        if (term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect)
-                or effect.drive_memory() is not None):
-            return np.zeros((0, len(self.residuals)))
-        width = np.broadcast_to(self.model.reversal.velocity, len(self.drives))[term.drive]
-        parts = []
-        for recording in self.recordings:
-            samples = recording.samples(slice(None), term.drive)
-            force = coefficients @ np.stack(effect.columns(
-                replace(samples, direction=np.ones_like(samples.velocity)), **term.shape))
-            backward = coefficients @ np.stack(effect.columns(
-                replace(samples, direction=-np.ones_like(samples.velocity)), **term.shape))
-            rows = np.stack(reversal_columns(
-                (force - backward) / 2, samples.velocity, samples.direction, width))
-            parts.append(recording.treat(rows.T).T)
-        return np.concatenate(parts, axis=1)
 
     def _present_in_drives(self, effect: DriveEffect) -> list[BaseColumn]:
         """Return what an effect of the given model may still change, drive by drive."""

@@ -41,8 +41,9 @@ from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
 
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
-# The fit has converged when a round changes the deviance by less; rounds are bounded.
-CONVERGED, MOST_ROUNDS, NOISE_STEPS = 0.01, 40, 60
+# The fit has converged when a round changes the deviance by less, or by less than this share of
+# what it lies above the one it is compared with; rounds are bounded.
+CONVERGED, HOPELESS, MOST_ROUNDS, NOISE_STEPS = 0.01, 0.005, 40, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +161,8 @@ class Regression:
             self._products[key] = self.series[d].products(a.rows[d], other)
         return self._products[key]
 
-    def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
+    def fit(self, blocks: Sequence[Block], start: Array | None = None,
+            rival: float = np.inf) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
 
         Parameters
@@ -168,6 +170,8 @@ class Regression:
         blocks : sequence of Block
         start : (D, J + 1) array, optional
             Amplitudes of the noise to start from.
+        rival : float
+            The deviance to be compared with: far above it the fit is only a rough one.
         """
         system = NormalEquations(self, blocks)
         shapes = self.noise_shapes
@@ -176,7 +180,8 @@ class Regression:
         amplitudes, before = start, np.inf
         for _ in range(MOST_ROUNDS):
             solution = system.solve(shapes.spectrum(amplitudes), self.counts)
-            if abs(before - solution.deviance) < CONVERGED:
+            above = solution.deviance - rival
+            if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
                 break
             before = solution.deviance
             amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,

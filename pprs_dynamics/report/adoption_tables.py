@@ -26,7 +26,7 @@ from rich.panel import Panel
 from rich.table import Table
 
 from pprs_dynamics.adoption.adopt import VALIDATION, Adoption
-from pprs_dynamics.diagnosis.quantities import newtons, plain, with_uncertainty
+from pprs_dynamics.diagnosis.quantities import counted, newtons, plain, with_uncertainty
 
 MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2
@@ -98,8 +98,8 @@ def _parts(answer: Adoption) -> Iterator[Any]:
     if answer.adopted and answer.calibrated:
         clear = [one for one in answer.calibrated if abs(one.after - one.before) > 2 * one.std]
         told = f', clearly {", ".join(one.label for one in clear)}' if clear else ''
-        yield escape(f'{len(answer.calibrated)} numbers of the model move within their '
-                     f'tolerances{told}')
+        yield escape(f'{counted(len(answer.calibrated), "number of the model")} moved within '
+                     f'tolerance{told}')
     for remark in answer.remarks:
         yield f'[yellow]![/] {escape(remark)}'
 

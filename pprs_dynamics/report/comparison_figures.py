@@ -52,9 +52,16 @@ def thinned(time: Array, *curves: Array, points: int = POINTS) -> tuple[Array, .
     They are the extremes of equal spans. Samples that are not finite are left out where their
     span has others.
     """
-    if len(time) <= 2 * points:
-        return time, *curves
-    edges = np.linspace(0, len(time), points // len(curves) + 1).astype(int)
+    at = extremes(*curves, points=points)
+    return tuple(values[at] for values in (time, *curves))
+
+
+def extremes(*curves: Array, points: int) -> np.typing.NDArray[np.int_]:
+    """Return the samples of `thinned`."""
+    count = len(curves[0])
+    if count <= 2 * points:
+        return np.arange(count)
+    edges = np.linspace(0, count, points // len(curves) + 1).astype(int)
     kept: list[int] = []
     for start, stop in pairwise(edges.tolist()):
         found = set()
@@ -63,7 +70,7 @@ def thinned(time: Array, *curves: Array, points: int = POINTS) -> tuple[Array, .
             if np.isfinite(part).any():
                 found |= {start + int(np.nanargmin(part)), start + int(np.nanargmax(part))}
         kept += sorted(found or {start})
-    return tuple(values[kept] for values in (time, *curves))
+    return np.array(kept)
 
 
 def over_time(residuals: Residuals, drive: int, worst: list[tuple[float, float]]) -> Any:
@@ -282,15 +289,20 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
 
 def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:
     """Return times and curves of all segments at the same samples, with breaks between them."""
-    segments = np.unique(residuals.segment)
-    parts: list[tuple[Array, ...]] = []
-    for segment in segments:
-        inside = residuals.segment == segment
-        time, *curves = thinned(residuals.time[inside], *(one[inside] for one in values),
-                                points=max(50, POINTS // len(segments)))
-        gap = np.array([np.nan])
-        parts.append((np.append(time, time[-1:]), *(np.append(one, gap) for one in curves)))
-    time, *joined = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    at = shown_samples(residuals, *values)
+    is_break = at < 0
     # A screen shows no more than single precision holds.
-    shown: list[Any] = [one.astype(np.float32) for one in joined]
-    return time, *shown
+    curves: list[Any] = [np.where(is_break, np.nan, one[at]).astype(np.float32) for one in values]
+    return residuals.time[np.where(is_break, np.roll(at, 1), at)], *curves
+
+
+def shown_samples(residuals: Residuals, *values: Array, points: int = POINTS,
+                  ) -> np.typing.NDArray[np.int_]:
+    """Return the samples that are drawn of curves, as `thinned`; -1 after each segment."""
+    segments = np.unique(residuals.segment)
+    parts: list[np.typing.NDArray[np.int_]] = []
+    for segment in segments:
+        inside = np.flatnonzero(residuals.segment == segment)
+        at = extremes(*(one[inside] for one in values), points=max(50, points // len(segments)))
+        parts += [inside[at], np.array([-1])]
+    return np.concatenate(parts)

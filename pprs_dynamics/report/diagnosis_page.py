@@ -30,9 +30,11 @@ from pprs_dynamics.diagnosis.sentences import (
     unexplained_groups,
 )
 from pprs_dynamics.diagnosis.set_words import set_rows
+from pprs_dynamics.diagnosis.what_if import WhatIf
 from pprs_dynamics.report import diagnosis_figures as figures
 from pprs_dynamics.report.diagnosis_tables import finding_lines, sites
 from pprs_dynamics.report.page import ErrorRow, Page
+from pprs_dynamics.report.what_if_part import add_what_if
 from pprs_dynamics.residuals.residuals import Residuals
 
 METHOD = (
@@ -52,6 +54,7 @@ SETS = ('cost', 'set')
 def diagnosis_page(
     diagnosis: Diagnosis, words: Sentences, after: Residuals, recordings: Sequence[str],
     validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
+    system: WhatIf | None = None,
 ) -> Page:
     """Return the page: an answer that fits one screen, the rest to be unfolded.
 
@@ -66,6 +69,8 @@ def diagnosis_page(
         Names of those fitted, and of those held out.
     rivals : sequence of RivalEffect
         As they were given to `word_diagnosis`.
+    system : WhatIf, optional
+        Of it; without it nothing can be ticked.
     """
     page = Page(f'Diagnosis: {diagnosis.verdict}')
     page.text(words.headline, 'lead')
@@ -80,6 +85,8 @@ def diagnosis_page(
     if words.warnings:
         with page.fold('Warnings', is_open=True):
             page.bullets(words.warnings)
+    if system is not None:
+        add_what_if(page, system, diagnosis.residuals)
     _findings(page, diagnosis, words, rivals)
     _sets(page, diagnosis)
     _contributions(page, diagnosis, steps)
@@ -185,8 +192,8 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
              f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
              sites(one.drives, diagnosis)) for one in diagnosis.effects],
-            caption='Those with most evidence first, parameters fitted anew at every step. '
-            f'Held out: {where}.')
+            caption='Those without which the error would be largest first, parameters fitted anew '
+            f'at every step. Held out: {where}.')
         drives = diagnosis.residuals.drives
         size = sum((one.force ** 2).mean(axis=0) for one in diagnosis.effects)
         acting = [name for d, name in enumerate(drives) if size[d] > 0]

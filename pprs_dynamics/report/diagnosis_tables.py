@@ -87,7 +87,7 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     if diagnosis.effects:
         held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
                 else 'blocks of the same recordings')
-        yield _table(f'Those with most evidence first; held out: {held}',
+        yield _table(f'Those that lower the error most first; held out: {held}',
                      ('effect', 'on', 'error [N]', 'held out [N]', 'evidence'),
                      _effect_rows(diagnosis), right=(2, 3, 4))
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):

@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.experiments.next_experiment import Experiment
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.report.comparison_figures import LINES
+from pprs_dynamics.report.comparison_figures import LEGEND, LINES, SECONDS, thinned
 from pprs_dynamics.report.experiment_tables import (
     ACCURACY_HEADINGS,
     CONTEST_HEADINGS,
@@ -34,8 +33,10 @@ from pprs_dynamics.report.experiment_tables import (
 from pprs_dynamics.report.page import Page, plotly_objects
 from pprs_dynamics.report.robot_view import animate_robot
 
+POINTS = 500  # pairs of extremes shown of a curve
 
-def experiment_page(experiment: Experiment, motion: PlatformMotion) -> Page:
+
+def experiment_page(experiment: Experiment, motion: PlatformMotion, command: str) -> Page:
     """Return the page, most important first.
 
     Parameters
@@ -43,39 +44,42 @@ def experiment_page(experiment: Experiment, motion: PlatformMotion) -> Page:
     experiment : Experiment
     motion : PlatformMotion
         As it is written.
+    command : str
+        That plays it.
     """
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
     if experiment.contests:
-        page.heading('What it would tell')
-        page.text('Evidence is by how much the rival costs more in a diagnosis of all recordings; '
-                  'the chance is that of the rival falling so far behind that it is told as a '
-                  'rival no more.', 'note')
-        page.table(CONTEST_HEADINGS, contest_rows(experiment))
-    page.heading('The motion')
-    page.figure(animate_robot(experiment.model, motion, 'The designed motion'))
-    page.figure(_platform(motion))
-    page.figure(_drives(experiment, motion))
-    page.heading('Use of the limits')
-    page.text('Of what the margin leaves of each limit; checked at 500 Hz.', 'note')
-    page.figure(_limits(experiment))
+        page.table(CONTEST_HEADINGS, contest_rows(experiment),
+                   caption='What it would tell. Evidence is by how much the rival costs more in a '
+                   'diagnosis of all recordings; the chance is that of the rival falling so far '
+                   'behind that it is told as a rival no more.')
+    page.command('Play it, and record', command)
+    page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
+                over_time=True)
+    with page.fold('The robot in motion'):
+        page.figure(animate_robot(experiment.model, motion, 'The designed motion'),
+                    'The designed motion; it plays on request.')
+    with page.fold('Every drive'):
+        page.figure(_drives(experiment, motion),
+                    'Position, velocity, acceleration and effort of every drive.', over_time=True)
+    with page.fold('Use of the limits'):
+        page.figure(_limits(experiment), 'Use of every limit, of what the margin leaves of it; '
+                    'checked at 500 Hz. Dashed: all of it.')
     if experiment.accuracies:
-        page.heading('How well numbers would be known')
-        page.text('Standard deviations; effects that may or may not be there each beside the '
-                  'model alone. A number of an effect matters from the size in the fourth column; '
-                  'for a number of the model that is what its tolerance says.', 'note')
-        page.table(ACCURACY_HEADINGS, accuracy_rows(experiment))
+        with page.fold('How well numbers would be known'):
+            page.table(ACCURACY_HEADINGS, accuracy_rows(experiment), caption='Standard '
+                       'deviations; effects that may or may not be there each beside the model '
+                       'alone. A number of an effect matters from the size in the fourth column; '
+                       'for a number of the model that is what its tolerance says.')
     return page
 
 
 def _platform(motion: PlatformMotion) -> Any:
     moved = motion.position - motion.position[0]
     return _stacked(motion, (
-        ('position from the start [m]', tuple(zip('xyz', moved.T, strict=True))),
-        ('tilt and turn [rad]', (('tilt', motion.tilt), ('turn', motion.turn))),
-        ('angular velocity [rad/s]', tuple(zip(('about x', 'about y', 'about z'),
-                                               motion.angular_velocity.T, strict=True)))),
-        'The platform')
+        ('position [m]', tuple(zip('xyz', moved.T, strict=True))),
+        ('angle [rad]', (('tilt', motion.tilt), ('turn', motion.turn)))))
 
 
 def _drives(experiment: Experiment, motion: PlatformMotion) -> Any:
@@ -85,25 +89,29 @@ def _drives(experiment: Experiment, motion: PlatformMotion) -> Any:
     return _stacked(motion, tuple(
         (label, tuple(zip(DRIVES, values.T, strict=True))) for label, values in (
             ('position [m]', state.position), ('velocity [m/s]', state.velocity),
-            ('acceleration [m/s²]', state.acceleration), ('effort of the model [N]',
-                                                          forces.total))), 'The drives')
+            ('acceleration [m/s²]', state.acceleration), ('effort [N]', forces.total))))
 
 
-def _stacked(motion: PlatformMotion, rows: Any, title: str) -> Any:
+def _stacked(motion: PlatformMotion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...]], ...],
+             ) -> Any:
     go = plotly_objects()
     from plotly.subplots import make_subplots
 
-    figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.04)
+    assert motion.time is not None
+    figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    colours: dict[str, str] = {}
     for row, (label, curves) in enumerate(rows, start=1):
-        for (name, values), colour in zip(curves, LINES, strict=False):
+        for name, values in curves:
+            time, shown = thinned(motion.time, values, points=POINTS)
+            is_new = name not in colours
+            colour = colours.setdefault(name, LINES[len(colours) % len(LINES)])
             figure.add_trace(go.Scatter(
-                x=motion.time, y=np.asarray(values), name=name, mode='lines', legendgroup=name,
-                showlegend=title != 'The drives' or row == 1,
+                x=time, y=shown, name=name, mode='lines', legendgroup=name, showlegend=is_new,
                 line={'color': colour, 'width': 1.3}), row=row, col=1)
         figure.update_yaxes(title_text=label, row=row, col=1)
-    figure.update_xaxes(title_text='time [s]', row=len(rows), col=1)
-    figure.update_layout(template='plotly_white', height=190 * len(rows) + 90, title=title,
-                         margin={'l': 70, 'r': 20, 't': 50, 'b': 45})
+    figure.update_xaxes(title_text='time [s]', row=len(rows), col=1, **SECONDS)
+    figure.update_layout(height=170 * len(rows) + 80, legend=LEGEND,
+                         margin={'l': 70, 'r': 15, 't': 40, 'b': 45})
     return figure
 
 
@@ -112,8 +120,9 @@ def _limits(experiment: Experiment) -> Any:
     rows = limit_rows(experiment)[::-1]
     uses = [100 * experiment.limits[name] for name, _ in rows]
     figure = go.Figure(go.Bar(x=uses, y=[name for name, _ in rows], orientation='h',
-                              marker_color=LINES[0]))
+                              marker_color=LINES[0], hovertemplate='%{y}: %{x:.0f} %'))
     figure.add_vline(x=100, line={'color': LINES[1], 'dash': 'dash'})
-    figure.update_layout(template='plotly_white', height=70 + 20 * len(rows),
-                         xaxis_title='use [%]', margin={'l': 190, 'r': 20, 't': 20, 'b': 45})
+    figure.update_layout(height=70 + 20 * len(rows), xaxis_title='use [%]',
+                         yaxis={'automargin': True, 'dtick': 1},
+                         margin={'l': 10, 'r': 20, 't': 20, 'b': 45})
     return figure

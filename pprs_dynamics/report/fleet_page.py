@@ -40,7 +40,9 @@ ROW, HEAD = 26, 260  # heights of the map [px]
 _SCRIPT = '''
 const data = JSON.parse(document.getElementById('fleet-data').textContent);
 const place = document.getElementById('trend'), card = document.getElementById('recording');
+let shown = data.first;
 function showTrend(robot, quantity) {
+  shown = [robot, quantity];
   const trend = data.trends[robot + '\\u0000' + quantity];
   card.replaceChildren();
   if (!trend) { document.getElementById('trend-title').textContent =
@@ -54,9 +56,9 @@ function showTrend(robot, quantity) {
     error_y: {type: 'data', array: trend.s, thickness: 1, width: 2}},
     {x: stamps, y: trend.f, mode: 'lines', name: trend.text ? 'change' : 'median',
      line: {color: data.colours[1]}}];
-  const layout = {template: undefined, height: 420, margin: {l: 70, r: 70, t: 20, b: 50},
-    yaxis: {title: {text: quantity + ' [' + trend.unit + ']'}}, legend: {orientation: 'h'},
-    plot_bgcolor: 'white'};
+  const layout = {height: 420, margin: {l: 70, r: data.beside ? 70 : 15, t: 20, b: 50},
+    yaxis: {title: {text: quantity + (trend.unit ? ' [' + trend.unit + ']' : '')}},
+    legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}};
   if (trend.limit !== null) traces.push({x: [stamps[0], stamps[stamps.length - 1]],
     y: [trend.limit, trend.limit], mode: 'lines', name: 'limit',
     line: {dash: 'dash', color: data.colours[2]}});
@@ -65,7 +67,9 @@ function showTrend(robot, quantity) {
       name: data.beside, yaxis: 'y2', opacity: 0.5, line: {color: data.colours[2]}});
     layout.yaxis2 = {overlaying: 'y', side: 'right', title: {text: data.beside}};
   }
-  Plotly.react(place, traces, layout, {displaylogo: false, responsive: true});
+  place.setAttribute('aria-label', quantity + ' of ' + robot + ' over time');
+  const drawn = window.themed(JSON.stringify({data: traces, layout}));
+  Plotly.react(place, drawn.data, drawn.layout, {displayModeBar: false, responsive: true});
   place.removeAllListeners('plotly_click');
   place.on('plotly_click', event => {
     const k = event.points[0].customdata;
@@ -97,9 +101,12 @@ function begin() {
   const map = document.querySelector('.plot');
   if (!window.Plotly || !map.on) { setTimeout(begin, 100); return; }
   map.on('plotly_click', event => showTrend(event.points[0].y, event.points[0].x));
-  if (data.first) showTrend(data.first[0], data.first[1]);
+  if (shown) showTrend(...shown);
 }
 begin();
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  if (shown) showTrend(...shown);
+});
 '''
 
 
@@ -120,12 +127,11 @@ def fleet_page(fleet: FleetTrends, beside: str | None = None) -> Page:
         page.bullets(lines[1:])
     if fleet.trends:
         page.heading('Robots and quantities')
-        page.text('Colour: standard deviations from the robot\'s own first recordings, or, by the '
-                  'button, from the fleet\'s median. Framed: a change that chance does not '
-                  'explain. Click a field for its trend, and a point there for the recording.',
-                  'note')
-        page.figure(fleet_map(fleet))
-        page.interactive('<h2 id="trend-title">Trend</h2><div id="trend"></div>'
+        page.figure(fleet_map(fleet), 'Colour: standard deviations from the robot\'s own first '
+                    'recordings, or, by the button, from the fleet\'s median. Framed: a change '
+                    'that chance does not explain. Click a field for its trend, and a point there '
+                    'for the recording.')
+        page.interactive('<h2 id="trend-title">Trend</h2><div id="trend" role="img"></div>'
                          '<section id="recording" class="card"></section>',
                          'fleet-data', json.dumps(_data(fleet, changed, beside), allow_nan=False),
                          _SCRIPT)
@@ -165,7 +171,7 @@ def fleet_map(fleet: FleetTrends) -> Any:
                    'args': [{'visible': [k == 0, k == 1, True]}]}
                   for k, label in enumerate(('from its first recordings', "from the fleet"))]}
     figure.update_layout(
-        template='plotly_white', height=HEAD + ROW * len(robots), updatemenus=[button],
+        height=HEAD + ROW * len(robots), updatemenus=[button],
         xaxis={'tickangle': -60, 'type': 'category', 'automargin': True},
         yaxis={'autorange': 'reversed', 'type': 'category', 'automargin': True},
         margin={'l': 60, 'r': 20, 't': 50, 'b': 140})

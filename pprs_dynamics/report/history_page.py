@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pprs_dynamics.diagnosis.quantities import change, newtons
+from pprs_dynamics.diagnosis.quantities import change, counted, newtons
 from pprs_dynamics.model.ledger import Step
 from pprs_dynamics.report.history_figures import falling_error_by_drive
 from pprs_dynamics.report.history_tables import details, noise_of, step_rows
@@ -36,7 +36,7 @@ def history_page(name: str, steps: Sequence[Step]) -> Page:
         return page
     first, last = steps[0], steps[-1]
     noise = noise_of(steps)
-    page.text(f'{len(steps)} step{"s" * (len(steps) > 1)}: the error '
+    page.text(f'{counted(len(steps), "step")}: the error '
               f'{change(first.error_before, last.error_after)}; the noise is {newtons(noise)}.',
               'lead')
     page.errors([ErrorRow('as given', first.error_before, first.held_out_before, noise),

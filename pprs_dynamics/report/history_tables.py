@@ -25,7 +25,7 @@ from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
-from pprs_dynamics.diagnosis.quantities import with_uncertainty
+from pprs_dynamics.diagnosis.quantities import counted, with_uncertainty
 from pprs_dynamics.model.ledger import NOT_KNOWN, Step
 
 BAR = 24  # characters, of the largest error
@@ -65,8 +65,8 @@ def details(step: Step) -> list[str]:
                  step.recordings, step.sha256, step.spans[::2], step.spans[1::2], strict=False)]
     found = [', '.join(values), f'from {", ".join(spans)}; {step.date}, version {step.version}']
     if step.calibrated:
-        found.append(f'{len(step.calibrated)} numbers of the model moved within their tolerances, '
-                     'the file holds which')
+        found.append(f'{counted(len(step.calibrated), "number of the model")} moved within '
+                     'tolerance, the file holds which')
     if step.rivals:
         found.append(f'{", ".join(step.rivals)} would explain the recordings as well')
     if step.forced:

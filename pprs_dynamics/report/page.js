@@ -11,23 +11,35 @@
   const menus = [...document.querySelectorAll('select[data-menu]')];
   const drawn = new Set();
   let span = null;
-  let library = null;
+  const libraries = {};
 
-  function plotly() {
-    library ??= (async () => {
-      const letters = document.getElementById('plotly').textContent;
+  // A library unpacks itself when it is first asked for.
+  window.library = (name) => {
+    libraries[name] ??= (async () => {
+      const letters = document.getElementById(name).textContent;
       const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
       const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
       const script = document.createElement('script');
       script.textContent = await new Response(unpacked).text();
       document.head.append(script);
-      return window.Plotly;
     })();
-    return library;
+    return libraries[name];
+  };
+
+  async function plotly() {
+    await window.library('plotly');
+    return window.Plotly;
   }
 
   function contentOf(plot) {
-    let text = document.getElementById(`${plot.id}-data`).textContent;
+    const content = window.themed(document.getElementById(`${plot.id}-data`).textContent);
+    if (span && plot.dataset.time !== undefined) content.layout.xaxis.range = span;
+    show(content.data);
+    return content;
+  }
+
+  // What Plotly draws of a figure in JSON, in the colours of the page.
+  window.themed = (text) => {
     if (dark.matches) {
       for (const [from, to] of Object.entries(ON_BLACK)) text = text.replaceAll(from, to);
     }
@@ -50,10 +62,8 @@
                               ...layout.scene[name]};
       }
     }
-    if (span && plot.dataset.time !== undefined) layout.xaxis.range = span;
-    show(data);
     return {data, layout, frames};
-  }
+  };
 
   // Traces of a drive are shown where the menus stand on it.
   function show(data) {

@@ -38,6 +38,8 @@ HEIGHT = 320  # [px], of figures that say none
 # which is in the page only where something is drawn in three dimensions.
 BASIC = 'plotly-basic.min.js.gz'
 BASIC_TYPES = ('scatter', 'bar')
+# Of uPlot 1.6.32, for curves that change at once.
+CURVES, CURVES_STYLE = 'uplot.iife.min.js.gz', 'uplot.min.css'
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class Page:
         self._figures = 0
         self._menus = 0
         self._types: set[str] = set()
+        self._has_curves = False
 
     def heading(self, text: str) -> None:
         """Start a section."""
@@ -192,7 +195,8 @@ class Page:
         self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
                           f'<div class="columns">{drawn}</div></section>')
 
-    def interactive(self, elements: str, name: str, data: str, script: str) -> None:
+    def interactive(self, elements: str, name: str, data: str, script: str,
+                    with_curves: bool = False) -> None:
         """Add a part that a script of the package fills.
 
         Parameters
@@ -204,7 +208,10 @@ class Page:
         data : str
             JSON; it may hold text from files.
         script : str
+        with_curves : bool
+            It draws with uPlot, after `await library('uplot')`.
         """
+        self._has_curves |= with_curves
         # Within a script an end tag would end it, wherever it stands.
         safe = data.replace('<', '\\u003c')
         self._body.append(f'{elements}<script type="application/json" id="{name}">{safe}</script>'
@@ -235,15 +242,21 @@ class Page:
 
     def html(self) -> str:
         """Return the page."""
-        packed = _basic_plotly() if self._types <= set(BASIC_TYPES) else _whole_plotly()
-        library = (f'<script type="text/plain" id="plotly">{packed}</script>'
-                   if self._figures else '')
+        libraries = {}
+        if self._figures:
+            libraries['plotly'] = (_packed(BASIC) if self._types <= set(BASIC_TYPES)
+                                   else _whole_plotly())
+        if self._has_curves:
+            libraries['uplot'] = _packed(CURVES)
+        library = ''.join(f'<script type="text/plain" id="{name}">{packed}</script>'
+                          for name, packed in libraries.items())
+        style = asset('page.css') + (asset(CURVES_STYLE) if self._has_curves else '')
         return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta name="viewport" content="width=device-width, initial-scale=1">'
-                f'<title>{escape(self._title)}</title><style>{_asset("page.css")}</style>'
+                f'<title>{escape(self._title)}</title><style>{style}</style>'
                 f'</head><body><header><h1>{escape(self._title)}</h1></header>'
                 f'<main>{"".join(self._body)}</main>'
-                f'{library}<script>{_asset("page.js")}</script></body></html>\n')
+                f'{library}<script>{asset("page.js")}</script></body></html>\n')
 
     def write(self, path: str | PathLike[str]) -> Path:
         """Write the page to a file, whole or not at all.
@@ -272,9 +285,9 @@ def _force(value: float | None) -> str:
 
 
 @cache
-def _basic_plotly() -> str:
-    """Return the small part of plotly.js, compressed, in letters."""
-    return base64.b64encode(files('pprs_dynamics.report').joinpath(BASIC).read_bytes()).decode()
+def _packed(name: str) -> str:
+    """Return a compressed library of the package, in letters."""
+    return base64.b64encode(files('pprs_dynamics.report').joinpath(name).read_bytes()).decode()
 
 
 @cache
@@ -286,5 +299,6 @@ def _whole_plotly() -> str:
 
 
 @cache
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """Return a text that is shipped beside this module."""
     return files('pprs_dynamics.report').joinpath(name).read_text(encoding='utf-8')

@@ -36,7 +36,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.residuals.residuals import Residuals, bridged, find_stretches
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
-SINGLE_BANDS, BAND_RATIO = 12, 1.2
+SINGLE_BANDS, BAND_RATIO = 12, 1.25
 
 
 @dataclass(frozen=True)

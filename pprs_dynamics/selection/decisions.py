@@ -53,10 +53,6 @@ class Decisions:
     level_ratio: float = _number(
         3.0, '1', "a drive's slow noise over its fast noise, against its peers', told as unknown",
         'robots have like drives; a factor of 3 in rms is an order of magnitude in power')
-    beam: float = _number(
-        3, 'sets', 'sets from which effects are added', 'bounds the time of a search')
-    proposals: float = _number(
-        6, 'candidates', 'of a scan that are fitted in full', 'bounds the time of a search')
 
     def table(self) -> list[tuple[str, float, str, str, str]]:
         """Return name, value, unit, what it decides and why, for the documentation."""

@@ -273,6 +273,12 @@ def linear_prediction(search: Search, found: CandidateSet) -> Array:
     return prediction
 
 
+def linear_error(search: Search, found: CandidateSet) -> float:
+    """Return the rms of measured minus what the linear fit predicts, over all drives [N]."""
+    left = search.regression.residuals.measured - linear_prediction(search, found)
+    return float(np.sqrt(np.nanmean(np.square(left))))
+
+
 def exact_forces(design: Design, model: ForceModel, recordings: Sequence[Recording]) -> Array:
     """Return the treated forces of a model on the recordings of a design, (M, D) [N]."""
     same = np.array_equal(model.position_error, design.model.position_error)

@@ -80,10 +80,14 @@ class FittedSets:
 
     def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
         blocks = [block for candidate in candidates for block in candidate.blocks]
-        fit = self.regression.fit(blocks, start)
-        doubtful = self._doubtful_blocks(candidates, fit)
-        if doubtful:
-            fit = self.regression.fit([*blocks, *chain(*doubtful.values())], fit.amplitudes)
+        if start is not None:
+            # The size of its forces, in proportion to which friction is in doubt, need not be
+            # exact: the noise of a near set does.
+            doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
+        else:
+            doubtful = {}
+        rival = min((one.fit.deviance for one in self.evaluated.values()), default=np.inf)
+        fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start, rival)
         found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
         return replace(found, is_admissible=self._is_admissible(found))
 
@@ -96,8 +100,8 @@ class FittedSets:
                          ) -> dict[Placement, tuple[Block, ...]]:
         """Return columns for what effects leave open, in proportion to their fitted force.
 
-        Whether friction follows the loads that an effect adds; and how friction turns over. Each
-        has a coefficient of unit prior.
+        Whether friction follows the loads that an effect adds; how friction turns over; and how
+        real forms depart from the catalogue's. Each has a coefficient of unit prior.
         """
         found = {}
         for candidate in candidates:
@@ -106,11 +110,11 @@ class FittedSets:
                 if placement.bare is not None:
                     rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
                     blocks.append(Block(rows, np.eye(1)))
-                turning = self.library.turning_rows(placement)
-                if turning is not None:
+                left_open = self.library.open_rows(placement)
+                if left_open is not None:
                     assert placement.drive is not None
-                    blocks.append(Block({placement.drive: np.tensordot(c, turning, 1)},
-                                        np.eye(turning.shape[1])))
+                    blocks.append(Block({placement.drive: np.tensordot(c, left_open, 1)},
+                                        np.eye(left_open.shape[1])))
                 if blocks:
                     found[placement] = tuple(blocks)
         return found

@@ -52,11 +52,17 @@ def without_remainders(search: FittedSets, best: CandidateSet,
     """Return the set without candidates that are within the model error of others."""
     remainders: list[Remainder] = []
     while True:
-        shares = {candidate: share_of_allowance(
-            search.design, search.regression, search.decisions, best, candidate)
-                  for candidate in best.candidates}
-        smallest = min(shares, key=lambda candidate: shares[candidate][0], default=None)
-        if smallest is None or shares[smallest][0] >= 1:
+        small = {}
+        for candidate in best.candidates:
+            share, names = share_of_allowance(
+                search.design, search.regression, search.decisions, best, candidate)
+            if share < 1:
+                small[candidate] = names
+        if not small:
             return best, tuple(remainders)
-        remainders.append(Remainder(smallest, best, shares[smallest][1]))
-        best = search.evaluate(tuple(c for c in best.candidates if c is not smallest), best)
+        # Of two that look like each other, either is small beyond the other.
+        without = {candidate: search.evaluate(
+            tuple(c for c in best.candidates if c is not candidate), best) for candidate in small}
+        least = min(without, key=lambda candidate: without[candidate].total)
+        remainders.append(Remainder(least, best, small[least]))
+        best = without[least]

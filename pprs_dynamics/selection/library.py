@@ -28,6 +28,7 @@ from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.design import Design, searched_in_drives
 from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.regression.normal_equations import Block, term_gains
+from pprs_dynamics.regression.open_form import open_rows
 from pprs_dynamics.regression.terms import Term
 from pprs_dynamics.selection.candidates import Candidate, EffectCandidate, Placement, Prices
 
@@ -194,7 +195,7 @@ class Library:
     def __init__(self, design: Design, regression: Regression, prices: Prices) -> None:
         self.design, self.regression, self.prices = design, regression, prices
         self._placements: dict[Hashable, Placement] = {}
-        self._turning: dict[Placement, Array | None] = {}
+        self._open: dict[Placement, Array | None] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
         felt = [effect for effect in searched_in_drives(design) if _is_felt_everywhere(effect)]
         self.spanning = [self.placement(design.term(effect, d, {}), names)
@@ -219,21 +220,21 @@ class Library:
         return found or self.placement(
             self.design.find_term(effect, drive, shape), names)
 
-    def turning_rows(self, placement: Placement) -> Array | None:
-        """Return what its friction changes by where it turns over otherwise, (k, w, n).
+    def open_rows(self, placement: Placement) -> Array | None:
+        """Return what its form leaves open, by its coefficients, (k, w, n); None for nothing.
 
-        By its coefficients; None for what is no friction or knows its past.
+        How friction turns over where it knows no past, and the effect's own deviations.
         """
-        if placement not in self._turning:
-            self._turning[placement] = self._turning_rows(placement)
-        return self._turning[placement]
+        if placement not in self._open:
+            self._open[placement] = self._open_rows(placement)
+        return self._open[placement]
 
-    def _turning_rows(self, placement: Placement) -> Array | None:
+    def _open_rows(self, placement: Placement) -> Array | None:
         design, term, d = self.design, placement.term, placement.drive
-        if d is None or not term.effect.is_friction:
+        if d is None or term.is_fixed:
             return None
         units = np.eye(len(term.names))[[term.names.index(name) for name in placement.names]]
-        rows = np.stack([design.reversal_rows(term, unit) for unit in units])
+        rows = np.stack([open_rows(design, term, unit) for unit in units])
         return self.regression.series[d].transform(rows) if np.any(rows) else None
 
     def _placed(self, term: Term, names: tuple[str, ...]) -> Placement:
@@ -258,9 +259,13 @@ class Library:
 
     def candidate(self, effect: type[CatalogueEffect],
                   placements: Sequence[Placement]) -> EffectCandidate:
-        """Return an effect with the price of its name and drives."""
+        """Return an effect with the price of its name and drives.
+
+        With other coefficients on other drives it is more than one hypothesis: asymmetric
+        friction that is dry on one drive and viscous on another is two.
+        """
         ordered = tuple(sorted(placements, key=lambda one: -1 if one.drive is None else one.drive))
-        price = self.prices.of_name()
+        price = len({one.names for one in ordered}) * self.prices.of_name()
         if ordered[0].drive is not None:
             price += self.prices.of_drives(len(ordered))
         return EffectCandidate(effect, ordered, price)

@@ -47,6 +47,7 @@ from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT, Candidates, F
 from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
+BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
 # Lowest score of a proposal, and how much worse than the best a replacement may look at the best
@@ -85,8 +86,9 @@ class Search(FittedSets):
         self.evaluate(())
         if start:
             self.refined(self.evaluate(start))
-        # Effects first: a pattern of no catalogue stands only beside what effects explain.
-        self._descend(False, 0.0)
+        else:
+            # Effects first: a pattern of no catalogue stands only beside what effects explain.
+            self._descend(False, 0.0)
         if self.patterns:
             self._descend(True, 0.5)
         self._report(1.0)
@@ -114,10 +116,20 @@ class Search(FittedSets):
         for candidates, near in sets:
             if set_key(candidates) not in self.evaluated and self._is_bounded(candidates):
                 new.append(self.evaluate(candidates, near))
+        # No noise takes a constant: what lacks nothing else is judged once it has it.
+        for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
+            new += [self.evaluate(more, found) for more in self.proposals(found, 1)
+                    if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
         for found in sorted(shaped, key=lambda one: one.cost)[:REFINED]:
             self.refined(found)
+
+    def _all_but_constants(self, found: CandidateSet) -> float:
+        """Return the cost of a set if its drives' constants were what their noise expects."""
+        squares = found.fit.squares[:, 0] / self.regression.noise_shapes.spectrum(
+            found.fit.amplitudes)[:, 0]
+        return found.cost - float(np.sum(np.maximum(squares - self.regression.counts[:, 0], 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
@@ -128,8 +140,8 @@ class Search(FittedSets):
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[tuple[Candidates, CandidateSet]] = []
         ranked = sorted(self.evaluated.values(), key=lambda one: one.cost)
-        for rank, base in enumerate(ranked[:int(self.decisions.beam)]):
-            count = int(self.decisions.proposals) if rank == 0 else 2
+        for rank, base in enumerate(ranked[:BEAM]):
+            count = PROPOSALS if rank == 0 else 2
             found += [(candidates, base) for candidates in self.proposals(base, count)]
             if rank == 0:
                 fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
@@ -266,10 +278,14 @@ class Search(FittedSets):
                     rests.append((tuple(c for c in best.candidates if c not in gone), None))
         for candidate in best.effects:
             for placement in candidate.placements if len(candidate.placements) > 1 else ():
-                # On one of its drives it may stand for another effect.
-                less = self.library.candidate(candidate.effect, [
-                    one for one in candidate.placements if one is not placement])
-                rests.append((self._exchanged(best, candidate, less), placement.drive))
+                # On one of its drives it, or some of its coefficients, may stand for another.
+                others = [one for one in candidate.placements if one is not placement]
+                fewer = [names for names in candidate.effect.variants
+                         if set(names) < set(placement.names)]
+                for kept in ([], *([self.library.placement(placement.term, names)]
+                                   for names in fewer)):
+                    less = self.library.candidate(candidate.effect, [*others, *kept])
+                    rests.append((self._exchanged(best, candidate, less), placement.drive))
         for rest, drive in rests:
             base = self._at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
@@ -308,12 +324,17 @@ class Search(FittedSets):
             if not isinstance(candidate, EffectCandidate):
                 continue
             effect = candidate.effect
-            if len(candidate.placements) > 1:
-                for gone in candidate.placements:
-                    if self.drop_cost(best, gone) < 3 * self.decisions.rival_margin:
-                        rest = [one for one in candidate.placements if one is not gone]
-                        yield self._exchanged(best, candidate,
-                                              self.library.candidate(effect, rest))
+            # The drives where it matters most; fewer of them may be better though one less is not.
+            strength = {one: self.drop_cost(best, one) for one in candidate.placements}
+            ranked = sorted(candidate.placements, key=lambda one: -strength[one])
+            for count in range(1, len(ranked)):
+                if sum(strength[one] for one in ranked[count:]) < 3 * self.decisions.rival_margin:
+                    yield self._exchanged(best, candidate,
+                                          self.library.candidate(effect, ranked[:count]))
+            if len({one.names for one in candidate.placements}) > 1:
+                for names in effect.variants:
+                    yield self._exchanged(best, candidate, self.library.candidate(effect, [
+                        self.library.placement(one.term, names) for one in candidate.placements]))
             for placement in candidate.placements:
                 for names in effect.variants:
                     # The others take part in every scan.
