@@ -27,6 +27,8 @@ from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.server.folders import Folders, is_folder
 from pprs_dynamics.server.hub import Hub, LiveSource
 from pprs_dynamics.server.serve import serve
+from pprs_dynamics.server.surveys import Surveys
+from pprs_dynamics.workbench.reading import Files
 from pprs_dynamics.workbench.session import Session
 
 HOST = '127.0.0.1'
@@ -35,8 +37,8 @@ HOST = '127.0.0.1'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, to choose '
-                        'from in the browser')
+                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
+                        'store of pprs survey, to choose from in the browser')
     parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
                         help='a recording that is never fitted: adoptions are judged on it; may '
                         'be repeated')
@@ -54,13 +56,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     given = [path for path in options.recordings if not is_folder(path)]
+    # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
+    files = Files.read(given, options.model, options.validate, options.topic)
 
     def begin() -> Session | None:
-        if not given:
-            return None
-        return Session.open(given, options.model, options.validate, options.topic)
+        return Session.of(files) if files.recordings else None
     live = _live(options) if options.live else None
-    hub = Hub(begin, options.model, Folders.of(options.recordings), live)
+    hub = Hub(begin, options.model, Folders.of(options.recordings),
+              Surveys.of(options.recordings), live)
     serve(hub, options.host, int(options.port), not options.no_browser)
     return 0
 

@@ -569,10 +569,14 @@ const showExperiment = (state) => {
 const showFiles = async () => {
   if (!bench.state?.has_folders) return;
   $('folders').hidden = false;
-  const {files} = await ask('files');
-  $('files').replaceChildren(...files.map((name) => {
+  const {files, surveyed} = await ask('files');
+  const offered = [
+    ...surveyed.map((one) => [one.name, `robot ${one.robot} · ${one.recording} · ${one.time} · ${
+      one.verdict}`]),
+    ...files.map((name) => [name, name.slice(name.indexOf('/') + 1)])];
+  $('files').replaceChildren(...offered.map(([name, label]) => {
     const item = make('li', '', 'bar');
-    item.append(make('span', name.slice(name.indexOf('/') + 1)));
+    item.append(make('span', label));
     for (const [text, heldOut] of [['Open', false], ['Judge on it', true]]) {
       const button = make('button', text);
       button.type = 'button';
