@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,9 @@ from workbench_server import workbench
 
 from pprs_dynamics import load_model
 from pprs_dynamics.commands.pprs import main
+from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.measurement.recording import Recording, write_recording
+from pprs_dynamics.server.serve import serve
 from pprs_dynamics.workbench import Session
 
 AXIS = 'config/single_axis.yaml'
@@ -84,7 +87,8 @@ def test_mistakes_of_usage_are_one_line_before_anything_is_served(tmp_path: Path
     bad.write_text('time,\n1,2\n')
     for arguments, told in ((('--port', '99999'), '--port'), (('nothing.csv',), 'nothing.csv'),
                             (('--model', 'no.yaml'), 'no.yaml'), ((str(bad),), 'bad.csv'),
-                            ((str(bad), str(bad)), 'twice')):
+                            ((str(bad), str(bad)), 'twice'),
+                            (('--host', '0.0.0.0'), 'one address')):
         done = subprocess.run([executable('pprs'), 'workbench', '--no-browser', *arguments],
                               capture_output=True, text=True, timeout=60)
         assert done.returncode == 2, arguments
@@ -112,3 +116,9 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     assert shown.estimates['drive_spring']['axis.stiffness'].value == pytest.approx(SPRING, rel=0.1)
     assert session.overall().now < 0.5 * session.overall().before
     json.dumps(session.to_json(), allow_nan=False)
+
+
+def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'uvicorn', None)
+    with pytest.raises(MissingLibraryError, match=r'workbench'):
+        serve(None, '127.0.0.1', 0, False)

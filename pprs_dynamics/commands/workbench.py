@@ -32,6 +32,7 @@ from pprs_dynamics.workbench.reading import Files
 from pprs_dynamics.workbench.session import Session
 
 HOST = '127.0.0.1'
+ANY = ('', '0.0.0.0', '::', '*')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='listen to joint_states, and set effects on running nodes')
     parser.add_argument('--port', type=number(0, 65535), default=0.0,
                         help='to listen on (default: any that is free)')
-    parser.add_argument('--host', default=HOST,
+    parser.add_argument('--host', type=_one_address, default=HOST,
                         help=f'to listen on (default {HOST}: nobody else on the network sees it)')
     parser.add_argument('--no-browser', action='store_true', help='open no browser')
 
@@ -66,6 +67,14 @@ def run(options: argparse.Namespace) -> int:
               Surveys.of(options.recordings), live)
     serve(hub, options.host, int(options.port), not options.no_browser)
     return 0
+
+
+def _one_address(text: str) -> str:
+    """Read an address that browsers can call: requests must name it."""
+    if text in ANY:
+        raise argparse.ArgumentTypeError(f'{text!r} must be the one address or name by which '
+                                         'browsers will call this machine')
+    return text
 
 
 def _live(options: argparse.Namespace) -> LiveSource:

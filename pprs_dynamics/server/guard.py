@@ -71,7 +71,7 @@ class Keys:
     @property
     def names(self) -> tuple[str, ...]:
         """Host and port as a browser may write them."""
-        host = f'[{self.host}]' if ':' in self.host else self.host
+        host = f'[{self.host}]' if ':' in self.host else self.host.lower()
         listed = [host, *(['localhost'] if self.host in ('127.0.0.1', '::1') else [])]
         return tuple(f'{name}:{self.port}' for name in listed)
 

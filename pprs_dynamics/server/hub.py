@@ -37,6 +37,7 @@ from pprs_dynamics.workbench.session import Session
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
 BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
+LAST_WORDS = 2.0  # [s] that work in the background gets to end
 IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
@@ -102,6 +103,8 @@ class Hub:
         if self.session is not None:
             for job in self.session.jobs.values():
                 job.cancel()
+                with suppress(Exception):  # whatever it ended with
+                    job.result(LAST_WORDS)
         if self.live is not None:
             self.live.close()
         self._worker.join(10)

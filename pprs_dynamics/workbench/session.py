@@ -299,6 +299,8 @@ class Session(TickBoard):
             Where it is not evaluated yet, or where no model may have these values.
         """
         shown = self.settle()
+        while not shown.is_settled:  # somebody ticked in between
+            shown = self.settle()
         if not shown.ticks:
             return self.model
         if shown.exact is None:

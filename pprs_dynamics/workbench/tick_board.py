@@ -290,8 +290,9 @@ class TickBoard:
         """
         with self._settling:
             shown, what_if = self._shown, self._what_if
-            near = shown.free
-            free = what_if.fitted([tick.best for tick in shown.ticks.values()], near)
+            if shown.is_settled:
+                return shown
+            free = what_if.fitted([tick.best for tick in shown.ticks.values()], shown.free)
             shown = self._fitted(shown, free, FITTED)
             if not self._show(shown):
                 return self._shown
