@@ -20,7 +20,6 @@ would tell adds to what the recordings have told.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -192,12 +191,9 @@ class ColumnPlan:
         numbers = tuple(one.number for one in self.base if isinstance(one, KnownNumber))
         shared = dict(zip(self.numbers, found.of_numbers(numbers), strict=True))
         of_drives, of_joints = found.of_drive_widths(), found.of_passive_widths()
-        # A base leaves out, from the first on, shapes that a drive does not feel.
-        left = Counter(one.drive for one in self.base if isinstance(one, ReversalShape))
         for k, one in enumerate(self.base):
             if isinstance(one, ReversalShape):
-                shared[k] = (of_joints if one.drive is None else of_drives)[-left[one.drive]]
-                left[one.drive] -= 1
+                shared[k] = (of_joints if one.drive is None else of_drives)[one.number]
         wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
             one, (FittedTerm, PresentCoefficient, PresentShape))}
         structure = {effect: np.stack([full for full, _ in found.of_structure(effect)])
@@ -285,4 +281,5 @@ def _felt(column: BaseColumn, rows: Rows) -> Rows:
 def reversal_shapes(drives: Sequence[int]) -> list[ReversalShape]:
     """Return the columns of reversals of drives, without rows."""
     # One for every width, and one for friction that differs by direction while it turns over.
-    return [ReversalShape({}, 1.0, drive) for _ in (*DRIVE_WIDTHS, None) for drive in drives]
+    return [ReversalShape({}, 1.0, drive, number)
+            for number, _ in enumerate((*DRIVE_WIDTHS, None)) for drive in drives]

@@ -111,7 +111,7 @@ def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:
     """Return what is fitted on any recording of a model, as columns without rows."""
     base: list[BaseColumn] = [KnownNumber({}, 1.0, number) for number in known_numbers(model)]
     base += reversal_shapes(range(len(DRIVES)))
-    base += [ReversalShape({}, 1.0, None) for _ in PASSIVE_WIDTHS]
+    base += [ReversalShape({}, 1.0, None, number) for number in range(len(PASSIVE_WIDTHS))]
     for effect in model.effects:
         if isinstance(effect, CatalogueEffect):
             for drive in effect.drives if isinstance(effect, DriveEffect) else (None,):

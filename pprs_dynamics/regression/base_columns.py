@@ -68,9 +68,13 @@ class KnownNumber(BaseColumn):
 
 @dataclass(frozen=True)
 class ReversalShape(BaseColumn):
-    """Friction that turns over otherwise than the model's; `drive` None: in passive joints."""
+    """Friction that turns over otherwise than the model's; `drive` None: in passive joints.
+
+    `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`.
+    """
 
     drive: int | None
+    number: int
 
 
 @dataclass(frozen=True)

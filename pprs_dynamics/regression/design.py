@@ -172,10 +172,11 @@ class Design:
             KnownNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
         # Where a drive stands, friction that turns over otherwise is any constant force.
-        base += [ReversalShape({d: column[d]}, 1.0, d) for column in stacked[OF_DRIVES]
+        base += [ReversalShape({d: column[d]}, 1.0, d, number)
+                 for number, column in enumerate(stacked[OF_DRIVES])
                  for d in range(count) if np.any(column[d]) and design.moves(d)]
-        base += [ReversalShape(_rows(column), 1.0, None)
-                 for column in stacked.get(OF_JOINTS, ()) if np.any(column)]
+        base += [ReversalShape(_rows(column), 1.0, None, number)
+                 for number, column in enumerate(stacked.get(OF_JOINTS, ())) if np.any(column)]
         for effect in given.effects:
             if isinstance(effect, DriveEffect):
                 base += design._present_in_drives(effect)
