@@ -132,8 +132,9 @@ def main() -> int:
     story.say(f'\nPicture: [b]{picture}[/]   pages: [b]{story.file("before.html")}[/], '
               f'[b]{story.file("why.html")}[/]'
               + (f', [b]{story.file("after.html")}[/]' if added else ''))
-    story.say('Try it out, effect by effect, in the browser:\n[bold cyan]$ '
-              f'{escape(workbench_command(story))}[/]')
+    story.say('Try it out, effect by effect, in the browser:')
+    console.print(f'[bold cyan]$ {escape(workbench_command(story))}[/]', highlight=False,
+                  soft_wrap=True)
     story.say(f'[dim]{time.monotonic() - began:.0f} s; the same again with --seed {seed}[/]')
     return 0
 
