@@ -42,9 +42,7 @@ from pprs_dynamics.regression.base_columns import (
 )
 from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.terms import PlacedEffect, Point
-from pprs_dynamics.selection.candidates import (
-    CandidateSet,
-)
+from pprs_dynamics.selection.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.selection.decisions import Decisions
 from pprs_dynamics.selection.search import Search
 
@@ -78,10 +76,10 @@ class Selection:
         """
         found = list(self.last.evaluated.values())
         if self.first is not self.last:
-            def bends(one: CandidateSet) -> bool:
-                return any(candidate.effect.bends_columns for candidate in one.effects)
-            found = [one for one in found if bends(one)] + [
-                one for one in self.first.evaluated.values() if not bends(one)]
+            def is_bent(one: CandidateSet) -> bool:
+                return any(map(_bends, one.candidates))
+            found = [one for one in found if is_bent(one)] + [
+                one for one in self.first.evaluated.values() if not is_bent(one)]
             found = [self.best, *(one for one in found if one is not self.best)]
         return sorted(found, key=lambda one: one.cost)
 
@@ -100,9 +98,14 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     first = search = Search(design, decisions,
                             progress=lambda share: report(0.25 + 0.35 * share))
     best = search.run()
+    # What was found beside an effect that bends the columns may only make good that they were
+    # not bent: the first step leaves it out.
+    bending = search.at_noise_of(best, search.rescanned(search.evaluate(
+        tuple(filter(_bends, best.candidates)))).candidates)
     for number in range(MOST_SEARCHES):
+        of = bending if number == 0 and bending.candidates else best
         try:
-            around = linearised(search, best, recordings, decisions)
+            around = linearised(search, of, recordings, decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
         if around is None:
@@ -110,9 +113,14 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
         start = 0.6 + 0.4 * number / MOST_SEARCHES
         search = Search(around, decisions, first.regression.error_scale,
                         _share_of(report, start, 0.4 / MOST_SEARCHES))
-        best = search.run(search.library.rebuilt(best.candidates))
+        best = search.run(*(search.library.rebuilt(one.candidates) for one in (
+            (bending, best) if number == 0 and of is not best else (best,))))
     report(1.0)
     return Selection(first, search, best)
+
+
+def _bends(candidate: Candidate) -> bool:
+    return isinstance(candidate, EffectCandidate) and candidate.effect.bends_columns
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,
@@ -147,7 +155,8 @@ def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recordi
                ) -> Point | None:
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 
-    None where the exact forces of the fitted model are those of the linear fit.
+    None where the exact forces of the fitted model are those of the linear fit, and columns were
+    computed with every effect that bends them.
     """
     design = search.design
     base, effects = parts_of(search, found)
@@ -155,9 +164,10 @@ def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recordi
     measured = search.regression.residuals.measured
     target = model_at(design, base, effects)
     exact = exact_forces(design, target, recordings)
-    if squared(search, found, exact - linear) < LEAST_DIFFERENCE:
-        return None
     before = design.point
+    if (squared(search, found, exact - linear) < LEAST_DIFFERENCE
+            and _is_bent_by(before, effects)):
+        return None
     loss = squared(search, found, measured - exact)
     now = exact_forces(design, design.model, recordings)
     known = {(one.effect, one.drive): one for one in before.effects} if before else {}
@@ -173,6 +183,15 @@ def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recordi
         else:
             return None
     return Point(target, base, effects)
+
+
+def _is_bent_by(point: Point | None, effects: Sequence[PlacedEffect]) -> bool:
+    """Return whether a point has the effects that bend columns, nearly of the same shapes."""
+    known = {(one.effect, one.drive): one for one in point.effects} if point else {}
+    return all((one.effect, one.drive) in known and all(
+        abs(one.shape[p.name] - known[one.effect, one.drive].shape[p.name]) <= p.scale
+        for p in one.effect.parameters if p.name in one.shape)
+        for one in effects if one.effect.bends_columns)
 
 
 def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:

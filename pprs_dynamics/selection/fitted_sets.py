@@ -119,7 +119,7 @@ class FittedSets:
                     found[placement] = tuple(blocks)
         return found
 
-    def _at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
+    def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
         placements = {placement for candidate in candidates
                       if isinstance(candidate, EffectCandidate)
@@ -153,9 +153,12 @@ class FittedSets:
                      + np.linalg.slogdet(placement.block.precision)[1])
 
     def refined(self, found: CandidateSet) -> CandidateSet:
-        """Return the set with all shapes moved by Gauss-Newton steps that lower the cost."""
-        for _ in range(SHAPE_ROUNDS):
-            moved = self._moved(found)
+        """Return the set with all shapes moved by Gauss-Newton steps that lower the cost.
+
+        Each may be twice as long as the one before.
+        """
+        for number in range(SHAPE_ROUNDS):
+            moved = self._moved(found, 2.0 ** number)
             if moved is None:
                 return found
             after = self.evaluate(moved, found)
@@ -164,8 +167,9 @@ class FittedSets:
             found = after
         return found
 
-    def _moved(self, found: CandidateSet) -> Candidates | None:
-        """Return candidates with shapes after one Gauss-Newton step."""
+    def _moved(self, found: CandidateSet, longest: float) -> Candidates | None:
+        """Return candidates with shapes after one Gauss-Newton step, by `longest` reaches at most.
+        """
         slopes = self.slopes(found)
         if not slopes:
             return None
@@ -179,7 +183,7 @@ class FittedSets:
             shape = dict(placement.term.shape)
             reach = self._reach(placement)
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
-                limit = reach[parameter.name]
+                limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
             moved[placement] = self.library.placed(effect, d, shape, placement.names)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 from pprs_dynamics.selection.allowance import share_of_allowance
 from pprs_dynamics.selection.candidates import Candidate, CandidateSet
-from pprs_dynamics.selection.fitted_sets import FittedSets
+from pprs_dynamics.selection.search import Search
 
 
 @dataclass(frozen=True)
@@ -47,22 +47,36 @@ class Remainder:
     of: tuple[str, ...]
 
 
-def without_remainders(search: FittedSets, best: CandidateSet,
+def without_remainders(search: Search, best: CandidateSet,
                        ) -> tuple[CandidateSet, tuple[Remainder, ...]]:
-    """Return the set without candidates that are within the model error of others."""
+    """Return the set without candidates that are within the model error of others.
+
+    What was best together with them may not be without: then something else may stand for it.
+    """
     remainders: list[Remainder] = []
-    while True:
-        small = {}
-        for candidate in best.candidates:
-            share, names = share_of_allowance(
-                search.design, search.regression, search.decisions, best, candidate)
-            if share < 1:
-                small[candidate] = names
-        if not small:
-            return best, tuple(remainders)
+    kept = best
+    while small := _small(search, kept):
         # Of two that look like each other, either is small beyond the other.
         without = {candidate: search.evaluate(
-            tuple(c for c in best.candidates if c is not candidate), best) for candidate in small}
+            tuple(c for c in kept.candidates if c is not candidate), kept) for candidate in small}
         least = min(without, key=lambda candidate: without[candidate].total)
-        remainders.append(Remainder(least, best, small[least]))
-        best = without[least]
+        remainders.append(Remainder(least, kept, small[least]))
+        kept = without[least]
+    while kept.total > best.total + search.decisions.rival_margin:
+        better = search.replaced(kept, lambda one: not _small(search, one))
+        if better is kept:
+            break
+        kept = better
+    return kept, tuple(one for one in remainders if one.candidate.name not in {
+        candidate.name for candidate in kept.candidates})
+
+
+def _small(search: Search, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
+    """Return the candidates within the model error of others, and of which."""
+    small = {}
+    for candidate in found.candidates:
+        share, names = share_of_allowance(
+            search.design, search.regression, search.decisions, found, candidate)
+        if share < 1:
+            small[candidate] = names
+    return small

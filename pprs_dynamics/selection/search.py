@@ -81,14 +81,17 @@ class Search(FittedSets):
                           for d in self.regression.drives] if with_unknown else [])
         self._report = progress or (lambda share: None)
 
-    def run(self, start: Candidates = ()) -> CandidateSet:
-        """Return the best set that the search reaches."""
+    def run(self, *starts: Candidates) -> CandidateSet:
+        """Return the best set that the search reaches, by effects alone before each further start.
+
+        A pattern of no catalogue stands only beside what effects explain.
+        """
         self.evaluate(())
-        if start:
-            self.refined(self.evaluate(start))
-        else:
-            # Effects first: a pattern of no catalogue stands only beside what effects explain.
+        if starts:
+            self.refined(self.evaluate(starts[0]))
+        for start in starts[1:] or (() if starts else ((),)):
             self._descend(False, 0.0)
+            self.refined(self.evaluate(start))
         if self.patterns:
             self._descend(True, 0.5)
         self._report(1.0)
@@ -103,7 +106,7 @@ class Search(FittedSets):
             before = self.best.cost
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
-                self._try(self._replacements())
+                self._try(self._replacements(self.best))
                 if self.best.cost > before - LEAST_IMPROVEMENT:
                     return
             self._simplify()
@@ -231,6 +234,22 @@ class Search(FittedSets):
                 return best
             self.refined(after)
 
+    def rescanned(self, found: CandidateSet) -> CandidateSet:
+        """Return the set with every effect on a drive in the shape that a scan without it finds."""
+        for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.placements
+                          if c.effect.shape and one.drive is not None]:
+            candidate = next(c for c in found.effects if c.effect is effect)
+            others = [one for one in candidate.placements if one.drive != d]
+            rest = tuple(c for c in found.candidates if c is not candidate)
+            less = (*rest, self.library.candidate(effect, others)) if others else rest
+            offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
+            if effect.name in offers:
+                placements = [*others, self.library.full(offers[effect.name])]
+                found = min(found, self.evaluate(
+                    (*rest, self.library.candidate(effect, placements)), found),
+                    key=lambda one: one.cost)
+        return self.refined(found)
+
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate with other coefficients of one placement."""
         for placement in candidate.placements:
@@ -265,12 +284,21 @@ class Search(FittedSets):
             return (*kept, self.library.candidate(effect, placements))
         return make
 
-    def _replacements(self) -> Iterable[tuple[Candidates, CandidateSet]]:
+    def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
+                 ) -> CandidateSet:
+        """Return the best of a set and those in which something else stands for one or two."""
+        before = set(self.evaluated)
+        self._try(self._replacements(found))
+        better = [one for key, one in self.evaluated.items()
+                  if key not in before and one.cost < found.total - LEAST_IMPROVEMENT]
+        return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
+                    found)
+
+    def _replacements(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
         """Yield sets in which something else stands for one or two candidates, or for a drive's.
 
-        Under the noise of the best set, so that a replacement that explains as much is seen to.
+        Under the noise of the set, so that a replacement that explains as much is seen to.
         """
-        best = self.best
         rests: list[tuple[Candidates, int | None]] = []
         for size in (1, 2):
             for gone in combinations(best.candidates, size):
@@ -287,7 +315,7 @@ class Search(FittedSets):
                     less = self.library.candidate(candidate.effect, [*others, *kept])
                     rests.append((self._exchanged(best, candidate, less), placement.drive))
         for rest, drive in rests:
-            base = self._at_noise_of(best, rest)
+            base = self.at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
             for candidates in self.proposals(base, REPLACEMENTS, drive, least):
                 yield candidates, best
