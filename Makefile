@@ -11,7 +11,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo demo-feedforward test reproduce feedforward localisation score adoption benchmark \
-	reliability reliability-full experiments fleet lint clean
+	reliability reliability-full experiments fleet workbench lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
@@ -27,6 +27,7 @@ help:
 	@echo 'make reliability-full   the same at full size (an hour or two)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long)'
 	@echo 'make fleet      a fleet of the physics engine, surveyed: what is found of what changed (long)'
+	@echo 'make workbench   how fast the workbench answers, in a real browser (5 minutes)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
 demo: $(VENV)/.demo
@@ -75,17 +76,20 @@ experiments: $(VENV)/.test
 fleet: $(VENV)/.test
 	$(BIN)/python benchmarks/fleet.py
 
+workbench: $(VENV)/.test
+	$(BIN)/python benchmarks/workbench.py 30 docs/images/workbench.png
+
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python
 	@echo 'Installing the package with ROS 2 wheels and compiling its equations (about a minute) ...'
 	@$(BIN)/pip install -qq --upgrade pip
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench]'
 	@$(BIN)/python -m pprs_dynamics.model.preparation
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,fleet,test]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,test]'
 	@touch $@
 
 $(VENV)/bin/python:

@@ -12,7 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How fast the workbench answers in a real browser: python benchmarks/workbench.py [ROUNDS [PNG]].
+"""How fast the workbench answers, in a real browser.
+
+    python benchmarks/workbench.py [ROUNDS [PICTURE.png]]
 
 A recording of 40 s of the simulated robot with two hidden effects; the server as a process,
 Chromium without a graphics card beside it. From the event of a click to the frame that shows its

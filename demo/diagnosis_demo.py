@@ -26,6 +26,7 @@ import argparse
 import json
 import os
 import secrets
+import shlex
 import subprocess
 import sys
 import time
@@ -131,8 +132,17 @@ def main() -> int:
     story.say(f'\nPicture: [b]{picture}[/]   pages: [b]{story.file("before.html")}[/], '
               f'[b]{story.file("why.html")}[/]'
               + (f', [b]{story.file("after.html")}[/]' if added else ''))
+    story.say('Try it out, effect by effect, in the browser:')
+    console.print(f'[bold cyan]$ {escape(workbench_command(story))}[/]', highlight=False,
+                  soft_wrap=True)
     story.say(f'[dim]{time.monotonic() - began:.0f} s; the same again with --seed {seed}[/]')
     return 0
+
+
+def workbench_command(story: Story) -> str:
+    """Return the command that opens the two recordings in the workbench."""
+    return shlex.join((executable('pprs'), 'workbench', story.file('run.mcap'), '--validate',
+                       story.file('other.mcap')))
 
 
 def record(story: Story, seed: int, duration: float) -> None:

@@ -56,7 +56,7 @@ MAY_USE = {
                'selection', 'identification', 'diagnosis', 'adoption', 'experiments', 'fleet'},
     'workbench': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                   'selection', 'diagnosis', 'adoption', 'experiments'},
-    'server': {'model', 'measurement', 'workbench'},
+    'server': {'model', 'measurement', 'workbench', 'fleet'},
     'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
     'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
                  'selection', 'identification', 'diagnosis', 'adoption', 'simulation',

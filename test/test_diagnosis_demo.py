@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -58,6 +59,10 @@ def test_the_error_falls_and_the_secret_is_told_last(tmp_path: Path) -> None:
     assert f'{hidden["name"]} was hidden, and {hidden["name"]} was found.' in after
     for command in ('simulate', 'compare', 'diagnose', f'adopt {hidden["name"]}', 'history'):
         assert f'$ pprs {command}' in before
+    opens = shlex.split(next(line for line in after.splitlines() if ' workbench ' in line))
+    assert opens[2:] == ['workbench', str(tmp_path / 'run.mcap'), '--validate',
+                         str(tmp_path / 'other.mcap')]
+    assert Path(opens[1]).exists()
     assert f'--seed {SEED}' in after
     # On the motion that was never fitted, evaluated here again: the error falls to the noise,
     # which is that of the same robot on the same motion with nothing hidden.

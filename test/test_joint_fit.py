@@ -23,7 +23,7 @@ from scipy.linalg import block_diag
 from pprs_dynamics.regression.base_columns import BaseColumn
 from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.regression.normal_equations import Block
-from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
 
 SAMPLES, DRIVES, PERIOD = 240, 2, 0.01
 
@@ -127,3 +127,11 @@ def test_a_constant_under_slow_noise_is_worth_little_and_under_white_noise_much(
         gains.append(regression.gain(fit, regression.block({0: np.ones((1, 4000))})))
     assert gains[0] > 1000
     assert gains[1] < 10
+
+
+def test_too_short_a_recording_is_a_sentence() -> None:
+    short = np.zeros((40, 1))
+    residuals = Residuals(('a',), PERIOD * np.arange(40), np.zeros(40, dtype=int), short, short,
+                          {}, {}, PERIOD)
+    with pytest.raises(ResidualsError, match=r'at most 40 samples .* must hold at least 100'):
+        Regression(residuals)

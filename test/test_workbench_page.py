@@ -321,3 +321,17 @@ def test_an_adoption_is_called_off(page: Page) -> None:
         'button', name='Cancel').last.click()
     page.tab.locator('#message', has_text='called off').wait_for()
     assert page.settled()['steps'] == []
+
+
+def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:
+    page.tab.keyboard.press('4')
+    page.tab.locator('#experiment-duration').fill('5')
+    page.tab.locator('#design').click()
+    page.tab.locator('#experiment-file').wait_for()
+    assert page.tab.locator('#experiment-text').inner_text()
+    with page.tab.expect_download() as started:
+        page.tab.locator('#experiment-file').click()
+    started.value.save_as(folder / 'next.csv')
+    lines = (folder / 'next.csv').read_text().splitlines()
+    assert lines[0].startswith('time,x,y,z,qx,qy,qz,qw')
+    assert len(lines) == 1 + 501

@@ -38,7 +38,7 @@ from pprs_dynamics.regression.base_columns import BaseColumn
 from pprs_dynamics.regression.normal_equations import Block, NormalEquations, term_gains
 from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
-from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
 
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less, or by less than this share of
@@ -90,6 +90,11 @@ class Regression:
     error_scale : mapping of drive to float, optional
         Force that priors of effects allow [N], so that costs of two designs mean the same; by
         default the rms of the error.
+
+    Raises
+    ------
+    ResidualsError
+        Where no drive has enough samples.
     """
 
     def __init__(self, residuals: Residuals, base: Sequence[BaseColumn] = (),
@@ -102,6 +107,10 @@ class Regression:
                  for d in (range(len(residuals.drives)) if drives is None else drives)}
         self.series = {d: one for d, one in every.items() if one.known.sum() >= LEAST_SAMPLES}
         self.drives = tuple(self.series)
+        if not self.drives:
+            most = max((int(one.known.sum()) for one in every.values()), default=0)
+            raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
+                                 f'hold at least {LEAST_SAMPLES} of a drive')
         self.counts = np.stack([self.series[d].counts for d in self.drives])
         self.precision = np.array([column.precision for column in self.columns])
         self.base_index = {d: np.array([k for k, column in enumerate(self.columns)

@@ -157,8 +157,8 @@ class Api:
         """Answer all that one screen shows, and the errors now."""
         hub = self.hub
         common = {'count': hub.count, 'generation': hub.generation, 'failure': hub.failure,
-                  'is_beginning': hub.is_beginning, 'has_folders': bool(hub.folders.roots),
-                  'has_live': hub.live is not None}
+                  'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
+                  'has_folders': bool(hub.folders.roots or hub.surveys.recordings)}
         session = hub.session
         if session is None:
             return binary({**common, 'is_empty': True}, {})
@@ -282,11 +282,12 @@ class Api:
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
-        return JSONResponse({'files': self.hub.folders.listed()})
+        return JSONResponse({'files': self.hub.folders.listed(),
+                             'surveyed': self.hub.surveys.listed()})
 
     def open(self, body: Any) -> Response:
-        """Open a recording of the folders that were given."""
-        self.hub.open([str(self.hub.folders.path(text_of(body, 'name')))],
+        """Open a recording of the folders and surveys that were given."""
+        self.hub.open([str(self.hub.offered(text_of(body, 'name')))],
                       body.get('is_held_out') is True)
         return self.screen(body)
 

@@ -35,7 +35,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 
 TOKEN = 'token'  # in the query of the address
 MOST_BYTES = 64_000  # of a body that is no upload
-MOST_COOKIES = 16  # browsers at a time
+MOST_COOKIES = 16  # browsers at a time; the one that was quiet for longest has to go
 SAFE = ('GET', 'HEAD')
 HEADERS = {
     'Content-Security-Policy':
@@ -71,7 +71,7 @@ class Keys:
     @property
     def names(self) -> tuple[str, ...]:
         """Host and port as a browser may write them."""
-        host = f'[{self.host}]' if ':' in self.host else self.host
+        host = f'[{self.host}]' if ':' in self.host else self.host.lower()
         listed = [host, *(['localhost'] if self.host in ('127.0.0.1', '::1') else [])]
         return tuple(f'{name}:{self.port}' for name in listed)
 
@@ -90,10 +90,13 @@ class Keys:
             return self._cookies[-1]
 
     def knows(self, cookie: str) -> bool:
-        """Return whether a cookie was given out."""
-        given = list(self._cookies)
-        # All are compared, so that the time tells nothing.
-        return sum(secrets.compare_digest(cookie.encode(), one.encode()) for one in given) > 0
+        """Return whether a cookie was given out; it is then the last to be forgotten."""
+        with self._lock:
+            # All are compared, so that the time tells nothing.
+            same = [one for one in self._cookies
+                    if secrets.compare_digest(cookie.encode(), one.encode())]
+            self._cookies = [one for one in self._cookies if one not in same] + same
+            return bool(same)
 
 
 class Guard:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 import time
 from collections.abc import Callable, Sequence
@@ -29,12 +30,14 @@ from typing import Any, Protocol
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.server.folders import ENDINGS, Folders
+from pprs_dynamics.server.surveys import PREFIX, Surveys
 from pprs_dynamics.workbench.errors import SessionError
 from pprs_dynamics.workbench.session import Session
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
 BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
+LAST_WORDS = 2.0  # [s] that work in the background gets to end
 IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 
 
@@ -64,12 +67,15 @@ class Hub:
     model : str
         The model file, for recordings that are opened later.
     folders : Folders
+        In which browsers may choose recordings.
+    surveys : Surveys
+        In which it may choose, too.
     live : LiveSource, optional
     """
 
     def __init__(self, begin: Callable[[], Session | None], model: str, folders: Folders,
-                 live: LiveSource | None = None) -> None:
-        self.model, self.folders, self.live = model, folders, live
+                 surveys: Surveys, live: LiveSource | None = None) -> None:
+        self.model, self.folders, self.surveys, self.live = model, folders, surveys, live
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
@@ -97,6 +103,8 @@ class Hub:
         if self.session is not None:
             for job in self.session.jobs.values():
                 job.cancel()
+                with suppress(Exception):  # whatever it ended with
+                    job.result(LAST_WORDS)
         if self.live is not None:
             self.live.close()
         self._worker.join(10)
@@ -151,6 +159,17 @@ class Hub:
                     self.session.add(path, is_held_out)
         self._changed()
 
+    def offered(self, name: str) -> Path:
+        """Return the path of a recording that is offered to browsers, by its name there.
+
+        Raises
+        ------
+        NotOfferedError
+            For any other.
+        """
+        chosen = self.surveys if name.startswith(f'{PREFIX}/') else self.folders
+        return chosen.path(name)
+
     def save_upload(self, name: str) -> Path:
         """Return the path for an upload, in a folder of its own, with what is plain of its name.
 
@@ -191,8 +210,8 @@ class Hub:
             session = self._begin()
             if session is not None:
                 self._use(session)
-        except PprsError as error:
-            self.failure = str(error)
+        except Exception as error:
+            self._fail(error)
         self.is_beginning = False
         self._changed()
         while not self._ends:
@@ -207,9 +226,17 @@ class Hub:
             if not session.shown.is_settled:
                 try:
                     session.settle()
-                except PprsError as error:
-                    self.failure = str(error)
+                    self.failure = ''
+                except Exception as error:
+                    self._fail(error)
                     self.tell()
+
+    def _fail(self, error: Exception) -> None:
+        """Say on the page what went wrong; a defect of ours stands in the terminal as well."""
+        self.failure = str(error)
+        if not isinstance(error, PprsError):
+            self.failure = f'{type(error).__name__}: {error}'
+            logging.getLogger(__name__).exception('the workbench goes on')
 
     def _diagnose(self) -> None:
         session = self.session

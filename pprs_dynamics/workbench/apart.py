@@ -92,7 +92,8 @@ def run_apart(work: Callable[..., Any], *arguments: Any, report: Callable[[float
         except BaseException:
             process.kill()
             raise
-    reader.join()
+        finally:
+            reader.join()  # before the pipe that it reads from is closed
     if not answers:
         raise EndedError(f'the process that worked on it ended with status {process.returncode}')
     kind, value = answers[0]

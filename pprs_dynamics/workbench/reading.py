@@ -17,8 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.conventions import find_mistakes
@@ -27,6 +28,8 @@ from pprs_dynamics.measurement.recording import Recording, read_recording
 from pprs_dynamics.measurement.repeats import find_repeat
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
+from pprs_dynamics.model.model_file import load_model
+from pprs_dynamics.model.parameter_file import find_file
 from pprs_dynamics.workbench.errors import SessionError
 
 
@@ -43,6 +46,43 @@ def refuse_paths(paths: Sequence[str]) -> None:
     for path in paths:
         if paths.count(path) > 1:
             raise SessionError(f'{path} is given twice, but every recording may be given once')
+
+
+@dataclass(frozen=True)
+class Files:
+    """Model and recordings as they were read.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings, validation : dict of str to Recording
+        By path.
+    base : Path
+        The model's file.
+    """
+
+    model: ForceModel
+    recordings: dict[str, Recording]
+    validation: dict[str, Recording]
+    base: Path
+
+    @classmethod
+    def read(cls, recordings: Sequence[str | PathLike[str]], model: str | PathLike[str],
+             validation: Sequence[str | PathLike[str]] = (), topic: str | None = None) -> Files:
+        """Read files by the readers of all commands.
+
+        Raises
+        ------
+        PprsError
+            Where one cannot be read, or holds the samples of another.
+        """
+        base = find_file(model)
+        found = load_model(base)
+        refuse_paths([str(path) for path in (*recordings, *validation)])
+        fitted, held_out = ({str(path): read(path, found, topic) for path in paths}
+                            for paths in (recordings, validation))
+        refuse_repeats(fitted, held_out)
+        return cls(found, fitted, held_out, base)
 
 
 def read(path: str | PathLike[str], model: ForceModel, topic: str | None = None) -> Recording:

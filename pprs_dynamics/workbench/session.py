@@ -31,15 +31,14 @@ from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import Step, read_steps, without_last_step
-from pprs_dynamics.model.model_file import build_model, load_model
+from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.model.model_writer import write_model
-from pprs_dynamics.model.parameter_file import find_file
 from pprs_dynamics.workbench.apart import run_apart
 from pprs_dynamics.workbench.errors import SessionError
 from pprs_dynamics.workbench.jobs import Cancelled, Job
 from pprs_dynamics.workbench.long_work import DesignedMotion, designed, diagnosed, judged
 from pprs_dynamics.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
-from pprs_dynamics.workbench.reading import read, refuse_paths, refuse_repeats
+from pprs_dynamics.workbench.reading import Files, read, refuse_paths, refuse_repeats
 from pprs_dynamics.workbench.shown import (
     Share,
     effect_to_json,
@@ -97,15 +96,19 @@ class Session(TickBoard):
         PprsError
             Where one cannot be read, or holds the samples of another.
         """
-        base = find_file(model)
-        found = load_model(base)
-        refuse_paths([str(path) for path in (*recordings, *validation)])
-        fitted, held_out = (
-            {str(path): read(path, found, topic) for path in paths}
-            for paths in (recordings, validation))
-        refuse_repeats(fitted, held_out)
-        session = cls(found, fitted, held_out, base)
-        session._files = {*fitted, *held_out}
+        return cls.of(Files.read(recordings, model, validation, topic))
+
+    @classmethod
+    def of(cls, files: Files) -> Session:
+        """Begin with files that were read.
+
+        Raises
+        ------
+        PprsError
+            As `measure_residuals`.
+        """
+        session = cls(files.model, files.recordings, files.validation, files.base)
+        session._files = {*files.recordings, *files.validation}
         return session
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
@@ -296,6 +299,8 @@ class Session(TickBoard):
             Where it is not evaluated yet, or where no model may have these values.
         """
         shown = self.settle()
+        while not shown.is_settled:  # somebody ticked in between
+            shown = self.settle()
         if not shown.ticks:
             return self.model
         if shown.exact is None:

@@ -167,7 +167,7 @@ def _parameters(shown: Shown, effect: type[CatalogueEffect], drives: tuple[str, 
         rows.append({
             'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
             'std': finite(one.std), 'unit': parameter.unit, 'description': parameter.description,
-            'lower': parameter.lower, 'upper': parameter.upper,
+            'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
             'is_chosen': key in chosen})
     return rows

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from threading import RLock
 
@@ -84,7 +84,8 @@ class TickBoard:
             self._shown = Shown(self.revision, {}, none, none, what_if.before, {}, FITTED)
             for name, tick in (ticks or {}).items():
                 on = tick.best.drives
-                self.tick(name, [what_if.drives[d] for d in on] if on else None)
+                with suppress(PprsError):  # what cannot act under this model is ticked no more
+                    self.tick(name, [what_if.drives[d] for d in on] if on else None)
             self.tell()
 
     @contextmanager
@@ -289,8 +290,9 @@ class TickBoard:
         """
         with self._settling:
             shown, what_if = self._shown, self._what_if
-            near = shown.free
-            free = what_if.fitted([tick.best for tick in shown.ticks.values()], near)
+            if shown.is_settled:
+                return shown
+            free = what_if.fitted([tick.best for tick in shown.ticks.values()], shown.free)
             shown = self._fitted(shown, free, FITTED)
             if not self._show(shown):
                 return self._shown

@@ -132,7 +132,7 @@ class WhatIf:
     Raises
     ------
     PprsError
-        As `measure_residuals`.
+        As `measure_residuals` and `Regression`.
     """
 
     def __init__(self, model: ForceModel, recordings: Sequence[Recording],

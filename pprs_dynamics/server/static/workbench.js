@@ -463,11 +463,11 @@ class EffectRow {
     return line;
   }
 
-  /* A slider is a factor of ten either way, or the parameter's bounds where it has a sign. */
+  /* A slider is a factor of ten either way, or as much as matters where there is a sign. */
   fromRange(one, at) {
     const middle = Number(this.fields.get(one.key).range.dataset.middle);
     const value = one.is_relative ? middle * 10 ** (at / 100)
-      : middle + at / 100 * Math.max(Math.abs(middle), (one.upper - one.lower) / 20);
+      : middle + at / 100 * Math.max(Math.abs(middle), one.scale);
     return Math.min(one.upper, Math.max(one.lower, value));
   }
 
@@ -475,7 +475,7 @@ class EffectRow {
     const middle = Number(range.dataset.middle ?? one.value);
     if (one.value === null) return 0;
     return Math.round(100 * (one.is_relative ? Math.log10(one.value / middle)
-      : (one.value - middle) / Math.max(Math.abs(middle), (one.upper - one.lower) / 20)));
+      : (one.value - middle) / Math.max(Math.abs(middle), one.scale)));
   }
 
   /* Only the last place of a drag goes out. */
@@ -569,10 +569,14 @@ const showExperiment = (state) => {
 const showFiles = async () => {
   if (!bench.state?.has_folders) return;
   $('folders').hidden = false;
-  const {files} = await ask('files');
-  $('files').replaceChildren(...files.map((name) => {
+  const {files, surveyed} = await ask('files');
+  const offered = [
+    ...surveyed.map((one) => [one.name, `robot ${one.robot} · ${one.recording} · ${one.time} · ${
+      one.verdict}`]),
+    ...files.map((name) => [name, name.slice(name.indexOf('/') + 1)])];
+  $('files').replaceChildren(...offered.map(([name, label]) => {
     const item = make('li', '', 'bar');
-    item.append(make('span', name.slice(name.indexOf('/') + 1)));
+    item.append(make('span', label));
     for (const [text, heldOut] of [['Open', false], ['Judge on it', true]]) {
       const button = make('button', text);
       button.type = 'button';
