@@ -46,6 +46,7 @@ from pprs_dynamics.selection.expansion import (
     exact_forces,
     fitted_model,
     linear_error,
+    linear_prediction,
     select,
 )
 from pprs_dynamics.selection.form import Remainder, without_remainders
@@ -212,9 +213,9 @@ class _Answer:
         search = self.search
         without = {c: self._without(c) for c in self.kept.effects}
         evidence = {c: one.total - self.kept.total for c, one in without.items()}
-        # First what lowers the error most: that matters first to whoever compensates it.
-        ordered = sorted(self.kept.effects, key=lambda c: -linear_error(
-            search, without[c]))
+        # First what lowers the error most, as a multiple of each drive's noise: drives may be of
+        # different sizes and units.
+        ordered = sorted(self.kept.effects, key=lambda c: -self._over_noise(without[c]))
         if not ordered:
             return []
         unknown = self.kept.unknowns
@@ -238,6 +239,15 @@ class _Answer:
                 errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 self.kept.force(candidate, remaining.shape), said.at_bound))
         return found
+
+    def _over_noise(self, found: CandidateSet) -> float:
+        """Return the root of the mean square of what a set leaves, over the noise of each drive."""
+        search = self.search
+        left = search.regression.residuals.measured - linear_prediction(search, found)
+        shares = [np.nanmean(np.square(left[:, d])) / max(
+            search.regression.noise_floor(self.best.fit, d), 1e-12) ** 2
+            for d in search.regression.drives]
+        return float(np.sqrt(np.mean(shares)))
 
     def _without(self, candidate: Candidate) -> CandidateSet:
         return self.search.evaluate(tuple(c for c in self.kept.candidates if c is not candidate),
