@@ -79,17 +79,22 @@ class Files:
         base = find_file(model)
         found = load_model(base)
         refuse_paths([str(path) for path in (*recordings, *validation)])
-        fitted, held_out = ({str(path): read(path, found, topic) for path in paths}
+        fitted, held_out = ({str(path): read_recording(path, found.drives, topic) for path in paths}
                             for paths in (recordings, validation))
         refuse_repeats(fitted, held_out)
         return cls(found, fitted, held_out, base)
 
 
-def read(path: str | PathLike[str], model: ForceModel, topic: str | None = None) -> Recording:
-    """Read a recording, with what its numbers rather mean; refuse positions that are no metres."""
-    recording = read_recording(path, model.drives, topic)
+def with_mistakes(model: ForceModel, recording: Recording) -> Recording:
+    """Return a recording with what its numbers rather mean among its findings.
+
+    Raises
+    ------
+    UnreadableFileError
+        For positions that are no metres.
+    """
     mistakes = find_mistakes(model, recording)
     for finding in mistakes:
         if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
-            raise UnreadableFileError(path, f'{finding.what}, must be metres')
+            raise UnreadableFileError(recording.name, f'{finding.what}, must be metres')
     return replace(recording, findings=(*mistakes, *recording.findings))
