@@ -80,7 +80,7 @@ class Hub:
         self.failure = ''
         self.is_beginning = True
         self.generation = self.count = 0
-        self._begin = begin
+        self._begin, self._is_unjudged = begin, False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
         self._count, self._lock, self._opening = 0, Lock(), Lock()
         self._work = Event()
@@ -208,6 +208,7 @@ class Hub:
         """Settle after every change; look for what is missing once nothing happens."""
         try:
             session = self._begin()
+            self._is_unjudged = session is not None
             if session is not None:
                 self._use(session)
         except Exception as error:
@@ -216,6 +217,7 @@ class Hub:
         self._changed()
         while not self._ends:
             if not self._work.wait(IDLE):
+                self._find_mistakes()
                 self._diagnose()
                 self._work.wait()
             self._work.clear()
@@ -230,6 +232,16 @@ class Hub:
                 except Exception as error:
                     self._fail(error)
                     self.tell()
+
+    def _find_mistakes(self) -> None:
+        """Look at units and signs of what the command line gave, once the page stands."""
+        if self.session is not None and self._is_unjudged:
+            self._is_unjudged = False
+            try:
+                self.session.find_mistakes()
+            except PprsError as error:
+                self.failure = str(error)
+                self.tell()
 
     def _fail(self, error: Exception) -> None:
         """Say on the page what went wrong; a defect of ours stands in the terminal as well."""

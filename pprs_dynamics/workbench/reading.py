@@ -86,11 +86,20 @@ class Files:
 
 
 def read(path: str | PathLike[str], model: ForceModel, topic: str | None = None) -> Recording:
-    """Read a recording, with what its numbers rather mean; refuse positions that are no metres."""
-    recording = read_recording(path, model.drives, topic, None, model.gain,
-                               model.efforts_in_amperes)
+    """Read a recording of a model's drives; currents become efforts by their gains."""
+    return read_recording(path, model.drives, topic, None, model.gain, model.efforts_in_amperes)
+
+
+def with_mistakes(model: ForceModel, recording: Recording) -> Recording:
+    """Return a recording with what its numbers rather mean among its findings.
+
+    Raises
+    ------
+    UnreadableFileError
+        For positions that are no metres.
+    """
     mistakes = find_mistakes(model, recording)
     for finding in mistakes:
         if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
-            raise UnreadableFileError(path, f'{finding.what}, must be metres')
+            raise UnreadableFileError(recording.name, f'{finding.what}, must be metres')
     return replace(recording, findings=(*mistakes, *recording.findings))

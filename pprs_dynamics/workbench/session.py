@@ -38,13 +38,19 @@ from pprs_dynamics.workbench.errors import SessionError
 from pprs_dynamics.workbench.jobs import Cancelled, Job
 from pprs_dynamics.workbench.long_work import DesignedMotion, designed, diagnosed, judged
 from pprs_dynamics.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
-from pprs_dynamics.workbench.reading import Files, read, refuse_paths, refuse_repeats
+from pprs_dynamics.workbench.reading import (
+    Files,
+    read,
+    refuse_paths,
+    refuse_repeats,
+    with_mistakes,
+)
 from pprs_dynamics.workbench.shown import (
     Share,
     effect_to_json,
     finite,
     names_of,
-    rms,
+    recordings_to_json,
 )
 from pprs_dynamics.workbench.tick_board import TickBoard
 from pprs_dynamics.workbench.what_if import WhatIf
@@ -96,18 +102,26 @@ class Session(TickBoard):
         PprsError
             Where one cannot be read, or holds the samples of another.
         """
-        return cls.of(Files.read(recordings, model, validation, topic))
+        session = cls.of(Files.read(recordings, model, validation, topic))
+        session.find_mistakes()
+        return session
 
     @classmethod
     def of(cls, files: Files) -> Session:
-        """Begin with files that were read.
+        """Begin with files that were read; what their numbers rather mean is not looked for yet.
 
         Raises
         ------
         PprsError
             As `measure_residuals`.
         """
-        session = cls(files.model, files.recordings, files.validation, files.base)
+        try:
+            session = cls(files.model, files.recordings, files.validation, files.base)
+        except PprsError:
+            # Positions in millimetres are told as that, not as a pose out of reach.
+            for recording in files.recordings.values():
+                with_mistakes(files.model, recording)
+            raise
         session._files = {*files.recordings, *files.validation}
         return session
 
@@ -120,7 +134,7 @@ class Session(TickBoard):
             Where it cannot be read, holds the samples of another, or the model cannot follow it.
         """
         refuse_paths([*self.recordings, *self.validation, str(path)])
-        more = {str(path): read(path, self.model)}
+        more = {str(path): with_mistakes(self.model, read(path, self.model))}
         fitted = self.recordings if is_held_out else {**self.recordings, **more}
         held_out = {**self.validation, **more} if is_held_out else self.validation
         refuse_repeats(fitted, held_out)
@@ -133,6 +147,18 @@ class Session(TickBoard):
         with self._lock:
             self.recordings, self.diagnosis = fitted, None
             self._use(what_if, self.shown.ticks)
+
+    def find_mistakes(self) -> None:
+        """Look for units, signs and orders that are not SI's, and add them to the findings.
+
+        Raises
+        ------
+        UnreadableFileError
+            For positions that are no metres.
+        """
+        for listed in (self.recordings, self.validation):
+            listed.update({path: with_mistakes(self.model, one) for path, one in listed.items()})
+        self.tell()
 
     @property
     def steps(self) -> list[Step]:
@@ -339,20 +365,6 @@ class Session(TickBoard):
                 'jobs': {kind: job.to_json() for kind, job in self.jobs.items()},
                 'adoption': adoption.to_json() if adoption else None,
                 'experiment': self.experiment.promise if self.experiment else None,
-                'recordings': self._recordings(),
+                'recordings': recordings_to_json(
+                    list(self.recordings.values()), self.what_if, self.now),
                 'held_out': [one.name for one in self.validation.values()]}
-
-    def _recordings(self) -> list[dict[str, Any]]:
-        """Return every recording with its times and its error before and now."""
-        found, first = [], 0
-        data = self.data
-        for recording, one in zip(self.recordings.values(), self.what_if.design.reconstructions,
-                                  strict=True):
-            part = slice(first, first + len(one.treat.starts))
-            first = part.stop
-            found.append({
-                'name': recording.name, 'start': float(data.time[part][0]),
-                'end': float(data.time[part][-1]), 'before': finite(rms(self.before[part])),
-                'now': finite(rms(self.now[part])),
-                'findings': [finding.text for finding in recording.findings]})
-        return found

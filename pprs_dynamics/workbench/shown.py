@@ -25,9 +25,10 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.selection.estimates import Estimate
-from pprs_dynamics.workbench.what_if import Exact, Offer, Tick
+from pprs_dynamics.workbench.what_if import Exact, Offer, Tick, WhatIf
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
 # cost is lowest; and the fitted model evaluated.
@@ -171,6 +172,21 @@ def _parameters(shown: Shown, effect: type[CatalogueEffect], drives: tuple[str, 
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
             'is_chosen': key in chosen})
     return rows
+
+
+def recordings_to_json(recordings: Sequence[Recording], what_if: WhatIf, now: Array,
+                       ) -> list[dict[str, Any]]:
+    """Return every recording with its times and its error before and now."""
+    found, first = [], 0
+    time = what_if.design.residuals.time
+    for recording, one in zip(recordings, what_if.design.reconstructions, strict=True):
+        part = slice(first, first + len(one.treat.starts))
+        first = part.stop
+        found.append({
+            'name': recording.name, 'start': float(time[part][0]), 'end': float(time[part][-1]),
+            'before': finite(rms(what_if.before[part])), 'now': finite(rms(now[part])),
+            'findings': [finding.text for finding in recording.findings]})
+    return found
 
 
 def names_of(candidate: EffectCandidate, drives: tuple[str, ...]) -> tuple[str, ...] | None:
