@@ -38,13 +38,7 @@ from pprs_dynamics.workbench.errors import SessionError
 from pprs_dynamics.workbench.jobs import Cancelled, Job
 from pprs_dynamics.workbench.long_work import DesignedMotion, designed, diagnosed, judged
 from pprs_dynamics.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
-from pprs_dynamics.workbench.reading import (
-    Files,
-    read,
-    refuse_paths,
-    refuse_repeats,
-    with_mistakes,
-)
+from pprs_dynamics.workbench.reading import Files, read, refuse_paths, refuse_repeats, with_mistakes
 from pprs_dynamics.workbench.shown import (
     Share,
     effect_to_json,
