@@ -381,8 +381,8 @@ def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_model_that_is_not_what_was_fitted_is_refused() -> None:
-    assert objections.of_linearity(1.2, 1.7) == []
-    said, = objections.of_linearity(1.2, 26.8)
+    assert objections.of_linearity(1.2, 1.7, 'N') == []
+    said, = objections.of_linearity(1.2, 26.8, 'N')
     assert '26.8 N' in said
     assert '1.2 N' in said
 

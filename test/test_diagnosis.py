@@ -77,7 +77,8 @@ def change(design: Design, effect: str, values: dict[str, float], drive: str = '
 
 
 @pytest.mark.parametrize('name', sorted(
-    name for name, effect in CATALOGUE.items() if issubclass(effect, StructureEffect)))
+    name for name, effect in CATALOGUE.items()
+    if issubclass(effect, StructureEffect) and MODEL.offers(effect)))
 def test_columns_of_the_structure_are_what_the_model_with_the_effect_says(
         name: str, design: Design) -> None:
     effect = CATALOGUE[name]

@@ -188,6 +188,9 @@ class CatalogueEffect(Effect):
     idealised : bool
         False where the form is exact: inertia, gravity, geometry, a factor. Real friction,
         springs and cords are only nearly of the form that they have here.
+    shows_at_reversals : bool
+        True where the effect shows most where friction turns over, so that friction which does so
+        otherwise than modelled looks like it.
     """
 
     card: ClassVar[Card]
@@ -204,6 +207,7 @@ class CatalogueEffect(Effect):
     is_friction: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = False
     idealised: ClassVar[bool] = True
+    shows_at_reversals: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):

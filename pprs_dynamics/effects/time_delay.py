@@ -40,7 +40,9 @@ class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
     name: ClassVar[str] = 'time_delay'
-    bends_columns: ClassVar[bool] = True  # and idealised: real lags are only nearly a delay
+    bends_columns: ClassVar[bool] = True
+    idealised: ClassVar[bool] = False
+    shows_at_reversals: ClassVar[bool] = True
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)

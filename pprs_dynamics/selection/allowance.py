@@ -36,7 +36,8 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
                        ) -> tuple[float, tuple[str, ...]]:
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
     # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
-    exact = isinstance(candidate, EffectCandidate) and not candidate.effect.idealised
+    exact = isinstance(candidate, EffectCandidate) and not (
+        candidate.effect.idealised or candidate.effect.shows_at_reversals)
     share = decisions.exact_share if exact else decisions.form_share
     drives = {d for block in candidate.blocks for d in block.rows}
     allowed, names = 0.0, []
