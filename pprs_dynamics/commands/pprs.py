@@ -108,3 +108,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
             # Only this one: importing all would take longer than most of them run.
             _module(name).add_arguments(command)
     return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())
