@@ -46,7 +46,7 @@ from pprs_dynamics.selection.expansion import (
     exact_forces,
     fitted_model,
     linear_error,
-    linear_prediction,
+    linear_residual,
     select,
 )
 from pprs_dynamics.selection.form import Remainder, without_remainders
@@ -243,7 +243,7 @@ class _Answer:
     def _over_noise(self, found: CandidateSet) -> float:
         """Return the root of the mean square of what a set leaves, over the noise of each drive."""
         search = self.search
-        left = search.regression.residuals.measured - linear_prediction(search, found)
+        left = linear_residual(search, found)
         shares = [np.nanmean(np.square(left[:, d])) / max(
             search.regression.noise_floor(self.best.fit, d), 1e-12) ** 2
             for d in search.regression.drives]

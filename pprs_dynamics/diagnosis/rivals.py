@@ -19,8 +19,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.effects.effect import CatalogueEffect
@@ -30,7 +28,7 @@ from pprs_dynamics.residuals.measuring import measure_residuals
 from pprs_dynamics.residuals.paired_errors import rms
 from pprs_dynamics.selection.candidates import CandidateSet
 from pprs_dynamics.selection.estimates import Estimate, estimate
-from pprs_dynamics.selection.expansion import fitted_model, linear_prediction
+from pprs_dynamics.selection.expansion import fitted_model, linear_error, linear_residual
 from pprs_dynamics.selection.held_out import hold_out
 from pprs_dynamics.selection.search import Search
 
@@ -95,16 +93,15 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
         search = (selection.last if any(one is best for one in selection.last.evaluated.values())
                   else selection.first)
         candidate = next(c for c in best.effects if c.name == name)
-        measured = search.regression.residuals.measured
-        remaining = measured - linear_prediction(search, best)
+        remaining = linear_residual(search, best)
         drives = candidate.drives
         found.append(RivalEffect(
             of, candidate.effect,
             None if drives is None else tuple(search.design.drives[d] for d in drives),
             estimate(search, best, candidate).parameters,
-            float(np.sqrt(np.nanmean(remaining ** 2))), _held_out(search, best, validate),
+            linear_error(search, best), _held_out(search, best, validate),
             best.cost - selection.best.cost,
-            best.force(candidate, measured.shape), remaining))
+            best.force(candidate, remaining.shape), remaining))
     return tuple(found)
 
 

@@ -215,7 +215,7 @@ class _System:
         for one in by_cost(self.search):
             yield one.effects, one
         # Where no set has an effect, a scan beside what was found says in which shape and where.
-        for proposal in self.search.proposals(self.kept, len(catalogue()), least=-inf):
+        for proposal in self.search.proposals(self.kept, least=-inf):
             yield effects(proposal), self.kept
 
     def _blocks(self, placement: Placement) -> list[Block]:

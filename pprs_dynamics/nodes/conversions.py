@@ -29,6 +29,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.nodes.rejection import Rejection
+from pprs_dynamics.nodes.whole import message_in
 
 PLATFORM = 'platform'
 BASE_FRAMES = ('', 'base')
@@ -98,6 +99,19 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Ar
     if not np.all(np.isfinite(drives)):
         raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, must be finite')
     return drives
+
+
+def read_measured(data: bytes) -> tuple[int, Array, Array]:
+    """Return stamp [ns], positions [m] and efforts [N], NaN where unknown, of a JointState's bytes.
+
+    Raises
+    ------
+    Rejection
+        As `message_in` and `read_drives`.
+    """
+    message = message_in(data, JointState)
+    return (nanoseconds(message.header.stamp), read_drives(message, 'position'),
+            read_drives(message, 'effort', may_be_nan=True))
 
 
 def nanoseconds(moment: Time | Duration) -> int:

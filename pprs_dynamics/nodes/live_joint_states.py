@@ -45,7 +45,6 @@ from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.qos import UNANSWERED
 from pprs_dynamics.nodes.rejection import Rejection
-from pprs_dynamics.nodes.whole import message_in
 from pprs_dynamics.residuals.live import LiveComparison
 
 NAME = 'workbench'
@@ -95,14 +94,11 @@ class LiveJointStates(Node):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            message = message_in(data, JointState)
-            position = conversions.read_drives(message, 'position')
-            effort = conversions.read_drives(message, 'effort', may_be_nan=True)
+            stamp, position, effort = conversions.read_measured(data)
         except Rejection as rejection:
             self._counters['rejected'] += 1
             self._trouble = str(rejection)
             return
-        stamp = conversions.nanoseconds(message.header.stamp)
         with self._lock:
             self._arrived = time.monotonic()
             if self._origin is None:

@@ -30,7 +30,6 @@ from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
-from pprs_dynamics.nodes.whole import message_in
 from pprs_dynamics.residuals.live import Compared, LiveComparison
 
 PARAMETERS = (
@@ -70,15 +69,12 @@ class MonitorNode(ExplainsRefusals):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            message = message_in(data, JointState)
-            position = conversions.read_drives(message, 'position')
-            effort = conversions.read_drives(message, 'effort', may_be_nan=True)
+            stamp, position, effort = conversions.read_measured(data)
         except Rejection as rejection:
             self._reject(rejection)
             return
         if self._cannot_begin:
             return  # samples would pile up
-        stamp = conversions.nanoseconds(message.header.stamp)
         if self._origin is None:
             self._origin = stamp
         # Counted from the first stamp: seconds since 1970 would cost digits.

@@ -98,14 +98,16 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     first = search = Search(design, decisions,
                             progress=lambda share: report(0.25 + 0.35 * share))
     best = search.run()
-    # What was found beside an effect that bends the columns may only make good that they were
-    # not bent: the first step leaves it out.
-    bending = search.at_noise_of(best, search.rescanned(search.evaluate(
-        tuple(filter(_bends, best.candidates)))).candidates)
+    starts = [best]
+    bending = tuple(filter(_bends, best.candidates))
+    if bending:
+        # What was found beside an effect that bends the columns may only make good that they were
+        # not bent: the first step leaves it out.
+        alone = search.rescanned(search.evaluate(bending))
+        starts = [search.at_noise_of(best, alone.candidates), best]
     for number in range(MOST_SEARCHES):
-        of = bending if number == 0 and bending.candidates else best
         try:
-            around = linearised(search, of, recordings, decisions)
+            around = linearised(search, starts[0], recordings, decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
         if around is None:
@@ -113,8 +115,8 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
         start = 0.6 + 0.4 * number / MOST_SEARCHES
         search = Search(around, decisions, first.regression.error_scale,
                         _share_of(report, start, 0.4 / MOST_SEARCHES))
-        best = search.run(*(search.library.rebuilt(one.candidates) for one in (
-            (bending, best) if number == 0 and of is not best else (best,))))
+        best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
+        starts = [best]
     report(1.0)
     return Selection(first, search, best)
 
@@ -292,10 +294,14 @@ def linear_prediction(search: Search, found: CandidateSet) -> Array:
     return prediction
 
 
+def linear_residual(search: Search, found: CandidateSet) -> Array:
+    """Return measured minus what the linear fit predicts, (M, D) [N]."""
+    return search.regression.residuals.measured - linear_prediction(search, found)
+
+
 def linear_error(search: Search, found: CandidateSet) -> float:
-    """Return the rms of measured minus what the linear fit predicts, over all drives [N]."""
-    left = search.regression.residuals.measured - linear_prediction(search, found)
-    return float(np.sqrt(np.nanmean(np.square(left))))
+    """Return the rms of `linear_residual` over all drives [N]."""
+    return float(np.sqrt(np.nanmean(np.square(linear_residual(search, found)))))
 
 
 def exact_forces(design: Design, model: ForceModel, recordings: Sequence[Recording]) -> Array:

@@ -20,7 +20,7 @@ of sums that are known. It proposes; a fit with its own noise decides (`selectio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from functools import partial
 
 import numpy as np
@@ -39,21 +39,27 @@ SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 class ScannedSets(FittedSets):
     """Fitted sets, and what a scan proposes to add to each."""
 
-    def proposals(self, base: CandidateSet, count: int, drive: int | None = None,
-                  least: float = PROPOSED) -> list[Candidates]:
+    def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,
+                  least: float = PROPOSED,
+                  effects: Container[type[CatalogueEffect]] | None = None) -> list[Candidates]:
         """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
 
         Parameters
         ----------
         base : CandidateSet
-        count : int
+        count : int, optional
+            At most; by default all.
         drive : int, optional
             Only effects on this one.
         least : float
             By which the cost must fall at the set's noise.
+        effects : container of type, optional
+            Only these.
         """
         scored: list[tuple[float, Callable[[], Candidates]]] = []
         for effect, found in self._scan(base, drive).items():
+            if effects is not None and effect not in effects:
+                continue
             old = next((c for c in base.effects if c.effect is effect), None)
             score, chosen = self._best_drives(effect, found, old)
             if score > least and chosen:

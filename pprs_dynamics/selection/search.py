@@ -45,7 +45,6 @@ from pprs_dynamics.selection.unknown import PatternLibrary, best_patterns
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
-MOST_PROPOSALS = 100  # more than there are effects
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
 # How much worse than the best a replacement may look at the best one's noise (its own noise may
@@ -183,10 +182,8 @@ class Search(ScannedSets):
 
     def rescanned(self, found: CandidateSet) -> CandidateSet:
         """Return the set on all drives where its effects pay, in shapes that scans find."""
-        names = {one.name for one in found.effects}
-        for candidates in self.proposals(found, MOST_PROPOSALS):
-            if {one.name for one in candidates} == names:
-                found = min(found, self.evaluate(candidates, found), key=lambda one: one.cost)
+        for candidates in self.proposals(found, effects={c.effect for c in found.effects}):
+            found = min(found, self.evaluate(candidates, found), key=lambda one: one.cost)
         for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.placements
                           if c.effect.shape and one.drive is not None]:
             candidate = next(c for c in found.effects if c.effect is effect)

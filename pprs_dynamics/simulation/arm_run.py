@@ -29,11 +29,11 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.joint_series import JointSeries
 from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, require_known, truth
+from pprs_dynamics.simulation.engine_model import load_engine
 
 RATE = 100.0  # [Hz]
 HARMONICS = 8
@@ -73,11 +73,7 @@ class ArmEngine:
     """
 
     def __init__(self, model: ArmModel) -> None:
-        try:
-            import mujoco
-        except ImportError:
-            raise MissingLibraryError('mujoco', 'a simulated arm', 'sim') from None
-        self.engine = mujoco
+        self.engine = mujoco = load_engine('a simulated arm')
         self.model = mujoco.MjModel.from_xml_string(_bare(Path(model.values['arm.urdf'])))
         self.data = mujoco.MjData(self.model)
         self.joints = [self.model.joint(name) for name in model.drives]

@@ -23,8 +23,13 @@ from typing import Any
 from pprs_dynamics.errors import MissingLibraryError
 
 
-def load_engine() -> Any:
+def load_engine(purpose: str = 'the simulated robot') -> Any:
     """Return the module mujoco.
+
+    Parameters
+    ----------
+    purpose : str
+        What needs it, where it is missing.
 
     Raises
     ------
@@ -34,7 +39,7 @@ def load_engine() -> Any:
     try:
         import mujoco
     except ImportError:
-        raise MissingLibraryError('mujoco', 'the simulated robot', 'sim') from None
+        raise MissingLibraryError('mujoco', purpose, 'sim') from None
     if mujoco.get_mju_user_warning() is None:
         # Its own way writes MUJOCO_LOG.TXT into the user's folder; warnings are counted anyway.
         mujoco.set_mju_user_warning(lambda message: None)

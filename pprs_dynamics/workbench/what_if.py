@@ -28,7 +28,6 @@ import numpy as np
 
 from pprs_dynamics.adoption.adopt import original
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.effects.catalogue import catalogue
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
@@ -42,7 +41,7 @@ from pprs_dynamics.selection.expansion import (
     exact_forces,
     expanded,
     fitted_model,
-    linear_prediction,
+    linear_residual,
 )
 from pprs_dynamics.selection.scanned_sets import with_fast_noise
 from pprs_dynamics.selection.search import Search
@@ -183,7 +182,7 @@ class WhatIf:
                    - one.price, default=None)
 
     def _proposals(self, found: CandidateSet) -> Iterable[tuple[object, ...]]:
-        return self.search.proposals(found, len(catalogue()), least=-np.inf)
+        return self.search.proposals(found, least=-np.inf)
 
     def offers(self, found: CandidateSet) -> list[Offer]:
         """Return what every effect that is not in a set would gain beside it, the best first."""
@@ -271,8 +270,7 @@ class WhatIf:
 
     def residual(self, found: CandidateSet) -> Array:
         """Return what the linear fit leaves, (M, D) [N]."""
-        left: Array = self.measured - linear_prediction(self.search, found)
-        return left
+        return linear_residual(self.search, found)
 
     def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
         """Return the parameters of every effect of a set, by drive.parameter."""
