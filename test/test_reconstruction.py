@@ -38,7 +38,7 @@ from pprs_dynamics.measurement.differentiation import (
 )
 from pprs_dynamics.measurement.drive_motion import smooth_drives
 from pprs_dynamics.measurement.live_reconstruction import LiveReconstruction
-from pprs_dynamics.measurement.reconstruction import reconstruct, treated_forces
+from pprs_dynamics.measurement.reconstruction import reconstruct, treated_forces, with_zeros
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.sampling_grid import find_grid
 from pprs_dynamics.measurement.treatment import Treatment, block_length
@@ -52,6 +52,7 @@ from pprs_dynamics.mechanism.forward_motion import (
 )
 from pprs_dynamics.mechanism.inverse_kinematics import solve_inverse_kinematics
 from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.model.model_file import build_model
 
 RATE, RESOLUTION, DURATION = 500.0, 1e-6, 8.0  # [Hz, m, s]
 STEP = 1 / RATE
@@ -328,6 +329,24 @@ def test_smoothed_motion_is_the_true_one():
     assert rms(found.acceleration - real.drives.acceleration[found.index]).max() < 3e-3
     assert not found.near_branch.any()
     assert not len(found.jumps)
+
+
+def test_zeros_elsewhere_are_those_of_a_whole_new_reconstruction():
+    recording = recording_of(truth())
+    shift = np.array([0.004, 0.0, -0.002, 0.001, 0.0, 0.003])
+    names = ['slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3']
+    moved = build_model({**MODEL.values, 'effects.active': ['homing_error'], **{
+        f'effects.homing_error.{name}.zero': float(by)
+        for name, by in zip(names, shift, strict=True)}})
+    assert_allclose(moved.position_error, shift)
+    whole, quick = reconstruct(moved, recording), with_zeros(
+        reconstruct(MODEL, recording), moved, shift)
+    assert_allclose(quick.position, whole.position, rtol=0, atol=1e-15)
+    for name in ('position', 'linear_velocity', 'angular_velocity', 'linear_acceleration'):
+        assert_allclose(getattr(quick.motion, name), getattr(whole.motion, name), rtol=0,
+                        atol=1e-10)
+    assert_allclose(treated_forces(moved, quick)['total'], treated_forces(moved, whole)['total'],
+                    rtol=0, atol=1e-9)
 
 
 # Treatment -----------------------------------------------------------------------------------

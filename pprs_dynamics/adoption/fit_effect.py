@@ -120,7 +120,7 @@ def fit_effect(
     plain_set = replace(without, fit=search.regression.at((), found.fit.amplitudes))
     plain_losses = hold_out(search, plain_set).losses
     evidence = without.cost - found.cost
-    last, found = expanded(search, found, recordings, decisions)
+    last, found = expanded(search, found, decisions)
     report(0.8)
     candidate = found.effects[0]
     said = estimate(last, found, candidate)

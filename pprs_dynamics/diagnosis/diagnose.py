@@ -165,7 +165,7 @@ def diagnose(
     """
     report = progress or (lambda share: None)
     selection = select(model, recordings, decisions, lambda share: report(0.9 * share))
-    diagnosis = _Answer(selection, recordings, validate, decisions).diagnosis()
+    diagnosis = _Answer(selection, validate, decisions).diagnosis()
     report(1.0)
     return diagnosis
 
@@ -173,10 +173,10 @@ def diagnose(
 class _Answer:
     """Turns a selection into an answer."""
 
-    def __init__(self, selection: Selection, recordings: Sequence[Recording],
-                 validate: Sequence[Recording], decisions: Decisions) -> None:
+    def __init__(self, selection: Selection, validate: Sequence[Recording],
+                 decisions: Decisions) -> None:
         self.selection, self.decisions = selection, decisions
-        self.recordings, self.validate = recordings, validate
+        self.validate = validate
         self.search: Search = selection.last
         self.design = self.search.design
         self.best = selection.best
@@ -188,7 +188,7 @@ class _Answer:
         first = self.selection.first.design
         widths = estimate_widths(search, self.kept)
         adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
-        remaining = first.residuals.measured - exact_forces(self.design, adopted, self.recordings)
+        remaining = first.residuals.measured - exact_forces(self.design, adopted)
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}

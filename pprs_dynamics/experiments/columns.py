@@ -253,7 +253,7 @@ class ColumnPlan:
         means = treat(total)
         residuals = Residuals(DRIVES, treat(time), np.zeros(len(means), dtype=int), means, means,
                               period=float(time[1] - time[0]) * block)
-        return Design(self.given, self.model, residuals, (full,), (), (), (), ())
+        return Design(self.given, self.model, residuals, (full,), (), (), (), (), (), means)
 
     def _by_drive(self, base: Sequence[Rows], design: Design) -> Columns:
         """Return base columns and those of the terms, drive by drive."""

@@ -39,5 +39,5 @@ def fit_open_numbers(model: ForceModel, recordings: Sequence[Recording],
         As `measure_residuals`.
     """
     search = Search(Design.of(model, recordings), DECISIONS, with_unknown=False)
-    search, found = expanded(search, search.evaluate(()), recordings, DECISIONS)
+    search, found = expanded(search, search.evaluate(()), DECISIONS)
     return fitted_model(search, found), calibrations(search, found, {})

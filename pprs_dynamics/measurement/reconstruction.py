@@ -31,7 +31,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.differentiation import Smoothing
-from pprs_dynamics.measurement.drive_motion import Measured, smooth_drives
+from pprs_dynamics.measurement.drive_motion import DriveMotion, Measured, smooth_drives
 from pprs_dynamics.measurement.followed_motion import CHUNK, Motion, kinematics_of
 from pprs_dynamics.measurement.rests import find_rests
 from pprs_dynamics.measurement.samples import Progress
@@ -205,6 +205,32 @@ def reconstruct(
         Treatment(drives.block_starts, total), drives.smoothing, drives.block,
         drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
         float(recording.time[0]), _applied_gain(recording))
+
+
+def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Reconstruction:
+    """Return the same reconstruction with the drives' zeros elsewhere.
+
+    Smoothing and blocks do not depend on them.
+
+    Parameters
+    ----------
+    found : Reconstruction
+    model : ForceModel
+        Whose kinematics to use.
+    shift : (D,) array
+        By which positions are less now [m].
+
+    Raises
+    ------
+    ConvergenceError
+        Where drive positions do not close the mechanism.
+    """
+    drives = DriveMotion(found.position - shift, found.velocity, found.acceleration, found.index,
+                         found.segments, found.treat.starts, found.block, found.smoothing,
+                         found.from_recorded, ())
+    followed = kinematics_of(model).follow(found.time, drives)
+    return replace(found, position=drives.position, motion=followed.motion,
+                   near_branch=followed.near_branch, jumps=followed.jumps)
 
 
 def _applied_gain(recording: Measured) -> Array:

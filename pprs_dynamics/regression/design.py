@@ -42,7 +42,7 @@ from pprs_dynamics.effects.drive_effect import (
 )
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.effects.structure_effect import StructureEffect
-from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct
+from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct, with_zeros
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.regression.base_columns import (
@@ -91,6 +91,8 @@ class Design:
         Change of all forces per metre that a drive is measured too far [N/m].
     notes : tuple of str
     reconstructions : tuple of Reconstruction
+    forces : (M, D) array
+        Of `model`, exactly [N].
     point : Point, optional
         None: the given model.
     """
@@ -103,8 +105,11 @@ class Design:
     structure: tuple[Term, ...]
     homing: tuple[Mapping[int, Array], ...]
     notes: tuple[str, ...]
-    reconstructions: tuple[Reconstruction, ...] = field(default=(), repr=False)
+    reconstructions: tuple[Reconstruction, ...] = field(repr=False)
+    forces: Array = field(repr=False)
     point: Point | None = None
+    _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
+        default_factory=dict, repr=False, compare=False)
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -120,13 +125,10 @@ class Design:
         reconstructions = tuple(reconstruct(model, recording) for recording in recordings)
         return cls._evaluated(model, model, reconstructions, progress)
 
-    def around(self, point: Point, recordings: Sequence[Recording],
-               progress: Callable[[float], None] | None = None) -> Design:
+    def around(self, point: Point, progress: Callable[[float], None] | None = None) -> Design:
         """Return the design of the same recordings around another point."""
-        same = np.array_equal(point.model.position_error, self.model.position_error)
-        found = (self.reconstructions if same else
-                 tuple(reconstruct(point.model, recording) for recording in recordings))
-        design = self._evaluated(point.model, self.given, found, progress)
+        design = self._evaluated(point.model, self.given, self.reconstructed(point.model),
+                                 progress)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if not isinstance(column, ReversalShape):
@@ -139,6 +141,18 @@ class Design:
                 shift[:, d] += weights @ rows
         residuals = replace(design.residuals, model=design.residuals.model - shift)
         return replace(design, residuals=residuals, point=point)
+
+    def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
+        """Return the motion of the recordings with the zeros that a model's drives have."""
+        shift = model.position_error - self.model.position_error
+        if not np.any(shift):
+            return self.reconstructions
+        key = np.asarray(shift).tobytes()
+        if key not in self._moved:
+            self._moved.clear()
+            self._moved[key] = tuple(with_zeros(one, model, shift)
+                                     for one in self.reconstructions)
+        return self._moved[key]
 
     @classmethod
     def _evaluated(cls, model: ForceModel, given: ForceModel,
@@ -167,7 +181,7 @@ class Design:
             for effect in sensitivities.searched)
         homing = tuple(dict(enumerate(column)) for column in stacked.get(HOMING, ()))
         design = cls(given, model, residuals, tuple(full), (), structure, homing, tuple(notes),
-                     reconstructions)
+                     reconstructions, residuals.model)
         base: list[BaseColumn] = [
             KnownNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]

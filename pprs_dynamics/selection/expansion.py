@@ -30,7 +30,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.measurement.reconstruction import reconstruct, treated_forces
+from pprs_dynamics.measurement.reconstruction import treated_forces
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import build_model
@@ -48,7 +48,7 @@ from pprs_dynamics.selection.search import Search
 
 # What the exact model may differ from the linear one by, in whitened squares, and how often the
 # expansion is repeated; less changes no cost by more than a rival's margin.
-LEAST_DIFFERENCE, MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 4.0, 3, 6, 4
+LEAST_DIFFERENCE, MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 4.0, 5, 6, 4
 
 
 @dataclass(frozen=True)
@@ -98,16 +98,10 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     first = search = Search(design, decisions,
                             progress=lambda share: report(0.25 + 0.35 * share))
     best = search.run()
-    starts = [best]
-    bending = tuple(filter(_bends, best.candidates))
-    if bending:
-        # What was found beside an effect that bends the columns may only make good that they were
-        # not bent: the first step leaves it out.
-        alone = search.rescanned(search.evaluate(bending))
-        starts = [search.at_noise_of(best, alone.candidates), best]
     for number in range(MOST_SEARCHES):
+        starts = _starts(search, best)
         try:
-            around = linearised(search, starts[0], recordings, decisions)
+            around = linearised(search, starts[0], decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
         if around is None:
@@ -116,9 +110,26 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
         search = Search(around, decisions, first.regression.error_scale,
                         _share_of(report, start, 0.4 / MOST_SEARCHES))
         best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
-        starts = [best]
+    # Rivals that bend no columns are judged where none are bent.
+    for one in list(search.evaluated.values()) if search is not first else ():
+        if (one.cost < best.cost + decisions.rival_margin and one.effects and not one.unknowns
+                and not any(map(_bends, one.candidates))):
+            first.refined(first.evaluate(first.library.rebuilt(one.candidates)))
     report(1.0)
     return Selection(first, search, best)
+
+
+def _starts(search: Search, best: CandidateSet) -> list[CandidateSet]:
+    """Return the sets around which to expand and from which to go on.
+
+    What was found beside an effect that bends the columns may only make good that they were not
+    bent: the first step leaves it out.
+    """
+    if not search.is_beyond_point:
+        return [best]
+    bending = tuple(filter(_bends, best.candidates))
+    alone = search.rescanned(search.evaluate(bending))
+    return [search.at_noise_of(best, alone.candidates), best]
 
 
 def _bends(candidate: Candidate) -> bool:
@@ -130,8 +141,7 @@ def _share_of(report: Callable[[float], None], start: float, width: float,
     return lambda share: report(start + width * share)
 
 
-def linearised(search: Search, found: CandidateSet, recordings: Sequence[Recording],
-               decisions: Decisions) -> Design | None:
+def linearised(search: Search, found: CandidateSet, decisions: Decisions) -> Design | None:
     """Return the design around the fitted model of a set; None where it would change nothing.
 
     Gauss-Newton steps with the set as it is, each halved until the exact error falls.
@@ -143,18 +153,17 @@ def linearised(search: Search, found: CandidateSet, recordings: Sequence[Recordi
     """
     around: Design | None = None
     for _ in range(MOST_STEPS):
-        point = next_point(search, found, recordings)
+        point = next_point(search, found)
         if point is None:
             break
-        around = search.design.around(point, recordings)
+        around = search.design.around(point)
         search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
         search.evaluate(())
         found = search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
     return around
 
 
-def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recording],
-               ) -> Point | None:
+def next_point(search: Search, found: CandidateSet) -> Point | None:
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 
     None where the exact forces of the fitted model are those of the linear fit, and columns were
@@ -165,13 +174,13 @@ def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recordi
     linear = linear_prediction(search, found)
     measured = search.regression.residuals.measured
     target = model_at(design, base, effects)
-    exact = exact_forces(design, target, recordings)
+    exact = exact_forces(design, target)
     before = design.point
     if (squared(search, found, exact - linear) < LEAST_DIFFERENCE
             and _is_bent_by(before, effects)):
         return None
     loss = squared(search, found, measured - exact)
-    now = exact_forces(design, design.model, recordings)
+    now = design.forces
     known = {(one.effect, one.drive): one for one in before.effects} if before else {}
     if all((one.effect, one.drive) in known for one in effects) and before is not None:
         reached = squared(search, found, measured - now)
@@ -181,7 +190,7 @@ def next_point(search: Search, found: CandidateSet, recordings: Sequence[Recordi
             base = (base + before.base) / 2
             effects = tuple(_between(known[one.effect, one.drive], one) for one in effects)
             target = model_at(design, base, effects)
-            loss = squared(search, found, measured - exact_forces(design, target, recordings))
+            loss = squared(search, found, measured - exact_forces(design, target))
         else:
             return None
     return Point(target, base, effects)
@@ -202,8 +211,8 @@ def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
         for name, value in b.coefficients.items()})
 
 
-def expanded(search: Search, found: CandidateSet, recordings: Sequence[Recording],
-             decisions: Decisions) -> tuple[Search, CandidateSet]:
+def expanded(search: Search, found: CandidateSet, decisions: Decisions,
+             ) -> tuple[Search, CandidateSet]:
     """Return the same set around its own fitted model, and the search that holds it.
 
     Raises
@@ -211,7 +220,7 @@ def expanded(search: Search, found: CandidateSet, recordings: Sequence[Recording
     ModelError
         For values that no model may have.
     """
-    around = linearised(search, found, recordings, decisions)
+    around = linearised(search, found, decisions)
     if around is None:
         return search, found
     scale = search.regression.error_scale
@@ -304,9 +313,13 @@ def linear_error(search: Search, found: CandidateSet) -> float:
     return float(np.sqrt(np.nanmean(np.square(linear_residual(search, found)))))
 
 
-def exact_forces(design: Design, model: ForceModel, recordings: Sequence[Recording]) -> Array:
-    """Return the treated forces of a model on the recordings of a design, (M, D) [N]."""
-    same = np.array_equal(model.position_error, design.model.position_error)
-    found = (design.reconstructions if same
-             else [reconstruct(model, recording) for recording in recordings])
-    return np.concatenate([treated_forces(model, one)['total'] for one in found])
+def exact_forces(design: Design, model: ForceModel) -> Array:
+    """Return the treated forces of a model on the recordings of a design, (M, D) [N].
+
+    Raises
+    ------
+    PprsError
+        Where the model cannot follow them.
+    """
+    return np.concatenate([treated_forces(model, one)['total']
+                           for one in design.reconstructed(model)])

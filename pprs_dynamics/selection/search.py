@@ -77,7 +77,9 @@ class Search(ScannedSets):
     def run(self, *starts: Candidates) -> CandidateSet:
         """Return the best set that the search reaches, by effects alone before each further start.
 
-        A pattern of no catalogue stands only beside what effects explain.
+        A pattern of no catalogue stands only beside what effects explain. Where an effect joins
+        that bends the columns, the search ends: what would come next might only make good that
+        they are not bent.
         """
         self.evaluate(())
         if starts:
@@ -85,10 +87,18 @@ class Search(ScannedSets):
         for start in starts[1:] or (() if starts else ((),)):
             self._descend(False, 0.0)
             self.refined(self.evaluate(start))
-        if self.patterns:
+        if self.patterns and not self.is_beyond_point:
             self._descend(True, 0.5)
         self._report(1.0)
         return self.best
+
+    @property
+    def is_beyond_point(self) -> bool:
+        """Whether the best set has an effect that bends columns, and these are not bent by it."""
+        point = self.design.point
+        known = {(one.effect, one.drive) for one in point.effects} if point else set()
+        return any(c.effect.bends_columns and (c.effect, placement.drive) not in known
+                   for c in self.best.effects for placement in c.placements)
 
     def _descend(self, with_patterns: bool, begin: float) -> None:
         """Move from the best set to better neighbours until there is none."""
@@ -103,6 +113,8 @@ class Search(ScannedSets):
                 if self.best.cost > before - LEAST_IMPROVEMENT:
                     return
             self._simplify()
+            if self.is_beyond_point:
+                return
 
     # Moves
 

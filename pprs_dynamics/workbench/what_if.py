@@ -305,11 +305,10 @@ class WhatIf:
         """
         search, parameters = self.search, None
         if is_free and any(c.effect.bends_columns for c in found.effects):
-            search, found = expanded(search, found, self.recordings, self.decisions)
+            search, found = expanded(search, found, self.decisions)
             parameters = {c.name: estimate(search, found, c).parameters for c in found.effects}
         model = fitted_model(search, found)
-        forces = exact_forces(search.design, model, self.recordings)
-        return Exact(model, self.measured - forces, parameters)
+        return Exact(model, self.measured - exact_forces(search.design, model), parameters)
 
     def quiet_noise(self, found: CandidateSet) -> dict[str, float]:
         """Return a first guess of every drive's noise [N]: the fast part of what a fit calls noise.
