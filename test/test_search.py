@@ -150,6 +150,19 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
+@pytest.mark.parametrize(('viscous', 'stands_out'), [(0.02, False), (0.08, True)])
+def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
+        viscous: float, stands_out: bool) -> None:
+    # Both are less than a tenth of what the drag is.
+    recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
+                              'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
+    selection = select(MODEL, [recording], DECISIONS)
+    assert names(selection.best) == ['platform_drag', 'revolute_friction']
+    found, remainders = without_remainders(selection.last, selection.best)
+    assert ('revolute_friction' in names(found)) is stands_out
+    assert [one.candidate.name for one in remainders] == ['revolute_friction'] * (not stands_out)
+
+
 def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
     wrench = {'force_x': 6.0, 'force_y': -4.0, 'force_z': 5.0, 'moment_x': 0.1, 'moment_y': 0.1,
               'moment_z': 0.0}

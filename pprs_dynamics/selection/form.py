@@ -17,12 +17,14 @@
 The catalogue's friction, springs and cords are only nearly of the form that real ones have, and so
 is the model's own friction. A further candidate on the same drives, whose whitened force beyond
 all others is a small share of theirs, is within their model error: it is told as such and not
-adopted.
+adopted. Not so where a drive would keep an error that stands out of its noise without it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from pprs_dynamics.selection.allowance import share_of_allowance
 from pprs_dynamics.selection.candidates import Candidate, CandidateSet
@@ -59,6 +61,10 @@ def without_remainders(search: Search, best: CandidateSet,
         # Of two that look like each other, either is small beyond the other.
         without = {candidate: search.evaluate(
             tuple(c for c in kept.candidates if c is not candidate), kept) for candidate in small}
+        without = {candidate: found for candidate, found in without.items()
+                   if _over_noise(search, best, found) <= search.decisions.left_ratio}
+        if not without:
+            break
         least = min(without, key=lambda candidate: without[candidate].total)
         remainders.append(Remainder(least, kept, small[least]))
         kept = without[least]
@@ -69,6 +75,14 @@ def without_remainders(search: Search, best: CandidateSet,
         kept = better
     return kept, tuple(one for one in remainders if one.candidate.name not in {
         candidate.name for candidate in kept.candidates})
+
+
+def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:
+    """Return the largest rms that a set leaves on a drive, over the noise beside the best set."""
+    regression = search.regression
+    left = np.sqrt(found.fit.squares.sum(axis=1) / regression.counts.sum(axis=1))
+    noise = [regression.noise_floor(best.fit, d) for d in regression.drives]
+    return float(np.max(left / np.maximum(noise, 1e-300)))
 
 
 def _small(search: Search, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
