@@ -199,9 +199,9 @@ def judge(fleet: FleetTrends, truths: dict[int, Truth], robots: int) -> dict[str
     for k in range(robots):
         told, truth = fleet.flagged(f'robot_{k + 1:02d}'), truths.get(k)
         if truth is None:
-            answer['flagged'] += bool(told)
-            answer['wrong'] += [f'robot {k + 1}: nothing, told {told[0].quantity.label}'] * bool(
-                told)
+            if told:
+                answer['flagged'] += 1
+                answer['wrong'].append(f'robot {k + 1}: nothing, told {told[0].quantity.label}')
             continue
         first = told[0] if told else None
         if first is None or first.quantity.name not in TOLD[truth.kind] or (

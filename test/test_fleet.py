@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet
 import pytest
+from cluster_kills import write_axis
 
 from pprs_dynamics import __version__
 from pprs_dynamics.commands.pprs import main
@@ -40,29 +41,9 @@ from pprs_dynamics.model.model_fingerprint import fingerprint
 
 MODEL = 'config/single_axis.yaml'
 EFFECTS = 'coulomb_friction'
-NOISE = 0.5  # [N]
 DAYS, EPOCH = 30, 20_000
 THRESHOLD = 1e-4
 RNG_SEEDS = range(40)
-
-
-def write_axis(path: Path, friction: float = 0.0, seed: int = 0) -> Path:
-    """Write 8 s of the single axis, with Coulomb friction that its model lacks [N]."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(800) / 100
-    position = 0.05 * np.sin(np.pi * time) + 0.02 * np.sin(2.6 * np.pi * time)
-    velocity = np.pi * (0.05 * np.cos(np.pi * time) + 0.052 * np.cos(2.6 * np.pi * time))
-    acceleration = -np.pi ** 2 * (0.05 * np.sin(np.pi * time)
-                                  + 0.1352 * np.sin(2.6 * np.pi * time))
-    # The numbers of config/single_axis.yaml.
-    effort = (95.109 * acceleration + 203.5 * velocity - 3.165
-              + (20.394 + friction) * np.tanh(velocity / 0.0003))
-    effort = effort + rng.normal(scale=NOISE, size=len(time))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    rows = '\n'.join(f'{t:.4f},{q:.9f},{f:.6f}' for t, q, f in zip(
-        time, position, effort, strict=True))
-    path.write_text(f'time,axis/position,axis/effort\n{rows}\n')
-    return path
 
 
 def job(path: Path | str, robot: str = 'a') -> Job:
@@ -121,6 +102,15 @@ def test_one_bad_day_is_no_change() -> None:
     value = np.random.default_rng(3).normal(size=DAYS)
     value[13] += 50.0
     assert not find_changes(time, value, THRESHOLD).found
+
+
+def test_recordings_at_one_time_are_no_trend() -> None:
+    noise = np.random.default_rng(5).normal(size=DAYS)
+    assert not find_changes(np.zeros(DAYS), noise, THRESHOLD).found
+    # Many at the end, as of a robot that was recorded ten times on its last day.
+    time = np.minimum(np.arange(float(DAYS)), 20.0)
+    (found,) = find_changes(time, noise + 8.0 * (time >= 10), THRESHOLD).found
+    assert (found.kind, found.time) == ('step', 10.0)
 
 
 def test_the_robot_that_changes_is_told_with_its_limit(tmp_path: Path) -> None:
