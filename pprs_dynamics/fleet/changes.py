@@ -44,7 +44,8 @@ MOST_STEPS = 4
 # series of 30 values with one step, 1 % got a second one at a price of 4.
 PRICE = 5.0
 DRAWS = 4000  # of slopes, for the time at which a limit is reached
-ROUNDING = 1e-9  # of the values' size: a smaller scatter is rounding
+# Of the values' size: a smaller scatter is rounding, of a number that recordings tell nothing of.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
