@@ -19,13 +19,13 @@ help:
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
 	@echo 'make feedforward   the table and picture of docs/feedforward.md (15 minutes)'
-	@echo 'make localisation  how often compare is right about where the model fails (long)'
+	@echo 'make localisation  how often compare is right about where the model fails (long; it can be stopped)'
 	@echo 'make score      how often diagnose is right about hidden effects (hours; it can be stopped)'
-	@echo 'make adoption   how good a model gets by what is found and added, from files to files (long)'
+	@echo 'make adoption   how good a model gets by what is found and added, from files to files (long; it can be stopped)'
 	@echo 'make benchmark  speed against Pinocchio and MuJoCo, latency against an echo node'
 	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
 	@echo 'make reliability-full   the same at full size (an hour or two)'
-	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long)'
+	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make fleet      a fleet of the physics engine, surveyed: what is found of what changed (long)'
 	@echo 'make workbench   how fast the workbench answers, in a real browser (5 minutes)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
@@ -51,11 +51,11 @@ reproduce: $(VENV)/.demo
 feedforward: $(VENV)/.demo
 	$(BIN)/python docs/feedforward.py
 
-localisation: $(VENV)/.demo
+localisation: $(VENV)/.test
 	$(BIN)/python benchmarks/localisation.py 100
 
 score: $(VENV)/.test
-	$(BIN)/python benchmarks/score.py --jobs 2 --table docs/diagnosis_table.md
+	$(BIN)/python benchmarks/score.py --table docs/diagnosis_table.md
 
 adoption: $(VENV)/.test
 	$(BIN)/python benchmarks/adoption_score.py 24

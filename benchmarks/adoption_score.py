@@ -20,7 +20,8 @@ Each case hides a random effect in the simulated robot and records two motions. 
 --adopt-all` sees the first recording; the error of the model it writes is taken on the second,
 beside that of the best fit of the hidden effect's own form. Then `pprs adopt` is asked for an
 effect that is not there, which it must refuse. Outcomes are appended to FILE as they come, and
-cases that are there are not run again.
+cases that are there are not run again. `--workers` and `--scheduler` say where cases run, as for
+`pprs survey`.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +42,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import hidden_recordings
 import numpy as np
+from cases_on_dask import add_options, engine, read_outcomes, run_missing
 from hidden_recordings import LEAD, Case, Scene, noise_settings
 from hidden_strength import Whitening
 
@@ -179,6 +182,12 @@ def run_case(case: Case, wrong: str) -> dict[str, Any]:
             'wrong': wrong, 'wrong_status': refused.returncode, 'wrong_reason': reason}
 
 
+def outcome_of(drawn: tuple[Case, str], duration: float) -> dict[str, Any]:
+    """Return the outcome of a case and a wrong effect, with recordings of a duration [s]."""
+    hidden_recordings.DURATION = duration
+    return run_case(*drawn)
+
+
 def _error(model: Path, recording: Recording) -> float:
     error = measure_residuals(DriveModel.load(model), [recording])[0].error
     return float(np.sqrt(np.nanmean(error ** 2)))
@@ -228,19 +237,13 @@ def main() -> int:
     parser.add_argument('--snr', type=float, default=1.0)
     parser.add_argument('--duration', type=float, default=40.0, help='of recordings [s]')
     parser.add_argument('--file', type=Path, default=OUTPUT / 'adoption.jsonl')
+    add_options(parser)
     options = parser.parse_args()
-    hidden_recordings.DURATION = options.duration
-    options.file.parent.mkdir(parents=True, exist_ok=True)
-    lines = options.file.read_text().splitlines() if options.file.exists() else []
-    outcomes = [json.loads(line) for line in lines]
-    done = {outcome['name'] for outcome in outcomes}
-    for case, wrong in draw_cases(options.cases, options.first, options.snr):
-        if case.name not in done:
-            outcomes.append(run_case(case, wrong))
-            with options.file.open('a') as stream:
-                stream.write(json.dumps(outcomes[-1]) + '\n')
-            print(one_line(outcomes[-1]), flush=True)
-    print(summary(outcomes))
+    cases = {one[0].name: one for one in draw_cases(options.cases, options.first, options.snr)}
+    with engine(options) as each:
+        run_missing(each, partial(outcome_of, duration=options.duration), cases, options.file,
+                    lambda outcome: outcome['name'], one_line)
+    print(summary(read_outcomes(options.file)))
     return 0
 
 

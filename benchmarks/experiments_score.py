@@ -17,6 +17,9 @@
     python benchmarks/experiments_score.py --seeds 10 --file experiments.jsonl
     python benchmarks/experiments_score.py --table experiments.jsonl
 
+Outcomes are appended to FILE as they come, and cases that are there are not run again.
+`--workers` and `--scheduler` say where cases run, as for `pprs survey`.
+
 A robot with a hidden effect, numbers off within the model file's tolerances and noisy sensors
 makes a poor recording of 10 s: up and down only, or slow and small, with a weaker and weaker
 effect, until the diagnosis is ambiguous with the truth among the candidates. Then one
@@ -28,14 +31,15 @@ nothing against it; open one that holds a rival, or names nothing.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cases_on_dask import add_options, engine, read_outcomes, run_missing
 from hidden_recordings import noise_settings, tolerant_model
 from hidden_strength import changed_values, tolerated_numbers
 
@@ -217,6 +221,12 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
     return result
 
 
+def outcome_of(case: tuple[str, int], follow: bool) -> dict[str, Any]:
+    """Return how the case of an effect and a seed goes; no more than these without ambiguity."""
+    name, seed = case
+    return score(name, seed, follow) or {'effect': name, 'seed': seed}
+
+
 def table(rows: list[dict[str, Any]]) -> Iterator[str]:
     """Yield the lines of a table."""
     yield '| hidden | with it in the set | runs | designed | random | repeated |'
@@ -257,17 +267,18 @@ def main() -> None:
     parser.add_argument('--file', type=Path, default=Path('experiments.jsonl'))
     parser.add_argument('--follow', action='store_true', help='let the simulated robot follow')
     parser.add_argument('--table', type=Path, help='only show what is in a file')
+    add_options(parser)
     options = parser.parse_args()
+    file = options.table or options.file
     if not options.table:
-        for seed in range(options.first_seed, options.first_seed + options.seeds):
-            for name in options.effects.split(','):
-                row = score(name, seed, options.follow)
-                print(name, seed, row or 'not ambiguous', flush=True)
-                if row:
-                    with options.file.open('a') as file:
-                        file.write(json.dumps(row) + '\n')
-    path = options.table or options.file
-    print('\n'.join(table([json.loads(line) for line in path.read_text().splitlines()])))
+        cases = {(name, seed): (name, seed)
+                 for seed in range(options.first_seed, options.first_seed + options.seeds)
+                 for name in options.effects.split(',')}
+        with engine(options) as each:
+            run_missing(each, partial(outcome_of, follow=options.follow), cases, file,
+                        lambda row: (row['effect'], row['seed']), str)
+    # Of what was not ambiguous there is nothing to settle.
+    print('\n'.join(table([row for row in read_outcomes(file) if 'designed' in row])))
 
 
 if __name__ == '__main__':

@@ -143,6 +143,8 @@ def make_fleet(folder: Path, seed: int, robots: int, days: int, quiet: bool) -> 
             values[key] = values[key] * factor if index is None else tuple(
                 v * (factor if i == index else 1) for i, v in enumerate(values[key]))
         noise = float(np.exp(own.uniform(*np.log(NOISES))))
+        # Its bodies are weighed once, and again only where one changes.
+        plant = PrescribedPlant(values, motion, PlantSettings(actual_loads=True))
         for day in range(days):
             hour = float(own.uniform(0, 2))
             warmth = 1 - float(np.exp(-hour / 0.5))
@@ -151,10 +153,11 @@ def make_fleet(folder: Path, seed: int, robots: int, days: int, quiet: bool) -> 
                          (EPOCH + day) * 86400 + 8 * 3600 + 3600 * hour, 20 + 15 * warmth))
             if not (folder / name).exists():
                 (folder / name).parent.mkdir(exist_ok=True)
-                warm = {key: _scaled(value, 1 - WARM * warmth) if key.startswith('friction.')
-                        and key.endswith(('viscous', 'coulomb')) else value
-                        for key, value in values.items()}
-                _record(folder / name, warm, motion, truths.get(robot), day, noise,
+                plant.values = {
+                    key: _scaled(value, 1 - WARM * warmth) if key.startswith('friction.')
+                    and key.endswith(('viscous', 'coulomb')) else value
+                    for key, value in values.items()}
+                _record(folder / name, plant, truths.get(robot), day, noise,
                         np.random.default_rng((seed, 22, robot, day)))
     with (folder / 'robots.csv').open('w', newline='') as file:
         writer = csv.writer(file)
@@ -168,13 +171,12 @@ def _scaled(value: float | tuple[float, ...], factor: float) -> float | tuple[fl
             else value * factor)
 
 
-def _record(path: Path, values: dict[str, object], motion: DrivenMotion, truth: Truth | None,
-            day: int, noise: float, rng: np.random.Generator) -> None:
-    plant = PrescribedPlant(values, motion, PlantSettings(actual_loads=True))
+def _record(path: Path, plant: PrescribedPlant, truth: Truth | None, day: int, noise: float,
+            rng: np.random.Generator) -> None:
     effect = truth.effect(day) if truth is not None else None
     read = plant.readings([effect] if effect is not None else [])
     settings = SensorSettings.with_effort_noise(noise)
-    time = motion.time[LEAD:]
+    time = plant.motion.time[LEAD:]
     recording = Recording.from_arrays(
         path.stem, time, settings.quantised(read.position[LEAD:]), None,
         read.effort[LEAD:] + EffortNoise(settings, rng).samples(len(time)))
@@ -199,9 +201,9 @@ def judge(fleet: FleetTrends, truths: dict[int, Truth], robots: int) -> dict[str
     for k in range(robots):
         told, truth = fleet.flagged(f'robot_{k + 1:02d}'), truths.get(k)
         if truth is None:
-            answer['flagged'] += bool(told)
-            answer['wrong'] += [f'robot {k + 1}: nothing, told {told[0].quantity.label}'] * bool(
-                told)
+            if told:
+                answer['flagged'] += 1
+                answer['wrong'].append(f'robot {k + 1}: nothing, told {told[0].quantity.label}')
             continue
         first = told[0] if told else None
         if first is None or first.quantity.name not in TOLD[truth.kind] or (

@@ -14,10 +14,12 @@
 
 """How often `localise` says something about noise, and how often it finds a planted error.
 
-Run `python benchmarks/localisation.py [RECORDINGS] [FIRST_SEED] [WHAT]`. It prints the share of
-recordings with a perfect model in which anything is stated, per sort of noise, and the share
-in which a planted error's drive and variable are named first, per error and sort of noise. WHAT
-is `noise`, `planted`, part of a planted error's name, or absent for all.
+Run `python benchmarks/localisation.py [RECORDINGS] [FIRST_SEED] [WHAT] [--file FILE]`. It prints
+the share of recordings with a perfect model in which anything is stated, per sort of noise, and
+that in which a planted error is named first with drive and variable, per error and sort of noise.
+WHAT is `noise`, `planted`, part of a planted error's name, or absent for all. What was said is
+appended to FILE as it comes, and recordings that are there are not made again; `--workers` and
+`--scheduler` say where they are made, as for `pprs survey`.
 
 Recordings: 40 s at 100 Hz of the paper's robot on a random excitation, noise of 0.08 N rms that is
 independent between the drives; planted errors of 0.3 N at most, on one drive.
@@ -25,15 +27,17 @@ independent between the drives; planted errors of 0.3 N at most, on one drive.
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 # The arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
+from cases_on_dask import Outcome, add_options, engine, read_outcomes, run_missing
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
@@ -43,6 +47,7 @@ from pprs_dynamics.mechanism.paths import Excitation
 from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.residuals.residuals import Residuals
 
+OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 DURATION, RATE = 40.0, 100.0  # [s, Hz]
 NOISE, ERROR = 0.08, 0.3  # [N]
 NOISES: tuple[float | str, ...] = (0.0, 0.9, 0.97, 0.99, 0.998, 'mixed', '1/f')
@@ -195,26 +200,45 @@ def misses(name: str, kind: float | str, seed: int) -> str:
     return '' if right else f'{DRIVES[drive]} meant, [{found[0].evidence:.0f}] {found[0].text}'
 
 
+def outcome_of(case: tuple[str, float | str, int]) -> Outcome:
+    """Return what is said of a case: planted error or 'noise', sort of noise, seed."""
+    name, kind, seed = case
+    said = states_anything(kind, seed) if name == 'noise' else misses(name, kind, seed)
+    return {'planted': name, 'noise': kind, 'seed': seed, 'said': said}
+
+
+def name_of(outcome: Outcome) -> tuple[str, float | str, int]:
+    """Return the case of an outcome."""
+    return outcome['planted'], outcome['noise'], outcome['seed']
+
+
 def main() -> None:
-    """Print the table, and what went wrong."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    first = int(sys.argv[2]) if len(sys.argv) > 2 else 100_000
-    what = sys.argv[3] if len(sys.argv) > 3 else ''
-    seeds = range(first, first + count)
-    if what in ('', 'noise'):
-        for kind in NOISES:
-            said = [text for text in (states_anything(kind, seed) for seed in seeds) if text]
-            print(f'perfect model, noise {kind!s:6}: {len(said):3} of {count} say something',
-                  flush=True)
-            print(''.join(f'    {text}\n' for text in said[:4]), end='', flush=True)
-    if what != 'noise':
-        chosen = [name for name in PLANTS if what in ('', 'planted') or what in name]
-        for name in chosen:
-            for kind in PLANTED_NOISES:
-                wrong = [text for text in (misses(name, kind, seed) for seed in seeds) if text]
-                print(f'{name:27} noise {kind!s:5}: {count - len(wrong):3} of {count} found first',
-                      flush=True)
-                print(''.join(f'    {text}\n' for text in wrong[:4]), end='', flush=True)
+    """Run what is missing, and print the table with what went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('recordings', type=int, nargs='?', default=100)
+    parser.add_argument('first_seed', type=int, nargs='?', default=100_000)
+    parser.add_argument('what', nargs='?', default='')
+    parser.add_argument('--file', type=Path, default=OUTPUT / 'localisation.jsonl')
+    add_options(parser)
+    options = parser.parse_args()
+    rows = [('noise', kind) for kind in NOISES if options.what in ('', 'noise')]
+    rows += [(name, kind) for name in PLANTS for kind in PLANTED_NOISES
+             if options.what in ('', 'planted') or options.what in name]
+    seeds = range(options.first_seed, options.first_seed + options.recordings)
+    cases = {(*row, seed): (*row, seed) for row in rows for seed in seeds}
+    with engine(options) as each:
+        run_missing(each, outcome_of, cases, options.file, name_of,
+                    lambda one: ' '.join(map(str, one.values())))
+    said = {name_of(one): one['said'] for one in read_outcomes(options.file)}
+    for name, kind in rows:
+        every = [said[name, kind, seed] for seed in seeds if (name, kind, seed) in said]
+        texts = [text for text in every if text]
+        if name == 'noise':
+            print(f'perfect model, noise {kind!s:6}: {len(texts):3} of {len(every)} say something')
+        else:
+            print(f'{name:27} noise {kind!s:5}: {len(every) - len(texts):3} of {len(every)} found '
+                  'first')
+        print(''.join(f'    {text}\n' for text in texts[:4]), end='')
 
 
 if __name__ == '__main__':

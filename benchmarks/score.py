@@ -15,18 +15,16 @@
 """How often `diagnose` is right about physics hidden in recordings.
 
     python benchmarks/score.py --quick
-    python benchmarks/score.py --seeds 20 --nothing 200 --jobs 2 --table docs/diagnosis_table.md
+    python benchmarks/score.py --seeds 20 --nothing 200 --table docs/diagnosis_table.md
 
 Every case's outcome is appended to FILE at once, and cases that are there are not run again: the
 run can be stopped and continued, and `--seeds` raised later. The table is made from that file.
+`--workers` and `--scheduler` say where cases run, as for `pprs survey`.
 """
 
 from __future__ import annotations
 
 import argparse
-import fcntl
-import itertools
-import json
 import os
 import sys
 import time
@@ -34,7 +32,6 @@ import traceback
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +39,7 @@ from typing import Any
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
+from cases_on_dask import Each, add_options, engine, read_outcomes, run_missing
 from hidden_recordings import PINK, Case, load_case, make_case, save_case
 from oracle import consult
 from score_table import judge, make_table
@@ -124,36 +122,13 @@ def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> di
     return {**outcome, 'judged': judge(outcome)}
 
 
-def run(todo: Iterable[Case], diagnose: Diagnose, file: Path, jobs: int = 1,
+def run(todo: Iterable[Case], diagnose: Diagnose, file: Path, each: Each,
         recordings: Path | None = None) -> None:
     """Diagnose cases that are not in a file of outcomes yet; append and print theirs."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    if file.exists() and not file.read_text().endswith('\n'):
-        with file.open('a') as stream:
-            stream.write('\n')  # after a line that was cut short
-    done = {outcome['name'] for outcome in outcomes(file)}
-    left = [case for case in todo if case.name not in done]
-    # One seed's cases share their motion, which takes longer to prepare than they do.
-    groups = [list(group) for _, group in itertools.groupby(left, lambda case: case.seed)]
-    work = partial(_run_group, diagnose=diagnose, file=file, recordings=recordings)
-    if jobs == 1:
-        for group in groups:
-            work(group)
-        return
-    with get_context('fork').Pool(jobs) as pool:
-        for _ in pool.imap_unordered(work, groups):
-            pass
-
-
-def outcomes(file: Path) -> list[dict[str, Any]]:
-    """Return the outcomes in a file; of a line that was cut short, none."""
-    found = []
-    for line in file.read_text().splitlines() if file.exists() else ():
-        try:
-            found.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return found
+    # One seed's cases come together: they share their motion, which workers keep.
+    run_missing(each, partial(diagnose_case, diagnose=diagnose, recordings=recordings),
+                {case.name: case for case in todo}, file, lambda outcome: outcome['name'],
+                one_line)
 
 
 def one_line(outcome: dict[str, Any]) -> str:
@@ -179,16 +154,6 @@ def _described(effect: dict[str, Any]) -> str:
     return effect['name'] + (f'({",".join(drives)})' if drives else '')
 
 
-def _run_group(group: Iterable[Case], diagnose: Diagnose, file: Path,
-               recordings: Path | None) -> None:
-    for case in group:
-        outcome = diagnose_case(case, diagnose, recordings)
-        with file.open('a') as stream:
-            fcntl.flock(stream, fcntl.LOCK_EX)
-            stream.write(json.dumps(outcome) + '\n')
-        print(one_line(outcome), flush=True)
-
-
 def _sets(seed: int) -> Iterator[tuple[str, ...]]:
     """Yield pairs and triples of effects, drawn at random."""
     rng = np.random.default_rng((seed, zlib.crc32(b'sets')))
@@ -212,7 +177,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument('--snr', type=float, nargs='+', default=SNRS)
     parser.add_argument('--only', choices=ROWS, nargs='+', default=ROWS)
     parser.add_argument('--effect', action='append', help='only cases with this one')
-    parser.add_argument('--jobs', type=int, default=1)
+    add_options(parser)
     parser.add_argument('--file', type=Path, default=OUTPUT / 'score.jsonl')
     parser.add_argument('--recordings', type=Path,
                         help='folder that keeps the recordings (default: of --quick and '
@@ -245,8 +210,9 @@ def main() -> int:
         # Of a diagnosis that changes from run to run, old outcomes are worth nothing.
         file = OUTPUT / ('quick.jsonl' if options.quick else 'development.jsonl')
         file.unlink(missing_ok=True)
-    run(todo, diagnose, file, options.jobs, recordings)
-    table = make_table(outcomes(file))
+    with engine(options) as each:
+        run(todo, diagnose, file, each, recordings)
+    table = make_table(read_outcomes(file))
     if options.table:
         options.table.write_text(table)
     else:

@@ -16,15 +16,19 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet
 import pytest
+from cluster_kills import write_axis
 
 from pprs_dynamics import __version__
 from pprs_dynamics.commands.pprs import main
@@ -40,29 +44,9 @@ from pprs_dynamics.model.model_fingerprint import fingerprint
 
 MODEL = 'config/single_axis.yaml'
 EFFECTS = 'coulomb_friction'
-NOISE = 0.5  # [N]
 DAYS, EPOCH = 30, 20_000
 THRESHOLD = 1e-4
 RNG_SEEDS = range(40)
-
-
-def write_axis(path: Path, friction: float = 0.0, seed: int = 0) -> Path:
-    """Write 8 s of the single axis, with Coulomb friction that its model lacks [N]."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(800) / 100
-    position = 0.05 * np.sin(np.pi * time) + 0.02 * np.sin(2.6 * np.pi * time)
-    velocity = np.pi * (0.05 * np.cos(np.pi * time) + 0.052 * np.cos(2.6 * np.pi * time))
-    acceleration = -np.pi ** 2 * (0.05 * np.sin(np.pi * time)
-                                  + 0.1352 * np.sin(2.6 * np.pi * time))
-    # The numbers of config/single_axis.yaml.
-    effort = (95.109 * acceleration + 203.5 * velocity - 3.165
-              + (20.394 + friction) * np.tanh(velocity / 0.0003))
-    effort = effort + rng.normal(scale=NOISE, size=len(time))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    rows = '\n'.join(f'{t:.4f},{q:.9f},{f:.6f}' for t, q, f in zip(
-        time, position, effort, strict=True))
-    path.write_text(f'time,axis/position,axis/effort\n{rows}\n')
-    return path
 
 
 def job(path: Path | str, robot: str = 'a') -> Job:
@@ -121,6 +105,15 @@ def test_one_bad_day_is_no_change() -> None:
     value = np.random.default_rng(3).normal(size=DAYS)
     value[13] += 50.0
     assert not find_changes(time, value, THRESHOLD).found
+
+
+def test_recordings_at_one_time_are_no_trend() -> None:
+    noise = np.random.default_rng(5).normal(size=DAYS)
+    assert not find_changes(np.zeros(DAYS), noise, THRESHOLD).found
+    # Many at the end, as of a robot that was recorded ten times on its last day.
+    time = np.minimum(np.arange(float(DAYS)), 20.0)
+    (found,) = find_changes(time, noise + 8.0 * (time >= 10), THRESHOLD).found
+    assert (found.kind, found.time) == ('step', 10.0)
 
 
 def test_the_robot_that_changes_is_told_with_its_limit(tmp_path: Path) -> None:
@@ -273,3 +266,66 @@ def test_the_command_says_what_it_did(recordings: Path, tmp_path: Path,
     assert '0 done, 7 done before' in capsys.readouterr().out
     assert main(['survey', str(tmp_path / 'none*'), '--output', str(store)]) == 2
     assert 'there is no recording' in capsys.readouterr().err
+
+
+@pytest.fixture
+def told_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a store called as in docs/fleets.md, with a growing friction and a refusal."""
+    store = Store(str(tmp_path / 'store'))
+    for robot in ('1', '2'):
+        write_values(store, robot, np.arange(5.0) * (robot == '2'))
+    store.write('2', 'k', [{'recording': 'bad.csv', 'error': 'no header'}])
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _examples(language: str) -> list[str]:
+    text = (Path(__file__).parents[1] / 'docs' / 'fleets.md').read_text()
+    return re.findall(rf'```{language}\n(.*?)```', text, re.DOTALL)
+
+
+def _value_of(code: str) -> Any:
+    """Run an example, and return what its last line shows."""
+    *before, last = ast.parse(code).body
+    assert isinstance(last, ast.Expr)
+    names: dict[str, Any] = {}
+    exec(compile(ast.Module(before, []), 'docs/fleets.md', 'exec'), names)
+    return eval(compile(ast.Expression(last.value), 'docs/fleets.md', 'eval'), names)
+
+
+def test_the_examples_of_the_documentation_read_a_store(told_store: Path) -> None:
+    with_pandas, with_polars = map(_value_of, _examples('python'))
+    assert with_pandas.shape == (5, 2)
+    assert with_pandas.max().tolist() == [0.0, 4.0]
+    assert with_polars.rows() == [(2, 'bad.csv', 'no header')]
+    import duckdb
+
+    (query,) = _examples('sql')
+    assert sorted(duckdb.sql(query).fetchall()) == [(1, 'slide_2', 0.0), (2, 'slide_2', 4.0)]
+
+
+def test_the_documented_columns_are_those_of_the_schema() -> None:
+    text = (Path(__file__).parents[1] / 'docs' / 'fleets.md').read_text()
+    documented = re.findall(r'^\| `(\w+)` \|', text, re.MULTILINE)
+    assert set(documented) == {'robot', *schema().names}
+
+
+def test_auto_diagnoses_each_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_axis(tmp_path / 'a' / 'right.csv', 0.0, seed=1)
+    write_axis(tmp_path / 'a' / 'worn.csv', 6.0, seed=2)
+    store = tmp_path / 'store'
+    assert main(['survey', str(tmp_path / 'a'), '--model', MODEL, '--output', str(store),
+                 '--workers', '1']) == 0
+    assert '2 recordings: 2 done' in capsys.readouterr().out
+    rows = Store(str(store)).read().to_pylist()
+    assert {row['options'] for row in rows} == {'auto'}
+    verdicts = {row['recording']: row['verdict'] for row in rows}
+    assert verdicts == {'right.csv': 'adequate', 'worn.csv': 'effect'}
+    (found,) = (row for row in rows if row['effect'] == 'coulomb_friction')
+    assert found['recording'] == 'worn.csv'
+    assert abs(found['value'] - 6.0) < 4 * found['std']
+    assert all(row['seconds'] > 0 and row['rms'] > 0 for row in rows)
+    # What was not found that day is 0 in a trend.
+    (trend,) = (one for one in fleet_trends(Store(str(store))).trends
+                if one.quantity.name == 'coulomb_friction.force')
+    assert sorted(trend.value) == [0.0, found['value']]

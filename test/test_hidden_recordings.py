@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases_on_dask import here, read_outcomes
 
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.residuals.measuring import measure_residuals
@@ -164,11 +165,11 @@ def test_the_score_appends_continues_and_counts_failures(
             raise ValueError('no idea')
         return Answer(said('adequate') if len(calls) == 1 else said('effect', 'base_tilt'))
 
-    score.run(todo[:2], diagnose, file)
+    score.run(todo[:2], diagnose, file, here)
     with file.open('a') as stream:
         stream.write('{"name": "cut sho')
-    score.run(todo, diagnose, file)
-    found = score.outcomes(file)
+    score.run(todo, diagnose, file, here)
+    found = read_outcomes(file)
     assert calls == [case.name for case in todo]
     assert [outcome.get('judged', {}).get('claimed') for outcome in found] == [False, None, True]
     assert 'no idea' in capsys.readouterr().out

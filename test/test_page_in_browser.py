@@ -267,3 +267,56 @@ def test_a_payload_picked_up_in_mid_run_is_no_noise() -> None:
         assert any(one.drive == name for one in comparison.where)
     for name in DRIVES[:3]:
         assert comparison.drives[name].grade == 'noise'
+
+
+# Where a value of a figure is on the screen, of a field of the map by its labels.
+PLACE = '''([figure, x, y]) => {
+  const plot = document.querySelector(figure), box = plot.getBoundingClientRect();
+  const {xaxis, yaxis} = plot._fullLayout;
+  return [box.left + xaxis._offset + xaxis.d2p(x), box.top + yaxis._offset + yaxis.d2p(y)];
+}'''
+
+
+def click_on(seen: Seen, figure: str, x: str, y: str | float) -> None:
+    """Click where a figure has a value, as the mouse comes there."""
+    seen.tab.locator(figure).scroll_into_view_if_needed()
+    place = seen.tab.evaluate(PLACE, [figure, x, y])
+    seen.tab.mouse.move(place[0] - 3, place[1] - 1)
+    seen.tab.mouse.move(*place)
+    seen.tab.wait_for_timeout(300)  # the library looks for what is below the mouse
+    seen.tab.mouse.click(*place)
+
+
+@needs_browser
+def test_the_map_leads_to_a_trend_and_a_trend_to_a_recording(see: Any) -> None:
+    seen = see('fleet', viewport={'width': 1280, 'height': 1400})
+    seen.drawn(1)
+    title, card = seen.tab.locator('#trend-title'), seen.tab.locator('#recording')
+    # The robot that changed comes first.
+    seen.tab.wait_for_function("document.querySelector('#trend').data")
+    assert title.inner_text().startswith('b, slide_2: coulomb_friction.force grows by')
+    assert card.is_hidden()
+    click_on(seen, '.plot', 'slide_2: coulomb_friction.force', 'a robot with a long name')
+    seen.tab.wait_for_function("document.querySelector('#trend-title').textContent[0] === 'a'")
+    assert title.inner_text() == (
+        'a robot with a long name, slide_2: coulomb_friction.force: no change')
+    time, value = seen.tab.evaluate(
+        "(({x, y}) => [x[7], y[7]])(document.querySelector('#trend').data[0])")
+    click_on(seen, '#trend', time, value)
+    card.wait_for(state='visible')
+    assert card.locator('h3').inner_text().startswith('7.csv, 2024-10-11')
+    assert card.locator('code').inner_text() == (
+        "pprs diagnose '/a robot with a long name/7.csv' --report recording.html")
+    assert 'slide_2: coulomb_friction.force' in card.locator('table').inner_text()
+    # The next field closes it.
+    click_on(seen, '.plot', 'slide_2: coulomb_friction.force', 'b')
+    card.wait_for(state='hidden')
+    assert title.inner_text().startswith('b, ')
+    # Beside the trend stands the column of the manifest.
+    assert seen.tab.evaluate(
+        "document.querySelector('#trend').data.map((one) => one.name)") == [
+        'slide_2: coulomb_friction.force', 'change', 'temperature']
+    # The other colours of the map: from the fleet's median.
+    seen.tab.locator('.updatemenu-button').nth(1).click()
+    seen.tab.wait_for_function("document.querySelector('.plot').data[1].visible === true")
+    assert not seen.complaints

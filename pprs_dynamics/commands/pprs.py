@@ -45,7 +45,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     use_one_thread()
     given = sys.argv[1:] if arguments is None else list(arguments)
     with lasting_output() as output:
-        options = _parser(given).parse_args(given)
+        try:
+            options = _parser(given).parse_args(given)
+        except KeyboardInterrupt:
+            # Importing a command takes long enough to be interrupted.
+            print('pprs: interrupted', file=sys.stderr)
+            return 130
         status = _run(options)
     if output.error is None or isinstance(output.error, BrokenPipeError):
         # A reader of our output that went away, e.g. `head`, had enough of it.

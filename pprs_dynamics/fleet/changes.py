@@ -44,7 +44,8 @@ MOST_STEPS = 4
 # series of 30 values with one step, 1 % got a second one at a price of 4.
 PRICE = 5.0
 DRAWS = 4000  # of slopes, for the time at which a limit is reached
-ROUNDING = 1e-9  # of the values' size: a smaller scatter is rounding
+# Of the values' size: a smaller scatter is rounding, of a number that recordings tell nothing of.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,9 @@ def find_changes(time: Array, value: Array, threshold: float) -> Changes:
     series = _Series(time, value)
     constant = Changes((), 1.0, 0.0, series.scatter, np.full(len(time), np.median(value)),
                        np.zeros((0, 3)))
-    if len(time) < LEAST_VALUES or series.scatter <= ROUNDING * float(np.abs(value).max()):
+    # Without times, e.g. where stamps begin at 0, there is no order to look for changes in.
+    if len(time) < LEAST_VALUES or time[0] == time[-1] or (
+            series.scatter <= ROUNDING * float(np.abs(value).max())):
         return constant
     slope, steps = series.slope(), series.steps()
     best = min((slope, *steps), key=lambda one: one.information)
@@ -160,6 +163,7 @@ class _Series:
         Coefficients (H, 2), sums of squares (H,) and covariances but for the noise (H, 2, 2).
         """
         places = np.unique(self.time[:self.n - LEAST_SEGMENT])
+        places = places[places < self.time[-1]]  # recordings may have one time
         ramps = np.maximum(self.time - places[:, None], 0.0)
         columns = np.stack([np.ones_like(ramps), ramps], axis=2)
         spreads = np.linalg.inv(columns.transpose(0, 2, 1) @ columns)

@@ -20,9 +20,12 @@ grow with their number.
 
 from __future__ import annotations
 
+import logging
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from time import monotonic
 from typing import Any
 
@@ -65,27 +68,90 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     except ImportError:
         raise MissingLibraryError('distributed', 'a survey', 'fleet') from None
     library: Any = distributed  # whose functions carry no types
-    if scheduler is not None:
-        try:
-            client = library.Client(scheduler, timeout=REACHED_WITHIN, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise SchedulerError(f'--scheduler {scheduler}: cannot be reached: {error}') from None
-        try:
+    with _without_log():
+        if scheduler is not None:
+            client = _reached(library, scheduler)
+            try:
+                yield client
+            finally:
+                client.close(timeout=2)
+            return
+        settings = {'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
+                    # Workers that are killed with their nannies are nobody's to restart.
+                    'distributed.worker.daemon': True}
+        with dask.config.set(settings), _workers_spared():
+            local = library.LocalCluster(
+                n_workers=workers or len(os.sched_getaffinity(0)), threads_per_worker=1,
+                processes=True, host=LOOPBACK, dashboard_address=f'{LOOPBACK}:0',
+                worker_dashboard_address=f'{LOOPBACK}:0', silence_logs='CRITICAL')
+        with local, library.Client(local, set_as_default=False) as client:
             yield client
-        finally:
-            client.close(timeout=2)
-        return
-    settings = {'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
-                # Workers that are killed with their nannies are nobody's to restart.
-                'distributed.worker.daemon': True}
-    count = workers or len(os.sched_getaffinity(0))
-    with (dask.config.set(settings),
-          library.LocalCluster(
-              n_workers=count, threads_per_worker=1, processes=True, host=LOOPBACK,
-              dashboard_address=f'{LOOPBACK}:0', worker_dashboard_address=f'{LOOPBACK}:0',
-              silence_logs='ERROR') as local,
-          library.Client(local, set_as_default=False) as client):
-        yield client
+
+
+def _reached(library: Any, scheduler: str) -> Any:
+    """Return a client of a running cluster."""
+    encrypted = scheduler.startswith('tls://')
+    security = library.Security()  # of Dask's configuration
+    # What Dask itself says of these two comes late, and more than once.
+    if encrypted and security.get_connection_args('client').get('ssl_context') is None:
+        raise SchedulerError(f"--scheduler {scheduler}: cannot be reached: Dask's configuration "
+                             'names no certificates (distributed.comm.tls)')
+    if security.require_encryption and not encrypted:
+        raise SchedulerError(f"--scheduler {scheduler}: cannot be reached: Dask's configuration "
+                             'requires encryption, an address must begin with tls://')
+    try:
+        return library.Client(scheduler, timeout=REACHED_WITHIN, set_as_default=False)
+    except (OSError, ValueError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise SchedulerError(f'--scheduler {scheduler}: cannot be reached: {reason}') from None
+
+
+@contextmanager
+def _without_log() -> Iterator[None]:
+    """Keep Dask's log of what comes and goes out of the terminal: what matters is raised."""
+    handlers = {handler: handler.level for name in logging.root.manager.loggerDict
+                if name.startswith('distributed') for handler in logging.getLogger(name).handlers}
+    for handler in handlers:
+        handler.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for handler, level in handlers.items():
+            handler.setLevel(level)
+
+
+@contextmanager
+def _workers_spared() -> Iterator[None]:
+    """Start processes that Ctrl-C does not reach: this one hears it, and ends them.
+
+    Threads and processes that begin in the block inherit that the signal is held back.
+    """
+    # Starting it later would let the signal through again.
+    resource_tracker.ensure_running()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
+             ) -> Iterator[tuple[Any, Any, str | None]]:
+    """Yield item, what work returns for it, and its error if it has one, as they come.
+
+    Raises
+    ------
+    SchedulerError
+        Where the scheduler goes.
+    """
+    def begin(item: Any) -> Any:
+        return client.submit(work, item, pure=False)
+
+    def after(item: Any, value: Any, error: str | None) -> None:
+        return None
+
+    for item, value, _, error in _two_steps(client, items, begin, after):
+        yield item, value, error
 
 
 def run_survey(client: Any, jobs: Iterable[Job], store: Store) -> Iterator[Result | None]:

@@ -168,13 +168,15 @@ def examine(job: Job, content: str | None) -> Result:
     use_one_thread()
     began = perf_counter()
     common = _common(job, content)
-    key = job.key(content or job.entry.path)
+    key, path = job.key(content or job.entry.path), job.entry.path
     try:
         with local_copy(job.entry.path) as path:
             rows = _examined(job, path, common)
     except PprsError as error:
+        # A copy's name says nothing to anybody.
+        text = str(error).replace(path, job.entry.path)
         # What could not even be read may be there the next time.
-        return Result(key, [{**common, 'error': displayed(str(error)),
+        return Result(key, [{**common, 'error': displayed(text),
                              'seconds': perf_counter() - began}], failed=content is None)
     except Exception as error:  # of the package itself, but no end of a survey
         return Result(key, [{**common, 'seconds': perf_counter() - began,
