@@ -178,6 +178,7 @@ class ArmModel(ForceModel):
             loaded = arm
             for effect in effects:
                 if isinstance(effect, BodyEffect):
+                    _require_present(effect, arm)
                     loaded = effect.changed(loaded)
                     _require_bodies(effect, loaded)
             common = values['friction.reversal_velocity']
@@ -245,6 +246,15 @@ def _inertial(tree: ArmTree, values: Mapping[str, Any]) -> Array:
         if not mass > 0:
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     return inertial
+
+
+def _require_present(effect: BodyEffect, arm: Arm) -> None:
+    """Raise ModelError where an effect changes a body that the arm does not have."""
+    for name in sorted(effect.absent(arm)):
+        if effect.values[name]:
+            raise ModelError(
+                f'effects.{effect.name}.{name}', effect.values[name], 'be left out: this arm has '
+                'no such link, or it is the one that carries the tool, of which payload_mass tells')
 
 
 def _require_bodies(effect: CatalogueEffect, arm: Arm) -> None:

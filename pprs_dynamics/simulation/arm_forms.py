@@ -134,7 +134,7 @@ FORMS: dict[str, JointForm] = {
         lambda p, m: p['mass'] * m.acceleration),
 }
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
-OF_ARM = ('payload_mass', 'base_tilt', 'external_wrench', 'effort_gain')
+OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain')
 NAMES = (*FORMS, *OF_ARM)
 
 
