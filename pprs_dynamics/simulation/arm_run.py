@@ -243,8 +243,20 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         gain = scale * float(random.uniform(0.04, 0.1))
         efforts[:, joint] *= 1 + gain
         hidden.append(truth('effort_gain', [model.drives[joint]], {'gain': gain}, '1 + gain'))
+    if 'time_delay' in chosen:
+        assert motion.time is not None
+        delay = scale * float(random.uniform(0.008, 0.03))
+        efforts = np.stack([np.interp(motion.time - delay, motion.time, column)
+                            for column in efforts.T], axis=1)
+        hidden.append(truth('time_delay', list(model.drives), {'delay': delay}, 'all efforts late'))
+    shift = np.zeros(len(largest))
+    if 'homing_error' in chosen:
+        joint = int(random.integers(1, len(model.drives)))
+        shift[joint] = scale * float(random.uniform(0.01, 0.03))
+        hidden.append(truth('homing_error', [model.drives[joint]], {
+            model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    position = motion.position + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
+    position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden))
 

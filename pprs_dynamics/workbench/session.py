@@ -28,6 +28,7 @@ from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import Step, read_steps, without_last_step
@@ -45,6 +46,7 @@ from pprs_dynamics.workbench.shown import (
     finite,
     names_of,
     recordings_to_json,
+    units_to_json,
 )
 from pprs_dynamics.workbench.tick_board import TickBoard
 from pprs_dynamics.workbench.what_if import WhatIf
@@ -266,8 +268,8 @@ class Session(TickBoard):
             For a model of another mechanism.
         """
         model = self.model
-        if not isinstance(model, DriveModel):
-            raise SessionError(f'motions are designed for the 3-PPRS, not for {model.title}')
+        if not isinstance(model, (DriveModel, ArmModel)):
+            raise SessionError(f'no motions are designed for {model.title}')
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
             found: DesignedMotion = run_apart(designed, model, self.what_if.recordings, duration,
@@ -348,11 +350,11 @@ class Session(TickBoard):
                 'revision': self.revision, 'version': self.version, 'stage': shown.stage,
                 'is_settled': shown.is_settled,
                 'is_approximate': shown.is_approximate, 'departure': finite(shown.departure),
-                'notice': shown.notice, 'drives': list(self.drives),
+                'notice': shown.notice, 'drives': list(self.drives), **units_to_json(self.model),
                 'noise_is_guess': self.noise_floors is None,
                 'errors': {name: one.to_json() for name, one in self.errors().items()},
                 'overall': self.overall().to_json(),
-                'effects': [effect_to_json(shown, effect, self.drives, effect.name in called_for)
+                'effects': [effect_to_json(shown, effect, self.model, effect.name in called_for)
                             for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'steps': [step.to_json() for step in self.steps],
