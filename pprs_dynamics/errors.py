@@ -168,10 +168,11 @@ class ConvergenceError(PprsError, ArithmeticError):
 class LimitError(PprsError, ValueError):
     """A drive force over its limit."""
 
-    def __init__(self, sample: int, drive: str, force: float, limit: float) -> None:
+    def __init__(self, sample: int, drive: str, force: float, limit: float, unit: str = 'N',
+                 source: str = 'limits.effort') -> None:
         self.sample, self.drive, self.force, self.limit = sample, drive, force, limit
-        super().__init__(
-            f'sample {sample}: {drive} needs {force:.6g} N, limits.effort allows {limit:.6g} N')
+        super().__init__(f'sample {sample}: {drive} needs {force:.6g} {unit}, {source} allows '
+                         f'{limit:.6g} {unit}')
 
 
 class EffectError(PprsError, RuntimeError):

@@ -41,7 +41,9 @@ EQUAL = 1e-12
 class FeedforwardBench:
     """The node, its topics and a publisher."""
 
-    def __init__(self, bench: Bench, **options: Any) -> None:
+    def __init__(
+        self, bench: Bench, message: type = MultiDOFJointTrajectory, **options: Any,
+    ) -> None:
         self.bench = bench
         self.node = bench.add(FeedforwardNode, **options)
         self.commands = bench.listen(Float64MultiArray, '/feedforward/commands')
@@ -49,7 +51,7 @@ class FeedforwardBench:
         self.joint_trajectory = bench.listen(JointTrajectory, '/feedforward/joint_trajectory')
         bench.follow_status('/feedforward/status')
         self.publisher = bench.probe.create_publisher(
-            MultiDOFJointTrajectory, '/feedforward/trajectory', 100)
+            message, '/feedforward/trajectory', 100)
 
     def connect(self) -> FeedforwardBench:
         """Wait until node and probe see each other on every topic."""
@@ -69,13 +71,13 @@ class FeedforwardBench:
         """Of the node, now."""
         return dict(self.node._counters)
 
-    def send(self, message: MultiDOFJointTrajectory | bytes) -> None:
+    def send(self, message: MultiDOFJointTrajectory | JointTrajectory | bytes) -> None:
         """Publish and wait until the node has dealt with the message."""
         before = self.counters['received']
         self.publisher.publish(message)
         assert self.bench.spin_until(lambda: self.counters['received'] > before)
 
-    def answer(self, message: MultiDOFJointTrajectory | bytes) -> list[float]:
+    def answer(self, message: MultiDOFJointTrajectory | JointTrajectory | bytes) -> list[float]:
         """Publish a valid message and return the forces that come out."""
         before = len(self.commands)
         self.send(message)
@@ -91,16 +93,18 @@ class FeedforwardBench:
 
 
 @contextmanager
-def feedforward_bench(**parameters: Any) -> Iterator[FeedforwardBench]:
+def feedforward_bench(
+    message: type = MultiDOFJointTrajectory, **parameters: Any,
+) -> Iterator[FeedforwardBench]:
     """Give a running node with parameters of its own; it never goes stale unless told to.
 
-    Keywords are parameters with `__` for the dot.
+    Keywords are parameters with `__` for the dot, `message` what asks the node for forces.
     """
     values = {'command_timeout': 0.0, **parameters}
     overrides = [Parameter(name.replace('__', '.'), value=value)
                  for name, value in values.items()]
     with bench() as running:
-        yield FeedforwardBench(running, parameter_overrides=overrides).connect()
+        yield FeedforwardBench(running, message, parameter_overrides=overrides).connect()
 
 
 def random_motion(rng: np.random.Generator, points: int) -> PlatformMotion:

@@ -24,11 +24,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pprs_dynamics import ArmModel
+from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.commands.pprs import main
-from pprs_dynamics.experiments.arm_excitation import ArmLimits, _Search, excite_arm
+from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.experiments.arm_excitation import _Information, excite_arm
+from pprs_dynamics.experiments.arm_motions import ArmLimits, ArmMotions
+from pprs_dynamics.measurement.recording import read_recording, write_recording
+from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.model.model_writer import write_model
 
 DURATION = 12.0
+CORNER = 0.03  # share of a period in which the speed changes
+NOISE = 1.5  # [N m, N], white: so much that the corners do not tell
 
 
 @pytest.fixture(scope='module')
@@ -62,11 +69,12 @@ def test_it_is_a_motion_from_rest_to_rest(found) -> None:
 
 
 def test_it_tells_more_than_motions_drawn_at_random(model: ArmModel, found) -> None:
-    search = _Search(model, ArmLimits(), DURATION)
+    motions = ArmMotions(model, ArmLimits(), DURATION)
+    known = _Information(motions)
     random = np.random.default_rng(99)
-    drawn = [search.within_limits(random.normal(size=found.series.coefficients.shape))
+    drawn = [motions.within_limits(random.normal(size=found.series.coefficients.shape))
              for _ in range(20)]
-    told = [np.sum(np.log1p(search.information(one))) for one in (found, *drawn)]
+    told = [np.sum(np.log1p(known.of(one))) for one in (found.series, *drawn)]
     assert told[0] > max(told[1:])
 
 
@@ -82,10 +90,67 @@ def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:
     assert 0 < json.loads(answer.read_text())['determined'] <= 42
 
 
-def test_what_is_not_designed_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str],
-                                         ) -> None:
+@pytest.fixture(scope='module')
+def one_speed(model: ArmModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a recording in which swing hardly changes its speed: what lacks there is open."""
+    folder = tmp_path_factory.mktemp('one_speed')
+    period, rate = 8.0, 100.0
+    time = np.arange(0, 40, 1 / rate)
+    phase = (time / period) % 1
+    # There and back at constant speed, with rounded corners: viscous friction looks like dry.
+    corner = CORNER
+    speed = np.tanh((np.minimum(phase, 1 - phase)) / (corner / 3)) * np.tanh(
+        (0.5 - phase) / (corner / 3))
+    q = np.zeros((3, len(time), 3))
+    for joint, size in enumerate((0.3, 0.3, 0.05)):
+        v = size * speed
+        q[0, :, joint] = np.concatenate(([0.0], np.cumsum((v[1:] + v[:-1]) / 2 / rate)))
+        q[1, :, joint], q[2, :, joint] = v, np.gradient(v, 1 / rate)
+    viscous = list(model.values['friction.viscous'])
+    viscous[1] += 6.0
+    real = build_model({**model.values, 'friction.viscous': tuple(viscous)}, model.source)
+    assert isinstance(real, ArmModel)
+    path = folder / 'run.csv'
+    write_recording(path, arm.record(real, JointMotion(*q, time), NOISE))
+    return path
+
+
+def test_a_motion_is_designed_that_tells_rivals_apart(
+    model: ArmModel, one_speed: Path, tmp_path: Path,
+) -> None:
+    path, answer = tmp_path / 'arm.yaml', tmp_path / 'next.json'
+    write_model(path, model.values, model.source)
+    output, page = tmp_path / 'next.csv', tmp_path / 'next.html'
+    assert main(['next-experiment', str(one_speed), '--model', str(path), '--output', str(output),
+                 '--duration', '10', '--json', str(answer), '--report', str(page)]) == 0
+    told = json.loads(answer.read_text())
+    assert told['question'] == 'separate'
+    asked = {frozenset(pair) for pair in told['separates'] + told['does_not_separate']}
+    assert any('viscous_friction' in pair for pair in asked)
+    assert told['separates']
+    assert told['expected_evidence'] > 20
+    assert max(told['limits'].values()) <= 1.001
+    assert 'N m' in page.read_text()
+    # The promise is kept: the rival falls behind in a diagnosis of both runs.
+    table = pd.read_csv(output)
+    moved = JointMotion(*(table[[f'{joint}/{name}' for joint in arm.JOINTS]].to_numpy()
+                          for name in ('position', 'velocity', 'acceleration')),
+                        table['time'].to_numpy())
+    real = build_model({**model.values, 'friction.viscous': tuple(
+        np.add(model.values['friction.viscous'], (0, 6.0, 0)))}, model.source)
+    assert isinstance(real, ArmModel)
+    second = tmp_path / 'second.csv'
+    write_recording(second, arm.record(real, moved, NOISE, seed=1))
+    found = diagnose(model, [read_recording(one_speed, model.drives),
+                             read_recording(second, model.drives)])
+    assert [one.name for one in found.effects] == ['viscous_friction']
+    assert found.indistinguishable == ()
+
+
+def test_a_purpose_that_reads_recordings_asks_for_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
     path = str(arm.write_arm(tmp_path))
-    run = str(tmp_path / 'run.csv')
-    assert main(['next-experiment', run, '--model', path,
+    assert main(['next-experiment', '--model', path,
                  '--output', str(tmp_path / 'next.csv')]) == 2
-    assert 'only --purpose commission' in capsys.readouterr().err
+    assert 'no recording is given' in capsys.readouterr().err

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,7 @@ import pytest
 import yaml
 
 from pprs_dynamics import ArmModel, JointMotion, PprsError, load_model
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.base_tilt import BaseTilt
 from pprs_dynamics.effects.drive_effect import DriveRange
 from pprs_dynamics.effects.external_wrench import ExternalWrench
@@ -35,6 +37,10 @@ from pprs_dynamics.effects.payload_inertia import PayloadInertia
 from pprs_dynamics.effects.payload_mass import PayloadMass
 from pprs_dynamics.effects.payload_moment import PayloadMoment
 from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.measurement.conventions import find_mistakes
+from pprs_dynamics.measurement.readings import readings
+from pprs_dynamics.measurement.recording import Recording, read_for, write_recording
+from pprs_dynamics.mechanism.units import DriveUnits
 from pprs_dynamics.model.model_fingerprint import fingerprint
 from pprs_dynamics.model.model_writer import write_model
 
@@ -246,3 +252,53 @@ def test_ripple_is_looked_for_where_the_gear_has_it() -> None:
         assert min(abs(np.array(pitches) / pitch - 1)) < 1e-12
         without = [trial['pitch'] for trial in ForceRipple.trials(covered)]
         assert min(abs(np.array(without) / pitch - 1)) > 0.1
+
+
+def defects_of(tmp_path: Path, change: Callable[[Array, Array], None]) -> str:
+    """Return what is told of a recording of the arm that was changed."""
+    model = arm.real_arm(tmp_path)
+    run = arm.record(model, arm.motion(10.0))
+    position, effort = run.position.copy(), run.effort.copy()
+    change(position, effort)
+    path = tmp_path / 'run.csv'
+    write_recording(path, Recording.from_arrays('run', run.time, position, None, effort,
+                                                model.drives))
+    found = read_for(model, path)
+    return ' '.join(one.text for one in (*find_mistakes(model, found), *found.findings))
+
+
+def test_what_is_wrong_with_a_recording_is_told_in_the_units_of_the_joints(tmp_path: Path) -> None:
+    def stuck(position: Array, effort: Array) -> None:
+        position[:, 0], effort[:, 0], effort[:, 2] = 0.25, 3.0, 7.0
+        position[500:, 1] += 1.0
+
+    said = defects_of(tmp_path, stuck)
+    assert 'the position of turn is 0.25 rad throughout' in said
+    assert 'the effort of turn is 3 N m throughout' in said
+    assert 'the effort of reach is 7 N throughout' in said
+    jump = said.partition('the position of swing jumps')[2].partition('by up to ')[2]
+    assert jump.split()[1] == 'rad,'
+    assert ' m throughout' not in said.replace('N m throughout', '')
+
+
+def test_positions_in_degrees_are_told(tmp_path: Path) -> None:
+    def in_degrees(position: Array, effort: Array) -> None:
+        position[:, :2] *= 180 / np.pi
+
+    assert 'turn, swing look like degrees' in defects_of(tmp_path, in_degrees)
+
+
+def test_efforts_in_other_units_are_told_by_joint(tmp_path: Path) -> None:
+    def thousandth(position: Array, effort: Array) -> None:
+        effort[:, 1] *= 1e-3
+
+    said = defects_of(tmp_path, thousandth)
+    assert 'the effort of swing' in said
+    assert 'kN m' in said
+
+
+def test_six_joints_are_no_slides_and_lifts() -> None:
+    joints = tuple(f'joint_{k}' for k in range(1, 7))
+    found = list(readings(joints, (DriveUnits(True),) * 6))
+    assert not any(word in one.what for one in found for word in ('slide', 'lift', 'metres'))
+    assert {one.kind for one in found} == {'reversed_time', 'position_unit', 'position_sign'}

@@ -26,6 +26,7 @@ import pytest
 from pprs_dynamics import ArmModel
 from pprs_dynamics.commands.pprs import main
 from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
@@ -65,6 +66,24 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: ArmModel) -> None:
         loaded.drive_forces(motion).parts['payload_mass'], abs=1e-8)
 
 
+def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
+    motion = draw_motion(model, 10.0, 1)
+    engine = ArmEngine(model)
+    before = engine.torques(motion)
+    engine.add_to_link(model, 1, 0.7)
+    loaded = build_model({**model.values, 'effects.active': ['link_mass'],
+                          'effects.link_mass.link_2': 0.7}, model.source)
+    assert engine.torques(motion) - before == pytest.approx(
+        loaded.drive_forces(motion).parts['link_mass'], abs=1e-8)
+
+
+@pytest.mark.parametrize('name', ['link_3', 'link_4'])
+def test_a_link_that_is_the_payloads_or_not_there_is_refused(model: ArmModel, name: str) -> None:
+    with pytest.raises(ModelError, match=f'link_mass.{name} is 0.7, must be left out'):
+        build_model({**model.values, 'effects.active': ['link_mass'],
+                     f'effects.link_mass.{name}': 0.7}, model.source)
+
+
 def test_without_effects_the_model_leaves_noise(model: ArmModel) -> None:
     run = simulate_arm(model, (), 0, noise=0.3)
     error = run.effort - model.drive_forces(run.motion).total
@@ -75,13 +94,16 @@ def test_without_effects_the_model_leaves_noise(model: ArmModel) -> None:
 def test_every_hidden_effect_shows(model: ArmModel, name: str) -> None:
     plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=10.0)
                      for names in ((), (name,)))
-    assert np.abs(hidden.effort - plain.effort).max() > 0.05
+    shown = hidden.position - plain.position if name == 'homing_error' else (
+        hidden.effort - plain.effort)
+    assert np.abs(shown).max() > (0.005 if name == 'homing_error' else 0.05)
     assert hidden.effects[0]['name'] == name
-    assert (hidden.effects[0]['drives'] is None) == (name not in {*FORMS, 'effort_gain'})
+    assert (hidden.effects[0]['drives'] is None) == (
+        name not in {*FORMS, 'effort_gain', 'time_delay', 'homing_error'})
 
 
 @pytest.mark.parametrize(('name', 'seed'), [
-    ('payload_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3)])
+    ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3)])
 def test_what_is_hidden_is_named(model: ArmModel, name: str, seed: int) -> None:
     run = simulate_arm(model, (name,), seed)
     assert run.motion.time is not None
@@ -90,9 +112,9 @@ def test_what_is_hidden_is_named(model: ArmModel, name: str, seed: int) -> None:
     named = {found.effects[0].name} | {other for rivals in found.indistinguishable
                                        if rivals[0] == found.effects[0].name for other in rivals}
     assert name in named
-    if name == 'payload_mass':
-        assert found.effects[0].parameters['mass'].value == pytest.approx(
-            run.effects[0]['parameters']['mass'], rel=0.05)
+    if name in ('payload_mass', 'link_mass'):
+        for parameter, value in run.effects[0]['parameters'].items():
+            assert found.effects[0].parameters[parameter].value == pytest.approx(value, rel=0.05)
 
 
 def test_the_command_writes_recording_and_truth(tmp_path: Path,

@@ -138,10 +138,10 @@ def test_splines_are_loaded_before_messages_and_only_where_they_are_asked_for(mi
         'from pprs_dynamics import DriveModel\n'
         'from pprs_dynamics.model.preparation import prepare\n'
         'from pprs_dynamics.nodes.answer import Feedforward\n'
-        'from pprs_dynamics.nodes.feedforward_settings import PARAMETERS\n'
+        'from pprs_dynamics.nodes.feedforward_settings import parameters_for\n'
         'model = DriveModel.load()\n'
         'prepare(model)\n'
-        'own = {each.name: each.default for each in PARAMETERS}\n'
+        'own = {each.name: each.default for each in parameters_for(6)}\n'
         f'Feedforward(model, own | {{"missing_derivatives": {missing!r}}})\n'
         'print("scipy.interpolate" in sys.modules)\n')
     found = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)

@@ -30,7 +30,8 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.nodes import answer_cdr, conversions
+from pprs_dynamics.nodes import conversions
+from pprs_dynamics.nodes.answer_cdr import AnswerBytes
 from pprs_dynamics.nodes.rejection import Rejection
 from pprs_dynamics.nodes.trajectory_cdr import read_points
 from pprs_dynamics.nodes.trajectory_request import read_serialised, read_trajectory
@@ -140,13 +141,13 @@ def test_answers_are_the_messages_that_rclpy_would_send(points: int) -> None:
     forces = DriveModel.load().drive_forces(random_motion(np.random.default_rng(3), points))
     mechanism, effort = forces.mechanism, forces.total
     for stamp in (0, -1_500_000_000, 7_000_000_001, 2**31 * 10**9 + 5):
-        command = deserialize_message(answer_cdr.commands(effort[0]), Float64MultiArray)
+        command = deserialize_message(AnswerBytes(DRIVES).commands(effort[0]), Float64MultiArray)
         assert command == Float64MultiArray(data=effort[0].tolist())
         for values in ((effort[0],), (effort[0], mechanism.position[0], mechanism.velocity[0])):
-            state = deserialize_message(answer_cdr.joint_state(stamp, *values), JointState)
+            state = deserialize_message(AnswerBytes(DRIVES).joint_state(stamp, *values), JointState)
             assert state == conversions.joint_state(stamp, *values)
         offsets = np.arange(points) * 1_234_567_891
-        data = answer_cdr.joint_trajectory(stamp, offsets, forces, effort)
+        data = AnswerBytes(DRIVES).joint_trajectory(stamp, offsets, forces, effort)
         trajectory = deserialize_message(data, JointTrajectory)
         assert len(data) == len(serialize_message(trajectory))
         assert tuple(trajectory.joint_names) == DRIVES

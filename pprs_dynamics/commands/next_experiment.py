@@ -27,13 +27,13 @@ from pprs_dynamics.adoption.ledger_entry import check_output
 from pprs_dynamics.commands.arguments import PAGE, POSES, number, output_file, seed
 from pprs_dynamics.commands.output import write_json
 from pprs_dynamics.commands.recordings import add_recordings, read_recordings, refuse_inputs
-from pprs_dynamics.experiments.arm_excitation import ArmLimits, excite_arm
+from pprs_dynamics.experiments.arm_excitation import excite_arm
+from pprs_dynamics.experiments.arm_motions import ArmLimits
 from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.next_experiment import (
     LONGEST,
     PURPOSES,
     SHORTEST,
-    PurposeError,
     check_purpose,
     next_experiment,
 )
@@ -52,6 +52,7 @@ from pprs_dynamics.report.terminal import console, shown
 RATE = 100.0  # [Hz], the default of play_trajectory
 FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
 LIMITS = MotionLimits()
+PLAYED = 'positions, velocities and accelerations of its joints'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,12 +95,20 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     check_purpose(options.purpose, options.recordings)
     base = check_output(options.output, options.model)
+    model: DriveModel | ArmModel
+    limits: MotionLimits | ArmLimits
     if is_arm(read_parameters(base)):
-        return _excite_arm(options, screen)
-    limits = MotionLimits(options.velocity or LIMITS.velocity, options.acceleration, options.tilt,
-                          options.condition, options.margin)
-    model = DriveModel.load(base)
+        model = ArmModel.load(base)
+        limits = ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
+                           options.margin)
+    else:
+        model = DriveModel.load(base)
+        limits = MotionLimits(options.velocity or LIMITS.velocity, options.acceleration,
+                              options.tilt, options.condition, options.margin)
     refuse_inputs(options.output, options.recordings)
+    if isinstance(limits, ArmLimits) and options.purpose == 'commission':
+        assert isinstance(model, ArmModel)
+        return _excite_arm(options, model, limits, screen)
     recordings = read_recordings(options, screen, model)
     with progress_bar(screen, 'designing') as progress:
         experiment = next_experiment(
@@ -107,31 +116,33 @@ def run(options: argparse.Namespace) -> int:
             options.noise, lambda share: progress(share, 1.0))
     count = int(options.duration * options.rate + 1e-9) + 1
     motion = experiment.motion(np.arange(count) / options.rate)
-    write_poses(options.output, motion)
     screen.print(experiment_view(experiment))
+    if isinstance(model, ArmModel):
+        write_joint_motion(options.output, model.drives, motion)
+        command = ''
+    else:
+        write_poses(options.output, motion)
+        command = shlex.join([
+            'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
+            '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     if options.json:
         write_json(options.json, {**experiment.to_json(), 'purpose': options.purpose,
                                   'seed': options.seed, 'rate': options.rate,
                                   'output': options.output})
-    command = shlex.join([
-        'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
-        '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     if options.report:
         page = experiment_page(experiment, motion, command)
         screen.print(f'page: {shown(page.write(options.report))}')
-    screen.print(f'[bold]play it[/]: {escape(command)}')
+    if command:
+        screen.print(f'[bold]play it[/]: {escape(command)}')
+    else:
+        screen.print(f'[bold]play it[/] with a controller of joint trajectories: {escape(PLAYED)} '
+                     f'stand in {escape(options.output)}')
     return 0
 
 
-def _excite_arm(options: argparse.Namespace, screen: Any) -> int:
+def _excite_arm(options: argparse.Namespace, model: ArmModel, limits: ArmLimits,
+                screen: Any) -> int:
     """Design the first motion of an arm."""
-    model = ArmModel.load(options.model)
-    if options.purpose != 'commission':
-        raise PurposeError(f'purpose {options.purpose}: for an arm only --purpose commission is '
-                           'designed, a motion that excites inertia and friction of all joints')
-    refuse_inputs(options.output, options.recordings)
-    limits = ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
-                       options.margin)
     with progress_bar(screen, 'designing') as progress:
         found = excite_arm(model, limits, options.duration, options.seed,
                            lambda share: progress(share, 1.0))
@@ -139,7 +150,6 @@ def _excite_arm(options: argparse.Namespace, screen: Any) -> int:
     write_joint_motion(options.output, model.drives,
                        found.motion(np.arange(count) / options.rate))
     screen.print(escape(found.text))
-    assert found.limits is not None
     screen.print('limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share:.0%}' for name, share in found.limits.items()))
     if options.json:

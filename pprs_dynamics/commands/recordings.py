@@ -25,7 +25,7 @@ from typing import Any
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.conventions import find_mistakes
 from pprs_dynamics.measurement.readings import POSITION_UNIT
-from pprs_dynamics.measurement.recording import Recording, read_recording
+from pprs_dynamics.measurement.recording import Recording, read_for
 from pprs_dynamics.measurement.repeats import find_repeat
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
@@ -56,7 +56,7 @@ def read_recordings(options: argparse.Namespace, screen: Any, model: ForceModel,
     Raises
     ------
     UnreadableFileError
-        Where one holds the samples of another; or as `read_recording`.
+        Where one holds the samples of another; or as `read_for`.
     """
     recordings = read_each(options.recordings, options, screen, model)
     _refuse_repeats(options.recordings, recordings, (), 'every recording may be given once')
@@ -71,7 +71,7 @@ def read_validation(options: argparse.Namespace, screen: Any, model: ForceModel,
     Raises
     ------
     UnreadableFileError
-        Where one holds the samples of another, or of one that is fitted; or as `read_recording`.
+        Where one holds the samples of another, or of one that is fitted; or as `read_for`.
     """
     recordings = read_each(options.validate, options, screen, model)
     _refuse_repeats(options.validate, recordings, fitted,
@@ -86,8 +86,7 @@ def read_each(paths: Sequence[str], options: argparse.Namespace, screen: Any, mo
     recordings = []
     for path in paths:
         with progress_bar(screen, f'reading {displayed(path)}') as progress:
-            recording = read_recording(path, model.drives, options.topic, progress, model.gain,
-                                       model.efforts_in_amperes)
+            recording = read_for(model, path, options.topic, progress)
             mistakes = find_mistakes(model, recording)
             recordings.append(replace(recording, findings=(*mistakes, *recording.findings)))
     return recordings

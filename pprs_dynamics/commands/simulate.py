@@ -39,6 +39,7 @@ from pprs_dynamics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.report.progress import progress_bar
 from pprs_dynamics.report.robot_view import write_robot_page
 from pprs_dynamics.report.terminal import console, shown
+from pprs_dynamics.simulation.arm_forms import NAMES as ARM_EFFECTS
 from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
 from pprs_dynamics.simulation.arm_run import simulate_arm
 from pprs_dynamics.simulation.drive_control import ControlSettings
@@ -58,9 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*HIDDEN_EFFECTS, RANDOM),
+                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
-                        f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}')
+                        f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm '
+                        f'{", ".join(ARM_EFFECTS)}')
     parser.add_argument('--scale', type=number(0.0, 1e6), default=1.0,
                         help='multiplies the strength of the effects (default 1)')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')

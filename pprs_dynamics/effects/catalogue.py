@@ -41,6 +41,7 @@ from pprs_dynamics.effects.friction_drift import FrictionDrift
 from pprs_dynamics.effects.guard import guard
 from pprs_dynamics.effects.homing_error import HomingError
 from pprs_dynamics.effects.hysteresis import Hysteresis
+from pprs_dynamics.effects.link_mass import LinkMass
 from pprs_dynamics.effects.load_friction import LoadFriction
 from pprs_dynamics.effects.payload_inertia import PayloadInertia
 from pprs_dynamics.effects.payload_mass import PayloadMass
@@ -79,6 +80,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         FrictionDrift,
         HomingError,
         Hysteresis,
+        LinkMass,
         LoadFriction,
         PayloadInertia,
         PayloadMass,

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,8 @@ from pprs_dynamics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.effects.structure_effect import StructureEffect
 from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel, Forces
 from pprs_dynamics.regression.base_columns import (
     BaseColumn,
     KnownNumber,
@@ -40,9 +41,16 @@ from pprs_dynamics.regression.base_columns import (
     ReversalShape,
     present_values,
 )
+from pprs_dynamics.regression.collecting import sensitivities_of
 from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.platform_sensitivities import ChunkSensitivities
-from pprs_dynamics.regression.sensitivities import DRIVE_WIDTHS
+from pprs_dynamics.regression.sensitivities import (
+    DRIVE_WIDTHS,
+    HOMING,
+    NUMBERS,
+    OF_DRIVES,
+    PRESENT,
+)
 from pprs_dynamics.regression.terms import FullRate, Rows, Term
 from pprs_dynamics.residuals.residuals import Residuals
 
@@ -118,21 +126,31 @@ class FittedTerm:
         return rows
 
 
+class _WholeColumns(NamedTuple):
+    """Columns of motions one after the other, (K, N, D) each; see `Sensitivities.columns`."""
+
+    numbers: Array
+    drive_widths: Array
+    joint_widths: Array
+    structure: Mapping[type[StructureEffect], Array]
+    homing: Array
+
+
 @dataclass(frozen=True)
 class ColumnPlan:
     """Which columns are wanted, and how they are computed.
 
     Parameters
     ----------
-    given, model : DriveModel
+    given, model : ForceModel
         As the user has it; and around which forces are linear.
     base : tuple of BaseColumn
         As the design has them; their rows are those of the recordings, if any.
     terms : tuple of FittedTerm
     """
 
-    given: DriveModel
-    model: DriveModel
+    given: ForceModel
+    model: ForceModel
     base: tuple[BaseColumn, ...]
     terms: tuple[FittedTerm, ...]
 
@@ -143,10 +161,8 @@ class ColumnPlan:
         A drive that stood has no columns of its reversals in the design, but may turn over in a
         motion.
         """
-        assert isinstance(design.given, DriveModel)
-        assert isinstance(design.model, DriveModel)
         moved = {one.drive for one in design.base if isinstance(one, ReversalShape)}
-        stood = [drive for drive in range(len(DRIVES)) if drive not in moved]
+        stood = [drive for drive in range(len(design.drives)) if drive not in moved]
         return cls(design.given, design.model, (*design.base, *reversal_shapes(stood)),
                    tuple(terms))
 
@@ -175,58 +191,74 @@ class ColumnPlan:
         """Return all columns on the recordings of the design that the plan is of."""
         return self._by_drive([one.rows for one in self.base], design)
 
-    def on_motions(self, forces: DriveForces, time: Array, block: int = 1) -> list[Columns]:
+    def on_motions(self, forces: Forces, time: Array, block: int = 1) -> list[Columns]:
         """Return the columns of motions one after the other, each at the same times.
 
         Parameters
         ----------
-        forces : DriveForces
+        forces : Forces
             Of the model, before its sensors; M motions of N samples.
         time : (N,) array
         block : int
             Samples that are averaged.
         """
         samples = len(time)
-        found = ChunkSensitivities(self.model, forces)
-        numbers = tuple(one.number for one in self.base if isinstance(one, KnownNumber))
-        shared = dict(zip(self.numbers, found.of_numbers(numbers), strict=True))
-        of_drives, of_joints = found.of_drive_widths(), found.of_passive_widths()
+        found = self._whole_columns(forces, samples)
+        shared = dict(zip(self.numbers, found.numbers, strict=True))
         for k, one in enumerate(self.base):
             if isinstance(one, ReversalShape):
-                shared[k] = (of_joints if one.drive is None else of_drives)[one.number]
-        wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
-            one, (FittedTerm, PresentCoefficient, PresentShape))}
-        structure = {effect: np.stack([full for full, _ in found.of_structure(effect)])
-                     for effect in wanted if issubclass(effect, StructureEffect)}
-        homing = self._homing(found, samples) if any(
-            issubclass(effect, MeasurementEffect) and effect.shifts_positions()
-            for effect in wanted) else ()
+                shared[k] = (found.joint_widths if one.drive is None
+                             else found.drive_widths)[one.number]
         treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
         result = []
         for start in range(0, len(forces.total), samples):
             part = slice(start, start + samples)
 
-            def by_drive(column: Array, part: slice = part) -> dict[int, Array]:
-                return dict(enumerate(treat(column[part]).T))
+            def by_drive(column: Array) -> dict[int, Array]:
+                return dict(enumerate(treat(column).T))
 
             design = replace(
                 self._motion_design(forces, part, time, treat, block), structure=tuple(
                     Term(effect, None, {}, {d: treat(rows[:, part, d].T).T
-                                            for d in range(len(DRIVES))})
-                    for effect, rows in structure.items()),
-                homing=tuple(by_drive(column) for column in homing))
+                                            for d in range(len(self.model.drives))})
+                    for effect, rows in found.structure.items()),
+                homing=tuple(by_drive(column[part]) for column in found.homing))
             base = [self._present(one, design) if isinstance(
                         one, (PresentCoefficient, PresentShape))
-                    else _felt(one, by_drive(shared[k])) for k, one in enumerate(self.base)]
+                    else _felt(one, by_drive(shared[k][part])) for k, one in enumerate(self.base)]
             result.append(self._by_drive(base, design))
         return result
+
+    def _whole_columns(self, forces: Any, samples: int) -> _WholeColumns:
+        """Return the columns of all motions at full rate that do not need one motion alone."""
+        numbers = tuple(one.number for one in self.base if isinstance(one, KnownNumber))
+        wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
+            one, (FittedTerm, PresentCoefficient, PresentShape))}
+        structure = tuple(effect for effect in wanted if issubclass(effect, StructureEffect))
+        shifts = any(issubclass(effect, MeasurementEffect) and effect.shifts_positions()
+                     for effect in wanted)
+        none = np.zeros((0, *forces.total.shape))
+        if isinstance(self.model, DriveModel):
+            found = ChunkSensitivities(self.model, forces)
+            return _WholeColumns(
+                found.of_numbers(numbers), found.of_drive_widths(), found.of_passive_widths(),
+                {effect: np.stack([full for full, _ in found.of_structure(effect)])
+                 for effect in structure}, self._homing(found, samples) if shifts else none)
+        sensitivities = sensitivities_of(self.model, self.given)
+        known = {effect.name for effect in self.given.effects}
+        sensitivities.searched = tuple(one for one in structure if one.name not in known)
+        columns = sensitivities.columns(forces)
+        return _WholeColumns(
+            columns[NUMBERS], columns[OF_DRIVES], none,
+            {effect: columns[(PRESENT if effect.name in known else '') + effect.name]
+             for effect in structure}, columns.get(HOMING, none) if shifts else none)
 
     def _present(self, column: PresentCoefficient | PresentShape, design: Design) -> Rows:
         """Return the column of what the given model has already on one motion."""
         effect = next(e for e in self.model.effects if type(e) is column.effect)
         assert isinstance(effect, CatalogueEffect)
         values = present_values(effect, column.drive)
-        drive = None if column.drive is None else DRIVES.index(column.drive)
+        drive = None if column.drive is None else self.model.drives.index(column.drive)
         term = design.find_term(column.effect, drive,
                                 {p.name: values[p.name] for p in column.effect.shape})
         if isinstance(column, PresentCoefficient):
@@ -244,22 +276,22 @@ class ColumnPlan:
         return np.stack([np.stack([np.interp(every, kept, column) for column in rows.T], axis=1)
                          for rows in found.of_homing(kept)])
 
-    def _motion_design(self, forces: DriveForces, part: slice, time: Array, treat: Treatment,
+    def _motion_design(self, forces: Forces, part: slice, time: Array, treat: Treatment,
                        block: int) -> Design:
         s, total = forces.mechanism, forces.total[part]
         full = FullRate(time, s.position[part], s.velocity[part], s.acceleration[part],
                         s.direction[part], s.guide_load[part], total, total,
                         (slice(0, len(time)),), treat, float(time[0]))
         means = treat(total)
-        residuals = Residuals(DRIVES, treat(time), np.zeros(len(means), dtype=int), means, means,
-                              period=float(time[1] - time[0]) * block)
+        residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),
+                              means, means, period=float(time[1] - time[0]) * block)
         return Design(self.given, self.model, residuals, (full,), (), (), (), (), (), means)
 
     def _by_drive(self, base: Sequence[Rows], design: Design) -> Columns:
         """Return base columns and those of the terms, drive by drive."""
         terms = [(place, term.rows(design)) for term, place in self.places().items()]
         found = {}
-        for d in range(len(DRIVES)):
+        for d in range(len(self.model.drives)):
             index = [k for k, rows in enumerate(base) if d in rows]
             parts = [base[k][d][None] for k in index]
             for place, rows in terms:
@@ -275,7 +307,6 @@ def _felt(column: BaseColumn, rows: Rows) -> Rows:
     if isinstance(column, ReversalShape) and column.drive is not None:
         return {column.drive: rows[column.drive]}
     return rows
-
 
 
 def reversal_shapes(drives: Sequence[int]) -> list[ReversalShape]:

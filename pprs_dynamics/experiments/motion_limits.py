@@ -98,7 +98,7 @@ class MotionLimits:
 
 
 def limit_names(model: DriveModel) -> tuple[str, ...]:
-    """Return the names of the limits, in order."""
+    """Return the names of the limits of a 3-PPRS, in order."""
     names = [f'{what} of {drive}' for what in ('stroke', 'velocity', 'acceleration', 'effort')
              for drive in DRIVES]
     names += [f'rod angle of chain {chain}' for chain in (1, 2, 3)]

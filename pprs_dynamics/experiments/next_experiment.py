@@ -26,16 +26,19 @@ from scipy.stats import norm
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.experiments.arm_motions import ArmLimits
+from pprs_dynamics.experiments.arm_search import ArmSearch
 from pprs_dynamics.experiments.columns import FittedTerm
 from pprs_dynamics.experiments.commissioning import commissioning
 from pprs_dynamics.experiments.criteria import Contest, Precision
-from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
+from pprs_dynamics.experiments.motion_limits import MotionLimits
 from pprs_dynamics.experiments.question import Question, precision_of, question_of
-from pprs_dynamics.experiments.trajectory_search import Found, TrajectorySearch, forces_of
+from pprs_dynamics.experiments.trajectory_search import Found, TrajectorySearch
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.mechanism.units import DriveUnits
+from pprs_dynamics.model.arm_model import ArmModel
+from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel, Forces
 from pprs_dynamics.regression.base_columns import KnownNumber
 from pprs_dynamics.selection.decisions import DECISIONS
 
@@ -121,8 +124,10 @@ class Experiment:
     duration : float
         [s]
     motion : callable
-        Times [s] -> PlatformMotion.
-    model : DriveModel
+        Times [s] -> PlatformMotion, or JointMotion of an arm.
+    forces : callable
+        Times [s] -> Forces.
+    model : DriveModel or ArmModel
     """
 
     kind: str
@@ -133,9 +138,9 @@ class Experiment:
     hidden: tuple[str, ...]
     limits: dict[str, float]
     duration: float
-    motion: Callable[[Array], PlatformMotion]
-    forces: Callable[[Array], DriveForces]
-    model: DriveModel
+    motion: Callable[[Array], Any]
+    forces: Callable[[Array], Forces]
+    model: ForceModel
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -197,19 +202,20 @@ def _listed(pairs: Sequence[tuple[str, str]]) -> str:
 
 
 def next_experiment(
-    model: DriveModel, recordings: Sequence[Recording] = (), purpose: str = 'separate',
-    limits: MotionLimits | None = None, duration: float = 20.0, seed: int = 0,
+    model: DriveModel | ArmModel, recordings: Sequence[Recording] = (), purpose: str = 'separate',
+    limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
 ) -> Experiment:
     """Return the motion that tells most about what is open.
 
     Parameters
     ----------
-    model : DriveModel
+    model : DriveModel or ArmModel
+        Of an arm for 'separate' only; `arm_excitation` designs its first motion.
     recordings : sequence of Recording
     purpose : {'separate', 'commission'}
         'separate': what recordings leave open. 'commission': a first motion of a new robot.
-    limits : MotionLimits, optional
+    limits : MotionLimits or ArmLimits, optional
     duration : float
         [s]
     seed : int
@@ -232,12 +238,15 @@ def next_experiment(
     report = progress or (lambda share: None)
     check_purpose(purpose, recordings)
     check_duration(duration)
-    question = (commissioning(model, recordings, noise) if purpose == 'commission' else
+    question = (commissioning(model, recordings, noise)
+                if purpose == 'commission' and isinstance(model, DriveModel) else
                 question_of(model, recordings, lambda share: report(0.2 * share)))
-    limits = limits or MotionLimits()
+    limits = limits or (ArmLimits() if isinstance(model, ArmModel) else MotionLimits())
     limits = replace(limits, effort_reserve=max(
         limits.effort_reserve, RESERVE * question.noise_floor))
-    search = TrajectorySearch(question, limits, duration, seed)
+    search: TrajectorySearch | ArmSearch = (
+        ArmSearch(question, limits, duration, seed) if isinstance(limits, ArmLimits) else
+        TrajectorySearch(question, limits, duration, seed))
     found = search.run(lambda share: report(0.2 + 0.8 * share))
     report(1.0)
     return experiment_of(question, found)
@@ -274,9 +283,9 @@ def experiment_of(question: Question, found: Found) -> Experiment:
         question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), contests,
         tuple(_accuracies(question, known, after)), expected,
         () if contests else tuple(name for name, one in evidences.items() if one <= 0),
-        dict(zip(limit_names(question.model), map(float, found.uses), strict=True)),
+        dict(found.uses),
         found.path.duration, found.path.motion,
-        lambda time: forces_of(question.model, [found.path], time), question.model)
+        lambda time: question.model.drive_forces(found.path.motion(time)), question.model)
 
 
 def _expected(contest: Contest, known: Array, after: Array) -> list[ExpectedEvidence]:
@@ -313,7 +322,8 @@ def _accuracies(question: Question, known: Array, after: Array) -> list[Accuracy
               [(one,) for one in question.subjects])
     for group in groups:
         found += _known_to([label for one in group for term in one.terms
-                            for label in _labels(term)], precision_of(plan, group), known, after)
+                            for label in _labels(term, question.model)],
+                           precision_of(plan, group), known, after)
     return found
 
 
@@ -325,9 +335,11 @@ def _known_to(labels: list[tuple[str, str, float]], precision: Precision, known:
             for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
 
 
-def _labels(term: FittedTerm) -> list[tuple[str, str, float]]:
+def _labels(term: FittedTerm, model: ForceModel) -> list[tuple[str, str, float]]:
     """Return name, unit and scale of each parameter of a term that is fitted."""
-    prefix = term.effect.name + ('' if term.drive is None else f'.{DRIVES[term.drive]}')
-    return [(f'{prefix}.{p.name}', p.unit,
+    prefix, unit = term.effect.name, DriveUnits()
+    if term.drive is not None:
+        prefix, unit = f'{prefix}.{model.drives[term.drive]}', model.units[term.drive]
+    return [(f'{prefix}.{p.name}', unit.of(p.unit),
              p.spread(1.0, term.shape[p.name]) if p.name in term.shape else p.scale)
             for p in term.parameters]

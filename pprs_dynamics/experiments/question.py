@@ -20,6 +20,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from math import log
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from pprs_dynamics.experiments.criteria import (
 )
 from pprs_dynamics.experiments.information import Information
 from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.model.drive_model import DriveModel
+from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.regression.design import Design
 from pprs_dynamics.residuals.noise import NoiseSpectrum
 from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate, Prices
@@ -81,7 +82,7 @@ class Question:
     noise_floor: float
 
     @property
-    def model(self) -> DriveModel:
+    def model(self) -> Any:
         """Around which all is linear."""
         return self.plan.model
 
@@ -95,7 +96,7 @@ class Question:
         return replace(self, contests=tuple(contests), criterion=Separation(tuple(contests)))
 
 
-def question_of(model: DriveModel, recordings: Sequence[Recording],
+def question_of(model: ForceModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
     selection = select(model, recordings, DECISIONS, progress)

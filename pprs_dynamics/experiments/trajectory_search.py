@@ -21,7 +21,7 @@ comes out is checked at the rate at which it is played.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +39,7 @@ from pprs_dynamics.experiments.fourier_path import (
 from pprs_dynamics.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.experiments.question import Question
 from pprs_dynamics.measurement.treatment import block_length
+from pprs_dynamics.mechanism.joint_series import JointSeries
 from pprs_dynamics.mechanism.paths import HOME
 from pprs_dynamics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.parallel import each
@@ -71,18 +72,18 @@ class Found:
 
     Parameters
     ----------
-    path : FourierPath
+    path : FourierPath or JointSeries
     gram : (P, P) array
         What it would tell.
-    uses : (L,) array
+    uses : mapping of str to float
         Of the limits, 1 is all.
     value : float
         Of the criterion.
     """
 
-    path: FourierPath
+    path: FourierPath | JointSeries
     gram: Array
-    uses: Array
+    uses: Mapping[str, float]
     value: float
 
 
@@ -206,12 +207,13 @@ class TrajectorySearch:
         """Return a motion at full rate, made smaller where it exceeds a limit there."""
         path = self._allowed(path)
         forces = self._forces([path], self._fine)
-        uses = self.limits.uses(self.question.model, forces, len(self._fine))[0]
+        uses = self.limits.uses(self.question.model, forces, len(self._fine))[0].tolist()
         question = self.question
         block = block_length(1 / FINE_RATE)
         columns = question.plan.on_motions(forces, self._fine, block)[0]
         gram = question.information.of_motion(columns, self.duration)
-        return Found(path, gram, uses, self._worth(gram))
+        return Found(path, gram, dict(zip(limit_names(question.model), uses, strict=True)),
+                     self._worth(gram))
 
     def _kinds(self, drawn: list[Drawn]) -> list[Drawn]:
         """Return the best, and the best of others whose spectrum is another."""

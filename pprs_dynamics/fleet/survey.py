@@ -42,7 +42,7 @@ from pprs_dynamics.fleet.named_effects import OWN, fit_named_effects
 from pprs_dynamics.fleet.store import key_of
 from pprs_dynamics.measurement.conventions import find_mistakes
 from pprs_dynamics.measurement.fingerprint import fingerprint
-from pprs_dynamics.measurement.recording import Recording, describe, read_recording
+from pprs_dynamics.measurement.recording import Recording, describe, read_for
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.plain_text import displayed
@@ -207,8 +207,7 @@ def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
 
 def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
     model = _model(job.model, tuple(job.values.items()))
-    recording = read_recording(path, model.drives, job.topic, None, model.gain,
-                               model.efforts_in_amperes)
+    recording = read_for(model, path, job.topic)
     summary = describe(recording)
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}

@@ -30,8 +30,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.defects import SLOW_STEP
 from pprs_dynamics.measurement.excerpt import Excerpt, excerpt_of, forces_in_pieces, forces_on
 from pprs_dynamics.measurement.readings import (
+    LENGTHS,
     POSITION_UNIT,
-    UNITS,
     Reading,
     as_named,
     named,
@@ -39,12 +39,13 @@ from pprs_dynamics.measurement.readings import (
 )
 from pprs_dynamics.measurement.recording import Recording
 from pprs_dynamics.measurement.samples import Finding
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 
 # What efforts may be, as multiples of what they are taken for.
 EFFORT_FACTORS = (1.0, -1.0, 1e-3, -1e-3, 1e3, -1e3)
-EFFORT_UNITS = {1e-3: 'kN', 1e3: 'mN'}
+EFFORT_PREFIXES = {1e-3: 'k', 1e3: 'm'}
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 SHORTEST_STEP = 1e-5  # [s]; no robot is sampled at more than 100 kHz
 # A reading is believed where it fits this many times better, for every mistake that it takes.
@@ -140,7 +141,8 @@ class _Search:
         reference = self._reference()
         bound, least = (1.0, GOOD_FIT_ALONE) if reference is None else (reference, GOOD_FIT)
         best: _Fit | None = None
-        for reading in (as_named(self.model.drives), *readings(self.model.drives)):
+        drives, units = self.model.drives, self.model.units
+        for reading in (as_named(drives), *readings(drives, units)):
             for unit, excerpt in self.excerpts.items():
                 if not self._possible(reading, excerpt):
                     continue
@@ -189,7 +191,7 @@ class _Search:
         factors = np.ones(effort.shape[1])
         factors[told] = np.asarray(EFFORT_FACTORS)[chosen]
         return _Fit(reading, unit, float(misfits[chosen, drives].mean()), factors,
-                    reading.cost + (unit != 1.0) + _cost(factors, told))
+                    reading.cost + (unit != 1.0) + _cost(factors, told, self.model.drives))
 
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
         """Return whether a reading brings positions into the strokes, and units where needed."""
@@ -207,11 +209,11 @@ class _Search:
         return bool(needed and not np.any(outside(position @ reading.position.T)))
 
 
-def _cost(factors: Array, told: np.ndarray) -> int:
+def _cost(factors: Array, told: np.ndarray, drives: tuple[str, ...]) -> int:
     """Return how many mistakes factors of the efforts take: one where kinds of drives share it."""
     if np.all(factors[told] == factors[told[0]]):
         return int(factors[told[0]] != 1.0)
-    kinds = [factors[:3], factors[3:]] if len(factors) == 6 else [factors]
+    kinds = [factors[:3], factors[3:]] if drives == DRIVES else [factors]
     return sum(int(kind[0] != 1.0) if np.all(kind == kind[0]) else int(np.sum(kind != 1.0))
                for kind in kinds)
 
@@ -271,7 +273,9 @@ def _of_efforts(model: ForceModel, fit: _Fit) -> Iterator[Finding]:
         group = tuple(np.flatnonzero(fit.factors == factor).tolist())
         if not group:
             continue
-        unit = EFFORT_UNITS.get(abs(factor))
+        prefix = EFFORT_PREFIXES.get(abs(factor))
+        unit = None if prefix is None else ' or '.join(dict.fromkeys(
+            prefix + model.units[k].effort for k in group))
         times = 'minus' if factor == -1.0 else f'{factor:g} times'
         guess = '' if unit is None else f', as if it were in {unit}'
         other = ' (or its position is negated)' if len(drives) == 1 and factor < 0 else ''
@@ -289,7 +293,7 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Finding]:
     far = tuple(np.flatnonzero(reach > FAR_OUT * np.maximum(-lower, upper)).tolist())
     if not far:
         return
-    unit = next((name for unit, name in UNITS.items()
+    unit = next((name for unit, name in LENGTHS.items()
                  if np.all(reach[list(far)] * unit <= np.maximum(-lower, upper)[list(far)])), '')
     drives = recording.drives
     yield Mistake(POSITION_UNIT, len(far),

@@ -138,7 +138,8 @@ class Judgement:
             size = max((size for _, size in jumps), key=abs, default=0.0)
             self._tell('position_jump', len(jumps),
                        f'the position of {name} jumps {counted(len(jumps), "time")}, by up to '
-                       f'{size:.4g} m,', [(first, first) for first, _ in jumps], [name])
+                       f'{size:.4g} {self.samples.unit_of(drive, "m")},',
+                       [(first, first) for first, _ in jumps], [name])
         self._split(np.array([first for first, _, _ in found.jumps], dtype=np.int64))
         drives = [self.samples.drives[drive] for drive in sorted(found.spike_drives)]
         count = int(found.spikes.sum())
@@ -227,18 +228,19 @@ class Judgement:
             moves = not signals.is_constant(samples.position[:, drive])
             if not moves:
                 self._tell('constant_position', 1,
-                           f'the position of {name} is {samples.position[0, drive]:.6g} m '
-                           'throughout', drives=[name])
+                           f'the position of {name} is {samples.position[0, drive]:.6g} '
+                           f'{samples.unit_of(drive, "m")} throughout', drives=[name])
             velocity = None if samples.velocity is None else samples.velocity[:, drive]
             if moves and velocity is not None and signals.is_constant(velocity):
                 self._tell('constant_velocity', 1,
                            f'the velocity of {name} is {velocity[np.isfinite(velocity)][0]:.6g} '
-                           'm/s throughout, while it moves', drives=[name])
+                           f'{samples.unit_of(drive, "m/s")} throughout, while it moves',
+                           drives=[name])
             effort = samples.effort[:, drive]
             if signals.is_constant(effort):
                 self._tell('constant_effort', 1,
-                           f'the effort of {name} is {effort[np.isfinite(effort)][0]:.6g} N '
-                           'throughout', drives=[name])
+                           f'the effort of {name} is {effort[np.isfinite(effort)][0]:.6g} '
+                           f'{samples.unit_of(drive, "N")} throughout', drives=[name])
                 continue
             runs = signals.stuck_efforts(samples, self._starts, drive)
             self._tell('constant_effort', len(runs),

@@ -106,6 +106,20 @@ class LocalPolynomial:
         """Weights of the samples for value, first and second derivative, (3, window)."""
         return _coefficients(self.window, self.step)
 
+    def fitted(self, offsets: Array, values: Array) -> tuple[Array, float]:
+        """Return value, first and second derivative in the middle, (3, D), and the squares left.
+
+        Parameters
+        ----------
+        offsets : (window,) array
+            Times of the samples less that of the middle [s], at equal steps or not.
+        values : (window, D) array
+        """
+        basis = np.polynomial.legendre.legvander(offsets / (self.half * self.step), ORDER)
+        found = np.linalg.solve(basis.T @ basis, basis.T @ values)
+        derivatives: Array = _middle(self.window, self.step) @ found
+        return derivatives, float(np.sum((values - basis @ found) ** 2))
+
     @property
     def cut_off(self) -> float:
         """Frequency [Hz] at which the amplitude has fallen to 1/sqrt(2)."""
@@ -297,11 +311,17 @@ def _coefficients(window: int, step: float) -> Array:
     legendre = np.polynomial.legendre
     # Legendre polynomials on [-1, 1] keep the fit well conditioned; powers of k do not.
     fit = np.linalg.pinv(legendre.legvander(np.arange(-half, half + 1) / half, ORDER))
-    middle = [[legendre.legval(0.0, legendre.legder(unit, d)) / (half * step) ** d
-               for unit in np.eye(ORDER + 1)] for d in range(3)]
-    weights: Array = np.asarray(middle) @ fit
+    weights: Array = _middle(window, step) @ fit
     weights.flags.writeable = False
     return weights
+
+
+@lru_cache(maxsize=256)
+def _middle(window: int, step: float) -> Array:
+    """Return value, first and second derivative of Legendre polynomials in the middle, (3, K)."""
+    legendre, half = np.polynomial.legendre, window // 2
+    return np.array([[legendre.legval(0.0, legendre.legder(unit, d)) / (half * step) ** d
+                      for unit in np.eye(ORDER + 1)] for d in range(3)])
 
 
 def _windows(longest: int) -> list[int]:

@@ -26,6 +26,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.stamps import LOST_STEPS
 
+# Stamps that are off by less, in steps, count as equal steps.
+UNEVEN = 0.02
+
 
 class LiveSample(NamedTuple):
     """The middle of the window; drives (D,).
@@ -53,8 +56,10 @@ class LiveSample(NamedTuple):
 class LiveReconstruction:
     """A window that follows the samples; its answers come `polynomial.half` samples late.
 
-    Answers equal those of `reconstruct` with the same window for samples at equal steps. The
-    platform's motion then follows by `solve_forward_motion`, seeded with the last pose.
+    Answers equal those of `reconstruct` with the same window for samples at equal steps. Where
+    stamps are uneven, the motion is the smoother one of that with samples at their stamps and
+    that with samples at equal steps, which came late. The platform's motion then follows by
+    `solve_forward_motion`, seeded with the last pose.
 
     Parameters
     ----------
@@ -65,6 +70,8 @@ class LiveReconstruction:
     def __init__(self, polynomial: LocalPolynomial) -> None:
         self.polynomial = polynomial
         self.gaps = 0
+        half = polynomial.half
+        self._even: Array = np.arange(-half, half + 1, dtype=float) * polynomial.step
         self._window: deque[tuple[float, Array, Array]] = deque(maxlen=polynomial.window)
         self._is_start = True
 
@@ -90,8 +97,17 @@ class LiveReconstruction:
         middle = self._window[self.polynomial.half]
         # About the middle, as large constants would cost digits.
         around = np.stack([sample[1] for sample in self._window]) - middle[1]
-        q_smooth, q_dot, q_ddot = self.polynomial.coefficients @ around
+        offsets = np.array([sample[0] for sample in self._window]) - middle[0]
+        if np.abs(offsets - self._even).max() > UNEVEN * self.polynomial.step:
+            q_smooth, q_dot, q_ddot = self._smoother(offsets, around)
+        else:
+            q_smooth, q_dot, q_ddot = self.polynomial.coefficients @ around
         sample = LiveSample(middle[0], middle[1] + q_smooth, q_dot, q_ddot, middle[2],
                             self._is_start)
         self._is_start = False
         return sample
+
+    def _smoother(self, offsets: Array, around: Array) -> Array:
+        """Return value and derivatives where stamps are uneven, (3, D)."""
+        ways = [self.polynomial.fitted(times, around) for times in (offsets, self._even)]
+        return min(ways, key=lambda way: way[1])[0]

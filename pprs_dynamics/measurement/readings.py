@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -24,9 +24,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.drive_motion import DriveMotion
+from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.mechanism.units import DriveUnits
 
 POSITION_UNIT = 'position_unit'  # kind of mistake
-UNITS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
+LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
+ANGLES = {float(np.pi / 180): 'degrees'}
 SLIDES, LIFTS = (0, 1, 2), (3, 4, 5)  # of the six drives, in drive order
 # Columns in the order chain by chain, and last to first, under names in drive order.
 OTHER_ORDERS = ((0, 2, 4, 1, 3, 5), (0, 3, 1, 4, 2, 5), (5, 4, 3, 2, 1, 0))
@@ -82,20 +85,22 @@ def as_named(drives: tuple[str, ...]) -> Reading:
     return Reading('', '', (), same, same, 0)
 
 
-def readings(drives: tuple[str, ...]) -> Iterator[Reading]:
+def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[Reading]:
     """Yield all other readings of D drives, the simplest of each kind first."""
     count = len(drives)
     same = np.eye(count)
     yield Reading('reversed_time', 'the recording looks as if it were played backwards: friction '
                   'drives the motion', tuple(range(count)), same, same, backwards=True)
-    for unit, name in UNITS.items():
-        for group in _groups(count):
-            yield Reading(POSITION_UNIT, f'the {_position(drives, group)} like {name}', group,
-                          np.diag(_scaled(count, group, unit)), same)
-    for group in _groups(count):
+    for names, turns in ((LENGTHS, False), (ANGLES, True)):
+        alike = tuple(k for k, one in enumerate(units) if one.turns == turns)
+        for unit, name in names.items():
+            for group in _groups(drives, alike):
+                yield Reading(POSITION_UNIT, f'the {_position(drives, group)} like {name}', group,
+                              np.diag(_scaled(count, group, unit)), same)
+    for group in _groups(drives, tuple(range(count))):
         yield Reading('position_sign', f'the {_position(drives, group)} negated',
                       group, np.diag(_scaled(count, group, -1.0)), same)
-    for order in _orders(count):
+    for order in _orders(drives):
         moved = tuple(k for k in range(count) if order[k] != k)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)
         turned = same[list(order)]
@@ -111,7 +116,7 @@ def named(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
     """Return how a sentence names some of the drives."""
     if len(group) == len(drives) > 1:
         return 'all drives'
-    if len(drives) == 6 and group in (SLIDES, LIFTS):
+    if drives == DRIVES and group in (SLIDES, LIFTS):
         return 'the slides' if group == SLIDES else 'the lifts'
     return ', '.join(drives[k] for k in group)
 
@@ -121,14 +126,16 @@ def _position(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
             else 'positions of ' + named(drives, group) + ' look')
 
 
-def _groups(count: int) -> list[tuple[int, ...]]:
-    every = tuple(range(count))
-    return [every, *((SLIDES, LIFTS) if count == 6 else ()),
-            *((k,) for k in every if count > 1)]
+def _groups(drives: tuple[str, ...], alike: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return all of some drives together, those of a kind, and each alone."""
+    if not alike:
+        return []
+    return list(dict.fromkeys((alike, *((SLIDES, LIFTS) if drives == DRIVES else ()),
+                               *((k,) for k in alike))))
 
 
-def _orders(count: int) -> list[tuple[int, ...]]:
-    if count != 6:
+def _orders(drives: tuple[str, ...]) -> list[tuple[int, ...]]:
+    if drives != DRIVES:
         return []
     within = [(*first, *second) for first in permutations(SLIDES)
               for second in permutations(LIFTS)]

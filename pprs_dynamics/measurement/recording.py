@@ -30,6 +30,8 @@ from pprs_dynamics.measurement.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.defects import Judgement
 from pprs_dynamics.measurement.samples import Finding, Progress, Samples, counted
 from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.mechanism.units import DriveUnits
+from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.plain_text import displayed
 
 
@@ -196,7 +198,7 @@ class Summary:
 def read_recording(
     path: str | PathLike[str], drives: tuple[str, ...] = DRIVES, topic: str | None = None,
     progress: Progress | None = None, gain: Sequence[float] | None = None,
-    in_amperes: bool = False,
+    in_amperes: bool = False, units: tuple[DriveUnits, ...] = (),
 ) -> Recording:
     """Read a rosbag2 directory, a bare .mcap or .db3 file, or a CSV: the content decides.
 
@@ -213,6 +215,8 @@ def read_recording(
         Effort per ampere, for what was recorded as a current.
     in_amperes : bool
         Whether efforts are currents, too; columns named `current` always are.
+    units : tuple of DriveUnits, optional
+        For what is found wrong; of drives that push by default.
 
     Raises
     ------
@@ -235,12 +239,19 @@ def read_recording(
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     samples, applied = _as_efforts(path, samples, gain, in_amperes)
-    recording = replace(_judged(displayed(path.name), samples), gain=applied)
+    recording = replace(_judged(displayed(path.name), replace(samples, units=units)), gain=applied)
     if not len(recording.time):
         raise UnreadableFileError(
             path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '
             'finite positions of all drives')
     return recording
+
+
+def read_for(model: ForceModel, path: str | PathLike[str], topic: str | None = None,
+             progress: Progress | None = None) -> Recording:
+    """Read a recording of a model's drives, efforts by its gains; see `read_recording`."""
+    return read_recording(path, model.drives, topic, progress, model.gain,
+                          model.efforts_in_amperes, model.units)
 
 
 def _as_efforts(path: Path, samples: Samples, gain: Sequence[float] | None, in_amperes: bool,

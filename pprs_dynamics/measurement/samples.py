@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.mechanism.units import DriveUnits
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -122,6 +123,8 @@ class Samples:
         What the reader of the file has to tell.
     in_amperes : tuple of D bool
         Drives whose `effort` is a current [A]; () for none.
+    units : tuple of D DriveUnits
+        () where all drives push.
     """
 
     drives: tuple[str, ...]
@@ -133,6 +136,11 @@ class Samples:
     source: str = ''
     findings: tuple[Finding, ...] = field(default=())
     in_amperes: tuple[bool, ...] = ()
+    units: tuple[DriveUnits, ...] = ()
+
+    def unit_of(self, drive: int, unit: str) -> str:
+        """Return the unit of a drive's quantity; see `DriveUnits.of`."""
+        return self.units[drive].of(unit) if self.units else unit
 
     def take(self, index: Indices | Mask) -> Samples:
         """Return the samples of an index or mask."""

@@ -82,7 +82,7 @@ class Arm:
         T = frame.placement.homogeneous
         at_joint = library.PseudoInertia.FromMatrix(T @ at_tool @ T.T).toDynamicParameters()
         inertial = self.inertial.copy()
-        inertial[tree.joints.index(tree.model.names[frame.parentJoint])] += at_joint
+        inertial[tree.carrier] += at_joint
         return replace(self, inertial=inertial)
 
     @cached_property

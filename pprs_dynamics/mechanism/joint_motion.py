@@ -19,7 +19,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.mechanism.motion_checks import checked_matrix, checked_times
+
+QUINTIC_FROM = 6  # positions; with fewer the splines are cubic
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,60 @@ class JointMotion:
                        acceleration=self.acceleration[samples],
                        time=None if self.time is None else self.time[samples])
 
-    def with_time(self, time: Array) -> Self:
+    def with_time(self, time: ArrayLike) -> Self:
         """Return the motion at given times."""
-        return replace(self, time=time)
+        return replace(self, time=checked_times(time, len(self)))
+
+    @classmethod
+    def checked(cls, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
+                time: ArrayLike, drives: int) -> Self:
+        """Return the motion of so many drives.
+
+        Raises
+        ------
+        MotionError
+            For a wrong shape, a non-finite number, or times that do not strictly increase.
+        """
+        q = checked_matrix('position', position, drives)
+        v, a = (checked_matrix(name, values, drives, len(q)) for name, values in (
+            ('velocity', velocity), ('acceleration', acceleration)))
+        return cls(q, v, a, checked_times(time, len(q)))
+
+    def held(self) -> Self:
+        """Return the last position, at rest, at time 0."""
+        rest = np.zeros_like(self.position[-1:])
+        return replace(self, position=self.position[-1:], velocity=rest, acceleration=rest,
+                       time=np.zeros(1))
+
+
+def position_spline_derivatives(time: Array, position: Array) -> tuple[Array, Array]:
+    """Return velocities and accelerations of splines through positions, at the positions.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Strictly increasing [s], at least four.
+    position : (N, D) array
+
+    Returns
+    -------
+    velocity, acceleration : (N, D) arrays
+        NaN throughout where positions or times are so far apart that no spline can be computed.
+
+    Raises
+    ------
+    MotionError
+        For positions or times that are none.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    places = checked_matrix('position', position, position.shape[1])
+    knots = checked_times(time, len(places))
+    try:
+        # Positions too far apart overflow; the result is then not finite.
+        with np.errstate(all='ignore'):
+            spline = make_interp_spline(knots, places, k=5 if len(knots) >= QUINTIC_FROM else 3)
+            return spline.derivative(1)(knots), spline.derivative(2)(knots)
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        unknown = np.full_like(places, np.nan)
+        return unknown, unknown

@@ -231,6 +231,10 @@ class PlatformMotion:
             orientation = np.broadcast_to((0.0, 0.0, 0.0, 1.0), (len(position), 4))
         return cls(position, orientation, zero, zero, zero, zero)
 
+    def held(self) -> PlatformMotion:
+        """Return the last pose, at rest, at time 0."""
+        return PlatformMotion.at_rest(self.position[-1:], self.orientation[-1:]).with_time([0.0])
+
     @classmethod
     def from_poses(
         cls, time: ArrayLike, position: ArrayLike, orientation: ArrayLike,

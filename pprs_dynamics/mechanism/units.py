@@ -53,4 +53,9 @@ class DriveUnits:
 
 def common_effort(units: Sequence[DriveUnits]) -> str:
     """Return the unit of errors over all drives: that of their efforts, or of both kinds."""
-    return ' or '.join(sorted({one.effort for one in units})) or 'N'
+    return common_unit(units, 'N')
+
+
+def common_unit(units: Sequence[DriveUnits], unit: str) -> str:
+    """Return a quantity's unit over all drives, or the units of both kinds; see `DriveUnits.of`."""
+    return ' or '.join(sorted({one.of(unit) for one in units})) or unit

@@ -71,6 +71,11 @@ class ArmTree:
     effort: Array
     digest: str
 
+    @property
+    def carrier(self) -> int:
+        """Number of the joint whose link carries the tool."""
+        return self.joints.index(self.model.names[self.model.frames[self.tool].parentJoint])
+
 
 def pinocchio() -> Any:
     """Return the library Pinocchio.

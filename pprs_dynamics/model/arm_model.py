@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any, ClassVar
@@ -41,6 +42,7 @@ from pprs_dynamics.mechanism.urdf import TURNING, ArmTree, read_arm
 from pprs_dynamics.model.effects_block import added_effects
 from pprs_dynamics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState, total_force
 from pprs_dynamics.model.keys import ARM_GAIN, ARM_JOINTS, ARM_URDF, Key, arm_keys, is_arm
+from pprs_dynamics.model.limits import JointLimits
 from pprs_dynamics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.model.parameter_values import checked_values, source_of_errors
 
@@ -122,6 +124,18 @@ class ArmModel(ForceModel):
         """Means of efforts that are compared in a period of the motion."""
         return BLOCKS_PER_PERIOD
 
+    @cached_property
+    def limits(self) -> JointLimits:
+        """Ranges and efforts of the URDF, the latter in the unit of recordings and commands."""
+        tree, units = self.arm.tree, self.units
+        # A URDF may leave them out, of a prismatic joint as well.
+        bounded = tree.lower < tree.upper
+        return JointLimits(
+            tree.joints, tuple(one.position for one in units),
+            tuple('A' if self.efforts_in_amperes else one.effort for one in units),
+            np.where(bounded, tree.lower, -np.inf), np.where(bounded, tree.upper, np.inf),
+            tree.effort * self.amperes)
+
     @property
     def kinds(self) -> tuple[str, ...]:
         """`revolute` or `prismatic`, of each joint."""
@@ -164,6 +178,7 @@ class ArmModel(ForceModel):
             loaded = arm
             for effect in effects:
                 if isinstance(effect, BodyEffect):
+                    _require_present(effect, arm)
                     loaded = effect.changed(loaded)
                     _require_bodies(effect, loaded)
             common = values['friction.reversal_velocity']
@@ -180,7 +195,9 @@ class ArmModel(ForceModel):
         state : ModelState, optional
             Carries effects with memory from call to call; see `DriveModel.drive_forces`.
         """
-        return self.forces_at(self.mechanism(motion), state)
+        # Very large numbers overflow; users of the result check that it is finite.
+        with np.errstate(over='ignore', invalid='ignore'):
+            return self.forces_at(self.mechanism(motion), state)
 
     def mechanism(self, motion: JointMotion) -> ArmState:
         """Return what effects take of a motion."""
@@ -229,6 +246,15 @@ def _inertial(tree: ArmTree, values: Mapping[str, Any]) -> Array:
         if not mass > 0:
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     return inertial
+
+
+def _require_present(effect: BodyEffect, arm: Arm) -> None:
+    """Raise ModelError where an effect changes a body that the arm does not have."""
+    for name in sorted(effect.absent(arm)):
+        if effect.values[name]:
+            raise ModelError(
+                f'effects.{effect.name}.{name}', effect.values[name], 'be left out: this arm has '
+                'no such link, or it is the one that carries the tool, of which payload_mass tells')
 
 
 def _require_bodies(effect: CatalogueEffect, arm: Arm) -> None:

@@ -34,7 +34,7 @@ from pprs_dynamics.effects.passive_friction import (
     WholeMechanismFriction,
 )
 from pprs_dynamics.effects.structure_effect import BodyEffect
-from pprs_dynamics.errors import EffectError, ModelError
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.mechanism.jacobians import condition_number
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.reversal import Reversal
@@ -227,23 +227,6 @@ class DriveModel(ForceModel):
         if not added:
             return DriveForces.of_one_pass(one_pass, motion, table)
         return self._with_effects(added, _parts(table), one_pass.mechanism(motion, table), state)
-
-    def sound_at(self, motion: PlatformMotion) -> DriveModel:
-        """Return the model without those effects of other packages that fail for a motion.
-
-        Raises
-        ------
-        WorkspaceError, SingularityError
-            See `drive_forces`.
-        """
-        model = self
-        while True:
-            try:
-                model.drive_forces(motion)
-            except EffectError as error:
-                model = model.without(error.effect)
-            else:
-                return model
 
     @cached_property
     def _one_pass(self) -> OnePass | None:

@@ -66,6 +66,12 @@ class Forces:
     parts: dict[str, Array]
     mechanism: DriveStates
 
+    @property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the drives, (N, D) each."""
+        state = self.mechanism
+        return state.position, state.velocity, state.acceleration
+
 
 F = TypeVar('F', bound=Forces)
 
@@ -171,6 +177,13 @@ class ForceModel(ABC):
         return False
 
     @property
+    def amperes(self) -> Array:
+        """What efforts are multiplied by to give those of recordings and commands, (D,)."""
+        if self.gain is not None and self.efforts_in_amperes:
+            return 1 / np.asarray(self.gain)
+        return np.ones(len(self.drives))
+
+    @property
     def rest_speed(self) -> float:
         """Speed below which a drive that stays there stands, and its effort tells nothing.
 
@@ -224,6 +237,23 @@ class ForceModel(ABC):
                     effect.to_file() == other.to_file()):
                 continued.memories[effect.name] = state.memories[effect.name]
         return continued
+
+    def sound_at(self, motion: Any) -> Self:
+        """Return the model without those effects of other packages that fail for a motion.
+
+        Raises
+        ------
+        PprsError
+            See `drive_forces`.
+        """
+        model = self
+        while True:
+            try:
+                model.drive_forces(motion)
+            except EffectError as error:
+                model = model.without(error.effect)
+            else:
+                return model
 
     def without(self, effect: str) -> Self:
         """Return the model without the effect of that name."""

@@ -16,10 +16,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -32,8 +33,128 @@ from pprs_dynamics.mechanism.robot import DRIVES
 COUNT = len(DRIVES)
 
 
+class DriveLimits(ABC):
+    """What D drives can reach and give.
+
+    Class attributes
+    ----------------
+    effort_source : str
+        Where their efforts are limited, for a sentence.
+
+    Attributes
+    ----------
+    drives : tuple of D str
+    position_units, effort_units : tuple of D str
+    """
+
+    effort_source = 'limits.effort'
+
+    drives: tuple[str, ...]
+    position_units: tuple[str, ...]
+    effort_units: tuple[str, ...]
+
+    @property
+    @abstractmethod
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each drive [m, rad], (D,) each."""
+
+    @property
+    @abstractmethod
+    def efforts(self) -> Array:
+        """Largest absolute effort of each drive [N, N m], (D,)."""
+
+    @abstractmethod
+    def with_efforts(self, effort: Sequence[float]) -> Self:
+        """Return these limits with the smaller of two limits on every drive's effort."""
+
+    @abstractmethod
+    def stroke_source(self, drive: int) -> str:
+        """Return where the positions of a drive are limited, for a sentence."""
+
+    def clamped(self, forces: Array) -> Array:
+        """Return efforts, (N, D), moved to the limit where they are over it."""
+        clamped: Array = np.clip(forces, -self.efforts, self.efforts)
+        return clamped
+
+    def allow(self, forces: Array, drive_motion: tuple[Array, ...]) -> bool:
+        """Return whether all is finite, and neither a stroke nor an effort is exceeded.
+
+        Parameters
+        ----------
+        forces : (N, D) array
+            [N, N m].
+        drive_motion : three (N, D) arrays
+            Position, velocity and acceleration.
+        """
+        lower, upper = self.strokes
+        position = drive_motion[0]
+        return bool(np.isfinite(forces).all() and np.isfinite(drive_motion).all()
+                    and (np.abs(forces) <= self.efforts).all()
+                    and (position >= lower).all() and (position <= upper).all())
+
+    def check_strokes(self, positions: Array) -> None:
+        """Raise WorkspaceError for the first drive position, (N, D), outside its stroke."""
+        lower, upper = self.strokes
+        outside = ~((positions >= lower) & (positions <= upper))
+        if np.any(outside):
+            sample, drive = (int(i) for i in np.argwhere(outside)[0])
+            unit = self.position_units[drive]
+            raise WorkspaceError(
+                sample,
+                f'{self.drives[drive]} would have to be at {positions[sample, drive]:.6g} {unit}',
+                f'{self.stroke_source(drive)} is [{lower[drive]:g}, {upper[drive]:g}] {unit}')
+
+    def check_efforts(self, forces: Array) -> None:
+        """Raise LimitError for the first effort, (N, D), over its limit."""
+        over = ~(np.abs(forces) <= self.efforts)
+        if np.any(over):
+            sample, drive = (int(i) for i in np.argwhere(over)[0])
+            raise LimitError(sample, self.drives[drive], float(forces[sample, drive]),
+                             float(self.efforts[drive]), self.effort_units[drive],
+                             self.effort_source)
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits(DriveLimits):
+    """Ranges and efforts of an arm's joints, as its URDF has them; infinite where it has none.
+
+    Parameters
+    ----------
+    drives, position_units, effort_units
+        See `DriveLimits`.
+    lower, upper, effort : (n,) arrays
+    """
+
+    effort_source = 'the effort limit of URDF or node'
+
+    drives: tuple[str, ...]
+    position_units: tuple[str, ...]
+    effort_units: tuple[str, ...]
+    lower: Array
+    upper: Array
+    effort: Array
+
+    @property
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each joint [rad, m], (n,) each."""
+        return self.lower, self.upper
+
+    @property
+    def efforts(self) -> Array:
+        """Largest absolute effort of each joint, (n,)."""
+        return self.effort
+
+    def with_efforts(self, effort: Sequence[float]) -> JointLimits:
+        """Return these limits with the smaller of two limits on every joint's effort."""
+        return replace(self, effort=np.minimum(self.effort, effort))
+
+    def stroke_source(self, drive: int) -> str:
+        """Return where the positions of a joint are limited, for a sentence."""
+        return 'its range in the URDF'
+
+
 @dataclass(frozen=True)
-class Limits:
+class Limits(DriveLimits):
     """Strokes, efforts and distances from singularities.
 
     Parameters
@@ -49,6 +170,10 @@ class Limits:
     rod_cosine : float
         Smallest abs(cos u_i), for the approach of independent chains only.
     """
+
+    drives = DRIVES
+    position_units = ('m',) * COUNT
+    effort_units = ('N',) * COUNT
 
     slide_stroke: tuple[float, float]
     lift_stroke: tuple[float, float]
@@ -73,19 +198,16 @@ class Limits:
         first, second, third, fourth, fifth, sixth = np.minimum(self.efforts, effort).tolist()
         return replace(self, effort=(first, second, third, fourth, fifth, sixth))
 
-    def clamped(self, forces: Array) -> Array:
-        """Return forces, (N, 6), moved to the limit where they are over it."""
-        clamped: Array = np.clip(forces, -self.efforts, self.efforts)
-        return clamped
+    def stroke_source(self, drive: int) -> str:
+        """Return the key that limits the positions of a drive."""
+        return f'limits.{"slide_stroke" if drive < 3 else "lift_stroke"}'
 
     @cached_property
     def _kernel_parameters(self) -> KernelParameters[LimitParameters]:
         lower, upper = (tuple(end.tolist()) for end in self.strokes)
         return KernelParameters(LimitParameters(lower, upper, tuple(self.effort)))
 
-    def allow(
-        self, forces: Array, drive_motion: tuple[Array, ...],
-    ) -> bool:
+    def allow(self, forces: Array, drive_motion: tuple[Array, ...]) -> bool:
         """Return whether all is finite, and neither a stroke nor an effort is exceeded.
 
         In a tenth of the time of `check_strokes` and `check_efforts`, which name what is exceeded.
@@ -98,25 +220,6 @@ class Limits:
             Position, velocity and acceleration [m, m/s, m/s^2]; all of it C-contiguous.
         """
         return evaluate(allowed_kernel, self._kernel_parameters, forces, *drive_motion) < 0
-
-    def check_strokes(self, positions: Array) -> None:
-        """Raise WorkspaceError for the first drive position, (N, 6), outside its stroke."""
-        lower, upper = self.strokes
-        outside = ~((positions >= lower) & (positions <= upper))
-        if np.any(outside):
-            sample, drive = (int(i) for i in np.argwhere(outside)[0])
-            stroke = 'slide_stroke' if drive < 3 else 'lift_stroke'
-            raise WorkspaceError(
-                sample, f'{DRIVES[drive]} would have to be at {positions[sample, drive]:.6g} m',
-                f'limits.{stroke} is [{lower[drive]:g}, {upper[drive]:g}] m')
-
-    def check_efforts(self, forces: Array) -> None:
-        """Raise LimitError for the first force, (N, 6), over its limit."""
-        over = ~(np.abs(forces) <= self.efforts)
-        if np.any(over):
-            sample, drive = (int(i) for i in np.argwhere(over)[0])
-            raise LimitError(sample, DRIVES[drive], float(forces[sample, drive]),
-                             self.effort[drive])
 
 
 class LimitParameters(NamedTuple):

@@ -17,14 +17,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.passive_friction import IndependentChainsFriction
 from pprs_dynamics.mechanism.jacobians import condition_number
-from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.mechanism.state import MechanismState
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 
 # Of a long trajectory that many samples are looked at for their condition number, evenly spread:
@@ -38,29 +39,42 @@ class Margins:
 
     Parameters
     ----------
-    singularity : float
+    singularity : float or None
         1 minus the largest of: condition number over its limit, smallest sine of a rod angle
-        over that of the rods, and, with independent chains, the ratio for the cosine.
+        over that of the rods, and, with independent chains, the ratio for the cosine. None for an
+        arm: what moves joints comes near none.
     workspace : float
         Distance of a drive from an end of its stroke, over half the stroke.
     drive : str
         The drive nearest to an end of its stroke.
     """
 
-    singularity: float
+    singularity: float | None
     workspace: float
     drive: str
 
 
-def margins(model: DriveModel, mechanism: MechanismState) -> Margins:
+def margins(model: DriveModel | ArmModel, mechanism: Any) -> Margins:
     """Return the margins of a motion that the model has accepted.
 
     Parameters
     ----------
-    model : DriveModel
-    mechanism : MechanismState
+    model : DriveModel or ArmModel
+    mechanism : MechanismState or ArmState
         What `model.drive_forces` returned with the forces.
     """
+    lower, upper = model.limits.strokes
+    position = mechanism.position
+    with np.errstate(invalid='ignore'):  # no limit of a joint: infinity over infinity
+        room: Array = np.minimum(position - lower, upper - position).min(axis=0) / (
+            upper - lower) * 2
+    room = np.where(np.isnan(room), 1.0, room)
+    nearest = int(room.argmin())
+    singularity = _singularity(model, mechanism) if isinstance(model, DriveModel) else None
+    return Margins(singularity, float(room[nearest]), model.drives[nearest])
+
+
+def _singularity(model: DriveModel, mechanism: MechanismState) -> float:
     limits = model.limits
     J = mechanism.jacobians.J
     step = -(-len(J) // MOST_CONDITIONS)
@@ -69,8 +83,4 @@ def margins(model: DriveModel, mechanism: MechanismState) -> Margins:
             limits.rod_sine / np.abs(mechanism.chains.sin_u).min()]
     if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
         used.append(limits.rod_cosine / np.abs(mechanism.chains.cos_u).min())
-    lower, upper = limits.strokes
-    position = mechanism.position
-    room: Array = np.minimum(position - lower, upper - position).min(axis=0) / (upper - lower) * 2
-    nearest = int(room.argmin())
-    return Margins(float(1 - max(used)), float(room[nearest]), DRIVES[nearest])
+    return float(1 - max(used))

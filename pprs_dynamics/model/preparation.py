@@ -25,19 +25,27 @@ import numpy as np
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 
 HEIGHT = 0.5  # [m], of the home pose
 SAMPLES = 3  # more than one, as for recordings
 
 
-def prepare(model: DriveModel) -> None:
+def prepare(model: DriveModel | ArmModel) -> None:
     """Evaluate a model once, both ways, alone and in a batch.
 
     A robot that cannot be at the home pose refuses it, after what is needed has been compiled.
     Effects that fail are told of when they are asked for an answer.
     """
+    if isinstance(model, ArmModel):
+        with suppress(PprsError):
+            zero = np.zeros((SAMPLES, len(model.drives)))
+            at_rest = JointMotion(zero, zero, zero, np.arange(SAMPLES, dtype=float))
+            model.sound_at(at_rest).drive_forces(at_rest)
+        return
     home = PlatformMotion.at_rest(np.tile([0.0, 0.0, HEIGHT], (SAMPLES, 1)),
                                   np.tile([0.0, 0.0, 0.0, 1.0], (SAMPLES, 1)))
     with suppress(PprsError):

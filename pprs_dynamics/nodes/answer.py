@@ -23,14 +23,14 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError
-from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.pose_spline import load_splines
-from pprs_dynamics.model.drive_model import RIGID_BODY, DriveForces, DriveModel, ModelState
-from pprs_dynamics.model.limits import Limits
+from pprs_dynamics.model.force_model import RIGID_BODY, Forces, ModelState
+from pprs_dynamics.model.limits import DriveLimits
 from pprs_dynamics.nodes.conversions import NANOSECONDS
 from pprs_dynamics.nodes.feedforward_settings import CLAMP
+from pprs_dynamics.nodes.model_parameters import NodeModel
 from pprs_dynamics.nodes.rejection import Rejection
-from pprs_dynamics.nodes.trajectory_request import SPLINE, TrajectoryRequest
+from pprs_dynamics.nodes.trajectory_request import SPLINE, Motion, TrajectoryRequest
 
 
 class Answer(NamedTuple):
@@ -39,22 +39,22 @@ class Answer(NamedTuple):
     Parameters
     ----------
     request : TrajectoryRequest
-    forces : DriveForces
+    forces : Forces
         As the model gave them.
-    effort : (N, 6) array
-        What goes out [N]: scaled and within the limits.
+    effort : (N, D) array
+        What goes out [N, N m; A where commands are currents]: scaled and within the limits.
     clamp_reason : str
-        Which force was clamped; empty where none was.
+        Which effort was clamped; empty where none was.
     """
 
     request: TrajectoryRequest
-    forces: DriveForces
+    forces: Forces
     effort: Array
     clamp_reason: str = ''
 
     @property
     def clamped(self) -> bool:
-        """Whether a force was over its limit."""
+        """Whether an effort was over its limit."""
         return bool(self.clamp_reason)
 
 
@@ -63,32 +63,33 @@ class Feedforward:
 
     Parameters
     ----------
-    model : DriveModel
+    model : DriveModel or ArmModel
     own : mapping
         The node's parameters, see `feedforward_settings`.
     """
 
-    def __init__(self, model: DriveModel, own: Mapping[str, Any]) -> None:
-        self._model = model
+    def __init__(self, model: NodeModel, own: Mapping[str, Any]) -> None:
+        self._model: Any = model
         self._memory: ModelState | None = None
         self._remembers = False
         # The model that remembered last, and what.
-        self._before: tuple[DriveModel, ModelState] | None = None
+        self._before: tuple[NodeModel, ModelState] | None = None
         self._epoch: int | None = None
         self._last: TrajectoryRequest | None = None
         self.use(model, own)
 
-    def use(self, model: DriveModel, own: Mapping[str, Any]) -> None:
+    def use(self, model: NodeModel, own: Mapping[str, Any]) -> None:
         """Go on with another model; effects that both have keep their memory."""
         if self._memory is not None:
             self._before = self._model, self._memory
         # Made with the next answer, which is refused where an effect fails at it.
         self._memory = None
-        self._model, self._scale = model, own['feedforward_scale']
+        self._model, self._scale = model, own['feedforward_scale'] * model.amperes
+        self._scales = bool((self._scale != 1).any())
         if own['missing_derivatives'] == SPLINE:
             load_splines()
         self._clamps = own['limit_policy'] == CLAMP
-        self._limits: Limits = model.limits
+        self._limits: DriveLimits = model.limits
         if own['effort_limits']:
             self._limits = model.limits.with_efforts(own['effort_limits'])
 
@@ -98,8 +99,9 @@ class Feedforward:
         return [RIGID_BODY, *(e.name for e in self._model.effects if not e.is_measurement)]
 
     def part(self, answer: Answer, name: str) -> Array:
-        """Return one part of the first forces, scaled as they are, (6,)."""
-        return self._scale * answer.forces.parts[name][0]
+        """Return one part of the first forces, scaled as they are, (D,)."""
+        part: Array = self._scale * answer.forces.parts[name][0]
+        return part
 
     def answer(self, request: TrajectoryRequest) -> Answer:
         """Return what goes out for a request.
@@ -142,29 +144,28 @@ class Feedforward:
         """
         if self._last is None:
             raise Rejection('EMPTY', 'no trajectory has been accepted')
-        last = self._last.motion
         # The forces at rest, not those of the way there: no memory of it.
-        motion = PlatformMotion.at_rest(last.position[-1:], last.orientation[-1:]).with_time([0.0])
+        motion = self._last.motion.held()
         forces = self._model.sound_at(motion).drive_forces(motion)
         effort = self._limits.clamped(self._scale * forces.total) if gravity else (
             np.zeros_like(forces.total))
         if not np.all(np.isfinite(effort)):
-            raise Rejection('OUTPUT', 'the model gave a force that is not finite')
+            raise Rejection('OUTPUT', 'the model gave an effort that is not finite')
         return Answer(self._last, forces, effort)
 
-    def _checked(self, request: TrajectoryRequest, forces: DriveForces) -> Answer:
-        effort = forces.total if self._scale == 1 else self._scale * forces.total
+    def _checked(self, request: TrajectoryRequest, forces: Forces) -> Answer:
+        effort = self._scale * forces.total if self._scales else forces.total
         if self._limits.allow(effort, forces.drive_motion):
             return Answer(request, forces, effort)
         return self._looked_at(request, forces, effort)
 
-    def _looked_at(self, request: TrajectoryRequest, forces: DriveForces, effort: Array) -> Answer:
+    def _looked_at(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> Answer:
         """Return what goes out where something is not allowed, or raise what is wrong."""
         position, velocity, acceleration = forces.drive_motion
-        for name, quantity in (('force', forces.total), ('drive velocity', velocity),
-                               ('drive acceleration', acceleration)):
+        for name, quantity in (('n effort', effort), (' drive velocity', velocity),
+                               (' drive acceleration', acceleration)):
             if not np.isfinite(quantity).all():
-                raise Rejection('OUTPUT', f'the model gave a {name} that is not finite')
+                raise Rejection('OUTPUT', f'the model gave a{name} that is not finite')
         self._limits.check_strokes(position)
         try:
             self._limits.check_efforts(effort)
@@ -174,7 +175,7 @@ class Feedforward:
             return Answer(request, forces, self._limits.clamped(effort), str(error))
         return Answer(request, forces, effort)
 
-    def _timed(self, request: TrajectoryRequest) -> PlatformMotion:
+    def _timed(self, request: TrajectoryRequest) -> Motion:
         """Return the motion on one time scale for all messages, which memories go by."""
         if self._epoch is None:
             self._epoch = request.start

@@ -35,7 +35,6 @@ PLATFORM = 'platform'
 BASE_FRAMES = ('', 'base')
 NANOSECONDS = 1_000_000_000
 LATEST_SECOND = 2 ** 31 - 1
-_NAMES = list(DRIVES)
 
 
 def write_trajectory(
@@ -67,17 +66,24 @@ def write_trajectory(
 
 def joint_state(
     stamp: int, effort: Array, position: Array | None = None, velocity: Array | None = None,
+    drives: Sequence[str] = DRIVES,
 ) -> JointState:
     """Return efforts, and what else is known, at a time [ns]."""
-    message = JointState(name=_NAMES, effort=_doubles(effort))
+    message = JointState(name=list(drives), effort=_doubles(effort))
     if position is not None and velocity is not None:
         message.position, message.velocity = _doubles(position), _doubles(velocity)
-    message.header.stamp, message.header.frame_id = time(stamp), BASE_FRAMES[1]
+    message.header.stamp, message.header.frame_id = time(stamp), frame_of(drives)
     return message
 
 
-def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Array:
-    """Return one field of a JointState in drive order, matched by name, (6,).
+def frame_of(drives: Sequence[str]) -> str:
+    """Return the frame of what drives say: a platform's `base`; that of joints means nothing."""
+    return BASE_FRAMES[1] if tuple(drives) == DRIVES else BASE_FRAMES[0]
+
+
+def read_drives(message: JointState, field: str, may_be_nan: bool = False,
+                drives: Sequence[str] = DRIVES) -> Array:
+    """Return one field of a JointState in the order of drives, matched by name, (D,).
 
     Raises
     ------
@@ -86,23 +92,25 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False) -> Ar
         finite.
     """
     names, values = list(message.name), getattr(message, field)
-    missing = [drive for drive in DRIVES if drive not in names]
+    missing = [drive for drive in drives if drive not in names]
     if missing:
         raise Rejection('NAMES', f'name is {names!r:.100}, must hold {missing[0]}')
     if len(values) != len(names):
         raise Rejection('SIZE', f'{field} has {len(values)} values, must have '
                         f'{len(names)}, as name')
-    drives = np.array([values[names.index(drive)] for drive in DRIVES], dtype=float)
+    found = np.array([values[names.index(drive)] for drive in drives], dtype=float)
     if may_be_nan:
         # Not a number, and no measurement either.
-        return np.where(np.isfinite(drives), drives, np.nan)
-    if not np.all(np.isfinite(drives)):
-        raise Rejection('NON_FINITE', f'{field} is {drives.tolist()}, must be finite')
-    return drives
+        return np.where(np.isfinite(found), found, np.nan)
+    if not np.all(np.isfinite(found)):
+        raise Rejection('NON_FINITE', f'{field} is {found.tolist()}, must be finite')
+    return found
 
 
-def read_measured(data: bytes) -> tuple[int, Array, Array]:
-    """Return stamp [ns], positions [m] and efforts [N], NaN where unknown, of a JointState's bytes.
+def read_measured(
+    data: bytes, drives: Sequence[str] = DRIVES,
+) -> tuple[int, Array, Array]:
+    """Return stamp [ns], positions and efforts, NaN where unknown, of a JointState's bytes.
 
     Raises
     ------
@@ -110,8 +118,8 @@ def read_measured(data: bytes) -> tuple[int, Array, Array]:
         As `message_in` and `read_drives`.
     """
     message = message_in(data, JointState)
-    return (nanoseconds(message.header.stamp), read_drives(message, 'position'),
-            read_drives(message, 'effort', may_be_nan=True))
+    return (nanoseconds(message.header.stamp), read_drives(message, 'position', drives=drives),
+            read_drives(message, 'effort', may_be_nan=True, drives=drives))
 
 
 def nanoseconds(moment: Time | Duration) -> int:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Node `feedforward`: platform pose trajectories in, six drive forces out."""
+"""Node `feedforward`: trajectories of a platform or of joints in, the drives' efforts out."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.model.margins import Margins, margins
 from pprs_dynamics.model.model_fingerprint import fingerprint
 from pprs_dynamics.model.preparation import prepare
-from pprs_dynamics.nodes import answer_cdr
 from pprs_dynamics.nodes.answer import Answer, Feedforward
+from pprs_dynamics.nodes.answer_cdr import AnswerBytes
 from pprs_dynamics.nodes.conversions import NANOSECONDS
-from pprs_dynamics.nodes.feedforward_settings import HOLD_GRAVITY, PARAMETERS, SILENT
+from pprs_dynamics.nodes.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
 from pprs_dynamics.nodes.managed_node import ManagedNode
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.nodes.parameters import declare_own
+from pprs_dynamics.nodes.parameters import declare_own, drive_count
 from pprs_dynamics.nodes.provenance import files_given
 from pprs_dynamics.nodes.qos import UNANSWERED, publisher, subscription
 from pprs_dynamics.nodes.rejection import CODES, Rejection
+from pprs_dynamics.nodes.request_reader import reader_for
 from pprs_dynamics.nodes.status import StatusReporter
 from pprs_dynamics.nodes.timing import Durations
-from pprs_dynamics.nodes.trajectory_request import read_serialised
 from pprs_dynamics.nodes.watchdog import CommandWatchdog
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
@@ -51,7 +51,7 @@ LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last comma
 
 
 class FeedforwardNode(ExplainsRefusals, ManagedNode):
-    """Answers every valid trajectory with friction-compensated drive forces.
+    """Answers every valid trajectory with friction-compensated efforts of the drives.
 
     A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
     reason stands in `~/status` and in the log. When commands go stale, when an effect of another
@@ -66,16 +66,20 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._subscription: Any = None
         self._watchdog: CommandWatchdog | None = None
         self._failure: Exception | None = None
-        own = declare_own(self, PARAMETERS)
-        self._settings = ModelParameters(self, PARAMETERS, self._use_settings)
+        parameters = parameters_for(drive_count(self))
+        own = declare_own(self, parameters)
+        self._settings = ModelParameters(self, parameters, self._use_settings)
         # Compiling or loading takes a second or more, for which no message should have to wait.
         self.get_logger().info('loading the equations; the first time they are compiled, which '
-                               'takes some 15 s')
+                               'may take some 15 s')
         prepare(self._settings.model)
+        # Which drives there are, and by which message they are asked for, stays.
+        self._reader = reader_for(self._settings.model)
+        self._bytes = AnswerBytes(self._settings.model.drives)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(CODES, 0)}
-        self._margins_due, self._margins = 0.0, Margins(1.0, 1.0, '')
+        self._margins_due, self._margins = 0.0, Margins(None, 1.0, '')
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, time.monotonic())
         self._files = files_given(options.get('cli_args') or sys.argv)
@@ -113,8 +117,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._status.report('OK', 'WAITING', 'waiting for the first message')
         model = self._settings.model
         self.get_logger().info(
-            f'equations {model.equations}, effects '
-            f'{", ".join(effect.name for effect in model.effects)}; ready')
+            f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -149,7 +152,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._create_parts()
         # Raw: message objects of a long trajectory would take longer than the model.
         self._subscription = subscription(
-            self, MultiDOFJointTrajectory, '~/trajectory', self._on_trajectory, raw=True,
+            self, self._reader.message, '~/trajectory', self._on_trajectory, raw=True,
             profile=UNANSWERED)
 
     def _publisher(self, kind: type, topic: str) -> Any:
@@ -189,12 +192,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._counters['received'] += 1
         own, now = self._settings.own, self.get_clock().now().nanoseconds
         try:
-            request = read_serialised(data, now, own['max_age'], own['missing_derivatives'])
+            request = self._reader.read(data, now, own['max_age'], own['missing_derivatives'])
             answer = self._feedforward.answer(request)
         except PprsError as error:
             self._reject(Rejection.of(error))
             return
-        self._commands.publish(answer_cdr.commands(answer.effort[0]))
+        self._commands.publish(self._bytes.commands(answer.effort[0]))
         # What is left may take its time: the drives have their command.
         self._compute_time.add(time.perf_counter() - began)
         self._counters['accepted'] += 1
@@ -210,14 +213,14 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         request, forces = answer.request, answer.forces
         if self._joint_command.get_subscription_count():
             position, velocity, _ = forces.drive_motion
-            self._joint_command.publish(answer_cdr.joint_state(
+            self._joint_command.publish(self._bytes.joint_state(
                 request.first_stamp, answer.effort[0], position[0], velocity[0]))
         if self._joint_trajectory.get_subscription_count():
-            self._joint_trajectory.publish(answer_cdr.joint_trajectory(
+            self._joint_trajectory.publish(self._bytes.joint_trajectory(
                 request.start, request.offsets, forces, answer.effort))
         for name, each in self._parts.items():
             if each.get_subscription_count():
-                each.publish(answer_cdr.joint_state(
+                each.publish(self._bytes.joint_state(
                     request.first_stamp, self._feedforward.part(answer, name)))
 
     def _judge(self, answer: Answer) -> None:
@@ -225,17 +228,18 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         if now > self._margins_due:
             self._margins_due = now + MARGINS_PERIOD
             self._margins = left = margins(self._settings.model, answer.forces.mechanism)
-            self._status.facts['singularity_margin'] = round(left.singularity, 6)
+            if left.singularity is not None:
+                self._status.facts['singularity_margin'] = round(left.singularity, 6)
             self._status.facts['workspace_margin'] = round(left.workspace, 6)
         left = self._margins
         if answer.clamped:
-            report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the force was clamped')
-        elif left.singularity < own['warning_margin']:
+            report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the effort was clamped')
+        elif left.singularity is not None and left.singularity < own['warning_margin']:
             report('WARN', 'NEAR_SINGULAR', f'{left.singularity:.3f} of the way to the limits of '
                    f'conditioning is left, warning_margin is {own["warning_margin"]:g}')
         elif left.workspace < own['warning_margin']:
             report('WARN', 'NEAR_WORKSPACE', f'{left.drive} has {left.workspace:.3f} of half its '
-                   f'stroke left, warning_margin is {own["warning_margin"]:g}')
+                   f'range left, warning_margin is {own["warning_margin"]:g}')
         elif self._lagging:
             report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median: they '
                    'come faster than they are answered, or the machine is busy')
@@ -279,14 +283,14 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         try:
             held = self._feedforward.hold(gravity=action == HOLD_GRAVITY)
         except PprsError as error:
-            return f'the last command stays in force, as no force can be given: {error}'
-        self._commands.publish(answer_cdr.commands(held.effort[0]))
+            return f'the last command stays in force, as none can be given: {error}'
+        self._commands.publish(self._bytes.commands(held.effort[0]))
         if self._joint_command.get_subscription_count():
-            self._joint_command.publish(answer_cdr.joint_state(
+            self._joint_command.publish(self._bytes.joint_state(
                 self.get_clock().now().nanoseconds, held.effort[0],
                 held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
         if action != HOLD_GRAVITY:
-            return 'forces are zero'
+            return 'efforts are zero'
         failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
         return f'the last pose is held at rest{", without " if failed else ""}{", ".join(failed)}'
 

@@ -40,9 +40,8 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.recording import Recording, write_recording
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.nodes import conversions
+from pprs_dynamics.nodes.model_parameters import NodeModel
 from pprs_dynamics.nodes.qos import UNANSWERED
 from pprs_dynamics.nodes.rejection import Rejection
 from pprs_dynamics.residuals.live import LiveComparison
@@ -62,12 +61,12 @@ class LiveJointStates(Node):
 
     Parameters
     ----------
-    model : DriveModel
+    model : DriveModel or ArmModel
     topic : str
         Of sensor_msgs/JointState.
     """
 
-    def __init__(self, model: DriveModel, topic: str, **options: Any) -> None:
+    def __init__(self, model: NodeModel, topic: str, **options: Any) -> None:
         super().__init__(NAME, **options)
         self.model = model
         self._comparison = LiveComparison(model, WINDOW, ERROR_SPAN)
@@ -85,7 +84,7 @@ class LiveJointStates(Node):
         self.create_timer(JUDGED, self._judge)
         self.clients_of = {name: AsyncParameterClient(self, f'/{name}') for name in NODES}
 
-    def use_model(self, model: DriveModel) -> None:
+    def use_model(self, model: NodeModel) -> None:
         """Compare with another model from now on."""
         with self._lock:
             self.model = model
@@ -94,7 +93,7 @@ class LiveJointStates(Node):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            stamp, position, effort = conversions.read_measured(data)
+            stamp, position, effort = conversions.read_measured(data, self.model.drives)
         except Rejection as rejection:
             self._counters['rejected'] += 1
             self._trouble = str(rejection)
@@ -142,7 +141,8 @@ class LiveJointStates(Node):
         stamps = [(stamp - first) / conversions.NANOSECONDS for stamp, _, _ in samples]
         return Recording.from_arrays('live', np.array(stamps),
                                      np.stack([position for _, position, _ in samples]),
-                                     effort=np.stack([effort for _, _, effort in samples]))
+                                     effort=np.stack([effort for _, _, effort in samples]),
+                                     drives=self.model.drives)
 
     def to_json(self) -> dict[str, Any]:
         """Return how it stands, and what was left of late [N]."""
@@ -154,7 +154,7 @@ class LiveJointStates(Node):
                     if self._ring else 0.0)
             age = now - self._arrived if self._arrived else None
         step = max(1, len(late) // 1000)
-        return {**self._counters, 'drives': list(DRIVES), 'age': age, 'kept': span,
+        return {**self._counters, 'drives': list(self.model.drives), 'age': age, 'kept': span,
                 'trouble': self._trouble, 'effects': list(self.model.values.get(ACTIVE, ())),
                 'error': [_plain(value) for value in running],
                 'monitor_error': [_plain(value) for value in self._monitor]
@@ -169,12 +169,12 @@ class LiveSource:
 
     Parameters
     ----------
-    model : DriveModel
+    model : DriveModel or ArmModel
         That running nodes have as well.
     topic : str
     """
 
-    def __init__(self, model: DriveModel, topic: str = 'joint_states') -> None:
+    def __init__(self, model: NodeModel, topic: str = 'joint_states') -> None:
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = LiveJointStates(model, topic, context=self._context)
@@ -209,7 +209,7 @@ class LiveSource:
 
         Parameters
         ----------
-        model : DriveModel
+        model : DriveModel or ArmModel
 
         Returns
         -------

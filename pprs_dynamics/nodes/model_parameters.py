@@ -23,16 +23,20 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import KEYS, NODE_PREFIXES
+from pprs_dynamics.model.keys import ARM_JOINTS, KEYS, NAMES, NODE_PREFIXES, is_arm
 from pprs_dynamics.nodes.parameters import (
     NodeParameter,
     added_descriptor,
     current_values,
+    declare_arm,
     declare_model,
-    model_from,
+    overrides,
 )
+
+NodeModel = DriveModel | ArmModel
 
 
 class ExplainsRefusals(Node):
@@ -66,8 +70,8 @@ class ModelParameters:
 
     Attributes
     ----------
-    model : DriveModel
-        In force now.
+    model : DriveModel or ArmModel
+        In force now; of one kind, and of the same drives, as long as the node runs.
     own : dict
         Values of the node's own parameters.
     taken_from_paper : list of str
@@ -83,8 +87,15 @@ class ModelParameters:
         self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
     ) -> None:
         self._node, self._declared, self._changed = node, tuple(own), changed
-        taken_from_paper = declare_model(node)
+        self._kind: type[NodeModel] = ArmModel if is_arm(overrides(node)) else DriveModel
+        taken_from_paper = []
+        if self._kind is ArmModel:
+            declare_arm(node)
+        else:
+            taken_from_paper = declare_model(node)
+        self._drives: tuple[str, ...] | None = None
         self.model, self.own = self._validated()
+        self._drives = self.model.drives
         # A status entry, and a line in the log: another robot would get wrong forces.
         self.taken_from_paper = taken_from_paper
         if taken_from_paper:
@@ -96,10 +107,13 @@ class ModelParameters:
         node.add_on_set_parameters_callback(self.check)
         node.add_post_set_parameters_callback(self._apply)
 
-    def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[DriveModel, dict[str, Any]]:
+    def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[NodeModel, dict[str, Any]]:
         values = current_values(self._node, changes)
         own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
-        model = model_from(values)
+        model = self._kind.from_parameters(values)
+        if self._drives not in (None, model.drives):
+            raise ModelError(ARM_JOINTS, model.drives, 'stay as it was when the node started: '
+                             f'{", ".join(self._drives or ())}')
         model.initial_state()  # an effect that cannot even begin is refused
         return model, own
 
@@ -119,7 +133,7 @@ class ModelParameters:
         # What was checked, and nothing else, comes into force.
         self.model, self.own = self._checked
         for change in changes:
-            if change.name not in KEYS and change.name.startswith('effects.') and (
+            if change.name not in NAMES and change.name.startswith('effects.') and (
                     self._node.has_parameter(change.name)):
                 self._describe(change.name)
         self._changed()

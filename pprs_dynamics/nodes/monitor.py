@@ -23,6 +23,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import EffectError, PprsError
+from pprs_dynamics.mechanism.units import common_effort
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
@@ -69,7 +70,7 @@ class MonitorNode(ExplainsRefusals):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            stamp, position, effort = conversions.read_measured(data)
+            stamp, position, effort = conversions.read_measured(data, self._settings.model.drives)
         except Rejection as rejection:
             self._reject(rejection)
             return
@@ -102,7 +103,8 @@ class MonitorNode(ExplainsRefusals):
         worst = float(np.nanmax(running)) if np.isfinite(running).any() else float('nan')
         self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
                                        for value in running.tolist()]
-        self._status.report('OK', 'OK', f'largest running error {worst:.4g} N')
+        unit = common_effort(self._settings.model.units)
+        self._status.report('OK', 'OK', f'largest running error {worst:.4g} {unit}')
 
     def _publish(self, compared: Compared) -> None:
         for publisher, efforts in ((self._model_effort, compared.model),
@@ -110,7 +112,8 @@ class MonitorNode(ExplainsRefusals):
             if publisher.get_subscription_count():
                 for time, effort in zip(compared.time, efforts, strict=True):
                     stamp = self._origin + round(time * conversions.NANOSECONDS)
-                    publisher.publish(conversions.joint_state(stamp, effort))
+                    publisher.publish(conversions.joint_state(
+                        stamp, effort, drives=self._settings.model.drives))
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1

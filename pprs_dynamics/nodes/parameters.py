@@ -28,11 +28,24 @@ from rclpy.parameter import Parameter
 
 from pprs_dynamics.effects.catalogue import CATALOGUE
 from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.keys import AXIS_KEYS, KEYS, LARGEST, NODE_KEYS, Key, is_arm, is_axis
+from pprs_dynamics.model.keys import (
+    ARM_JOINTS,
+    ARM_URDF,
+    KEYS,
+    LARGEST,
+    NAMES,
+    NODE_KEYS,
+    Key,
+    as_list,
+    is_arm,
+    is_axis,
+    keys_of,
+)
 from pprs_dynamics.model.parameter_file import default_parameters
 from pprs_dynamics.model.parameter_values import is_known
-from pprs_dynamics.nodes.provenance import names_given
+from pprs_dynamics.nodes.provenance import folder_of, names_given
 from pprs_dynamics.nodes.rclpy_internals import parameter_overrides
 
 ACTIVE = 'effects.active'
@@ -132,8 +145,51 @@ def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, An
     return values
 
 
+def drive_count(node: Node) -> int:
+    """Return how many drives the model has that a node was given."""
+    given = overrides(node)
+    joints = given.get(ARM_JOINTS)
+    return len(joints) if is_arm(given) and isinstance(joints, list) and joints else len(DRIVES)
+
+
+def declare_arm(node: Node) -> None:
+    """Declare every key of an arm's model; a relative path of its URDF becomes an absolute one.
+
+    Raises
+    ------
+    ModelError
+        For a key that is missing or breaks its rule.
+    """
+    given = {name: _plain(value) for name, value in overrides(node).items()}
+    keys = keys_of(given)
+    for name, key in keys.items():
+        value = given.get(name)
+        if value is None and name in given and key.may_be_empty:
+            value = []
+        if value is not None:
+            key.check(value)
+        elif key.default is None:
+            raise ModelError(name, MISSING, key.rule)
+        else:
+            value = as_list(key.default)
+        if name == ARM_URDF:
+            value = str(folder_of(name) / value)
+        # An override would bring the relative path back.
+        node.declare_parameter(name, value, _of_key(key), ignore_override=True)
+    _declare_added(node, given)
+
+
+def _declare_added(node: Node, given: Mapping[str, Any]) -> None:
+    """Declare what was given beside the keys of a model, as of effects."""
+    for name, value in given.items():
+        if not node.has_parameter(name) and value is not None:
+            node.declare_parameter(name, value, added_descriptor(name))
+    if not node.has_parameter(ACTIVE):
+        node.declare_parameter(ACTIVE, [], added_descriptor(ACTIVE))
+
+
 def declare_model(node: Node) -> list[str]:
-    """Declare every key of a model, with the paper's robot where nothing is given.
+    """Declare every key of a 3-PPRS's model, with the paper's robot where nothing is given.
 
     Returns
     -------
@@ -156,11 +212,7 @@ def declare_model(node: Node) -> list[str]:
         default = defaults.get(name, key.default)
         node.declare_parameter(
             name, list(default) if isinstance(default, tuple) else default, _of_key(key))
-    for name, value in given.items():
-        if not node.has_parameter(name) and value is not None:
-            node.declare_parameter(name, value, added_descriptor(name))
-    if not node.has_parameter(ACTIVE):
-        node.declare_parameter(ACTIVE, [], added_descriptor(ACTIVE))
+    _declare_added(node, given)
     return [name for name, key in KEYS.items() if name not in given and name in defaults]
 
 
@@ -173,7 +225,7 @@ def refuse_unknown(node: Node) -> None:
 
 def overrides(node: Node) -> dict[str, Any]:
     """Return what was given in files and on the command line, None for an empty list."""
-    return parameter_overrides(node, lambda: {*KEYS, *AXIS_KEYS, *NODE_KEYS, *names_given()})
+    return parameter_overrides(node, lambda: {*NAMES, *NODE_KEYS, *names_given()})
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:
@@ -203,7 +255,8 @@ def added_descriptor(name: str) -> ParameterDescriptor:
 
 def _of_key(key: Key) -> ParameterDescriptor:
     unit = f' [{key.unit}]' if key.unit else ''
-    kind = str if key.choices else float if key.size is None else list
+    is_word = bool(key.choices) or key.is_text
+    kind = list if key.size is not None else str if is_word else float
     return _descriptor(f'{key.description}{unit}', key.rule, kind, key.lower if not key.positive
                        else max(key.lower, 0.0), key.upper)
 
@@ -229,14 +282,3 @@ def _descriptor(
 def _plain(value: Any) -> Any:
     """Return a list for the arrays that rclpy keeps."""
     return value.tolist() if isinstance(value, array) else value
-
-
-def model_from(values: Mapping[str, Any]) -> DriveModel:
-    """Build the model from a node's parameters, those of the node itself left out.
-
-    Raises
-    ------
-    ModelError
-        Where a value, or a name, is not one of a model.
-    """
-    return DriveModel.from_parameters(values)

@@ -58,11 +58,25 @@ def _paths(arguments: Sequence[str]) -> list[Path]:
 def names_given(arguments: Sequence[str] | None = None) -> list[str]:
     """Return the names of parameters on a command line and in the files that it names."""
     arguments = sys.argv if arguments is None else arguments
-    names = [name.partition(BLOCK)[2]
-             for path in _paths(arguments) if path.is_file()
-             for name in _flat(parse(read_text(path), path)) if BLOCK in name]
-    return names + [value.partition(':=')[0].rpartition(':')[2]
-                    for option, value in pairwise(arguments) if option in ('-p', '--param')]
+    return [name for path in _paths(arguments) if path.is_file()
+            for name in _names_in(path)] + _names_on(arguments)
+
+
+def folder_of(name: str, arguments: Sequence[str] | None = None) -> Path:
+    """Return the folder that a path in a parameter counts from: its file's, or the present one."""
+    arguments = sys.argv if arguments is None else arguments
+    files = [path for path in _paths(arguments) if path.is_file() and name in _names_in(path)]
+    return Path.cwd() if not files or name in _names_on(arguments) else files[-1].resolve().parent
+
+
+def _names_in(path: Path) -> list[str]:
+    return [name.partition(BLOCK)[2] for name in _flat(parse(read_text(path), path))
+            if BLOCK in name]
+
+
+def _names_on(arguments: Sequence[str]) -> list[str]:
+    return [value.partition(':=')[0].rpartition(':')[2]
+            for option, value in pairwise(arguments) if option in ('-p', '--param')]
 
 
 def _flat(tree: Mapping[str, Any]) -> Iterator[str]:

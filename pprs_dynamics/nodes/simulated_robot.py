@@ -24,13 +24,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.parameters import (
     NodeParameter,
     current_values,
     declare_model,
     declare_own,
-    model_from,
 )
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.setpoints import SetpointQueue
@@ -77,7 +77,7 @@ class SimulatedRobotNode(Node):
         own = declare_own(self, PARAMETERS)
         declare_model(self)
         values = {name: value for name, value in current_values(self).items() if name not in own}
-        self._model = model_from(values)
+        self._model = DriveModel.from_parameters(values)
         self._use_effort = own['use_effort']
         self._robot = _robot(self._model.values, own)
         self._queue = SetpointQueue(self._robot.control)

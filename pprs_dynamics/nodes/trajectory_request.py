@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.samples import Indices, Mask
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.motion import PlatformMotion
 from pprs_dynamics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
 from pprs_dynamics.nodes.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
@@ -33,6 +34,7 @@ from pprs_dynamics.nodes.whole import message_in
 
 REJECT, SPLINE = 'reject', 'spline'
 VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)
+Motion = PlatformMotion | JointMotion
 
 
 class TrajectoryRequest(NamedTuple):
@@ -40,7 +42,7 @@ class TrajectoryRequest(NamedTuple):
 
     Parameters
     ----------
-    motion : PlatformMotion
+    motion : PlatformMotion or JointMotion
         All points; its time is in seconds after `start`.
     start : int
         Header stamp, or the time of arrival where it is 0 [ns].
@@ -48,7 +50,7 @@ class TrajectoryRequest(NamedTuple):
         time_from_start of every point [ns], exact.
     """
 
-    motion: PlatformMotion
+    motion: Any
     start: int
     offsets: Indices
 
@@ -70,7 +72,7 @@ def read_serialised(
     points = read_points(data)
     if points is not None:
         stamp, numbers, offsets = points
-        return _request(_start(stamp, now, max_age), numbers, offsets)
+        return request_of(start_of(stamp, now, max_age), offsets, _motion_of(numbers))
     return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing)
 
 
@@ -104,24 +106,36 @@ def read_trajectory(
     if message.header.frame_id not in BASE_FRAMES:
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
                         "must be 'base' or empty")
-    lacking = _check_counts(points, missing)
-    start = _start(nanoseconds(message.header.stamp), now, max_age)
-    offsets = np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
+    lacking = check_counts(points, missing)
+    start = start_of(nanoseconds(message.header.stamp), now, max_age)
+    offsets = offsets_of(points)
     numbers = np.array([_row(point) for point in points])
     if lacking.any():
         _fill(numbers, offsets, lacking)
-    return _request(start, numbers, offsets)
+    return request_of(start, offsets, _motion_of(numbers))
 
 
-def _request(start: int, numbers: Array, offsets: Indices) -> TrajectoryRequest:
+def _motion_of(numbers: Array) -> Callable[[Array], Motion]:
+    return lambda time: PlatformMotion.from_rows(numbers, time)
+
+
+def request_of(
+    start: int, offsets: Indices, motion_at: Callable[[Array], Motion],
+) -> TrajectoryRequest:
+    """Return the request for a motion that is made with its times [s], from the start on."""
     if offsets[0] < 0:
         raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s, '
                         'must not be negative')
-    return TrajectoryRequest(
-        PlatformMotion.from_rows(numbers, offsets / NANOSECONDS), start, offsets)
+    return TrajectoryRequest(motion_at(offsets / NANOSECONDS), start, offsets)
 
 
-def _start(stamp: int, now: int, max_age: float) -> int:
+def offsets_of(points: Sequence[Any]) -> Indices:
+    """Return time_from_start of every point [ns], (N,)."""
+    return np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
+
+
+def start_of(stamp: int, now: int, max_age: float) -> int:
+    """Return a header stamp, or the time of arrival where it is 0 [ns]; see `read_trajectory`."""
     start = stamp if stamp else now
     age = (now - start) / NANOSECONDS
     if max_age and age > max_age:
@@ -129,22 +143,39 @@ def _start(stamp: int, now: int, max_age: float) -> int:
     return start
 
 
-def _check_counts(points: Sequence[Any], missing: str) -> Mask:
-    """Return which points lack a velocity and an acceleration, (N, 2), where that is allowed."""
+def check_counts(
+    points: Sequence[Any], missing: str, places: str = 'transforms', wanted: int = 1,
+) -> Mask:
+    """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
+
+    Parameters
+    ----------
+    points : sequence of messages
+    missing : {'reject', 'spline'}
+    places : str
+        Field that says where.
+    wanted : int
+        Elements that each field must have.
+
+    Raises
+    ------
+    Rejection
+        SIZE, for another number of elements.
+    """
     lacking = np.zeros((len(points), 2), dtype=bool)
     for index, point in enumerate(points):
-        for column, field in enumerate(('velocities', 'accelerations', 'transforms')):
+        for column, field in enumerate(('velocities', 'accelerations', places)):
             count = len(getattr(point, field))
-            if count == 1:
+            if count == wanted:
                 continue
-            may_lack = count == 0 and field != 'transforms' and missing == SPLINE
+            may_lack = count == 0 and field != places and missing == SPLINE
             if may_lack and len(points) >= FEWEST_POSES:
                 lacking[index, column] = True
                 continue
             hint = (f': a spline needs at least {FEWEST_POSES} points, and the trajectory has '
                     f'{len(points)}' if may_lack else '')
             raise Rejection(
-                'SIZE', f'point {index} has {count} {field}, must have 1{hint}')
+                'SIZE', f'point {index} has {count} {field}, must have {wanted}{hint}')
     return lacking
 
 
@@ -152,10 +183,16 @@ def _fill(numbers: Array, offsets: Indices, lacking: Mask) -> None:
     """Put the derivatives of a spline through the poses where points lack their own."""
     derivatives = spline_derivatives(
         (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7])
-    for place, values, rows in zip((VELOCITY, ACCELERATION), derivatives, lacking.T, strict=True):
+    fill_in(numbers, (VELOCITY, ACCELERATION), derivatives, lacking)
+
+
+def fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
+            lacking: Mask) -> None:
+    """Put the derivatives of a spline into the columns of those points that lack their own."""
+    for place, values, rows in zip(places, derivatives, lacking.T, strict=True):
         if not np.isfinite(values).all():
-            raise Rejection('OUTPUT', 'the spline through the poses has derivatives that are not '
-                            'finite')
+            raise Rejection('OUTPUT', 'the spline through the points has derivatives that are '
+                            'not finite')
         numbers[rows, place] = values[rows]
 
 

@@ -27,7 +27,7 @@ from typing import Any
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.nodes.rejection import Rejection
 
@@ -44,7 +44,7 @@ def message_in(data: bytes, kind: type) -> Any:
     data : bytes
         As a raw subscription gives them.
     kind : type
-        MultiDOFJointTrajectory, JointState or Float64MultiArray.
+        MultiDOFJointTrajectory, JointTrajectory, JointState or Float64MultiArray.
 
     Raises
     ------
@@ -126,6 +126,16 @@ def _trajectory(walk: _Walk) -> None:
         walk.over(STAMP)
 
 
+def _joint_trajectory(walk: _Walk) -> None:
+    walk.over(STAMP)
+    walk.text()
+    walk.texts()
+    for _ in range(walk.count()):
+        for _ in range(4):
+            walk.numbers()
+        walk.over(STAMP)
+
+
 def _joint_state(walk: _Walk) -> None:
     walk.over(STAMP)
     walk.text()
@@ -143,4 +153,5 @@ def _array(walk: _Walk) -> None:
 
 
 _WALKS: dict[type, Callable[[_Walk], None]] = {
-    MultiDOFJointTrajectory: _trajectory, JointState: _joint_state, Float64MultiArray: _array}
+    MultiDOFJointTrajectory: _trajectory, JointTrajectory: _joint_trajectory,
+    JointState: _joint_state, Float64MultiArray: _array}

@@ -139,11 +139,16 @@ class ArmSensitivities(Sensitivities):
         As the model says, and as they would be if friction did not follow the loads that the
         effect adds.
         """
-        full, bare = [], []
+        full: list[Array] = []
+        bare: list[Array] = []
         for coefficient in effect.coefficients:
             step = coefficient.scale
             moved: Any = effect.at({**values, coefficient.name:
                                     values.get(coefficient.name, 0.0) + step})
+            if isinstance(moved, BodyEffect) and coefficient.name in moved.absent(state.robot):
+                for columns in (full, bare):
+                    columns.append(np.zeros_like(reference))
+                continue
             if values:
                 model = replace(self.model, effects=tuple(
                     moved if type(one) is effect else one for one in self.model.effects))

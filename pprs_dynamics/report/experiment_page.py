@@ -20,8 +20,10 @@ from typing import Any
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.experiments.next_experiment import Experiment
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.motion import PlatformMotion
-from pprs_dynamics.mechanism.robot import DRIVES
+from pprs_dynamics.mechanism.units import common_unit
+from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.report.comparison_figures import LEGEND, LINES, SECONDS, thinned
 from pprs_dynamics.report.experiment_tables import (
     ACCURACY_HEADINGS,
@@ -33,19 +35,20 @@ from pprs_dynamics.report.experiment_tables import (
 from pprs_dynamics.report.page import Page, plotly_objects
 from pprs_dynamics.report.robot_view import animate_robot
 
+Motion = PlatformMotion | JointMotion
 POINTS = 500  # pairs of extremes shown of a curve
 
 
-def experiment_page(experiment: Experiment, motion: PlatformMotion, command: str) -> Page:
+def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Page:
     """Return the page, most important first.
 
     Parameters
     ----------
     experiment : Experiment
-    motion : PlatformMotion
+    motion : PlatformMotion or JointMotion
         As it is written.
     command : str
-        That plays it.
+        That plays it; empty where there is none.
     """
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
@@ -54,12 +57,15 @@ def experiment_page(experiment: Experiment, motion: PlatformMotion, command: str
                    caption='What it would tell. Evidence is by how much the rival costs more in a '
                    'diagnosis of all recordings; the chance is that of the rival falling so far '
                    'behind that it is told as a rival no more.')
-    page.command('Play it, and record', command)
-    page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
-                over_time=True)
-    with page.fold('The robot in motion'):
-        page.figure(animate_robot(experiment.model, motion, 'The designed motion'),
-                    'The designed motion; it plays on request.')
+    if command:
+        page.command('Play it, and record', command)
+    if isinstance(motion, PlatformMotion):
+        assert isinstance(experiment.model, DriveModel)
+        page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
+                    over_time=True)
+        with page.fold('The robot in motion'):
+            page.figure(animate_robot(experiment.model, motion, 'The designed motion'),
+                        'The designed motion; it plays on request.')
     with page.fold('Every drive'):
         page.figure(_drives(experiment, motion),
                     'Position, velocity, acceleration and effort of every drive.', over_time=True)
@@ -82,17 +88,19 @@ def _platform(motion: PlatformMotion) -> Any:
         ('angle [rad]', (('tilt', motion.tilt), ('turn', motion.turn)))))
 
 
-def _drives(experiment: Experiment, motion: PlatformMotion) -> Any:
+def _drives(experiment: Experiment, motion: Motion) -> Any:
     assert motion.time is not None
     forces = experiment.forces(motion.time)
     state = forces.mechanism
     return _stacked(motion, tuple(
-        (label, tuple(zip(DRIVES, values.T, strict=True))) for label, values in (
-            ('position [m]', state.position), ('velocity [m/s]', state.velocity),
-            ('acceleration [m/s²]', state.acceleration), ('effort [N]', forces.total))))
+        (f'{name} [{common_unit(experiment.model.units, unit).replace("^2", "²")}]',
+         tuple(zip(experiment.model.drives, values.T, strict=True)))
+        for name, unit, values in (
+            ('position', 'm', state.position), ('velocity', 'm/s', state.velocity),
+            ('acceleration', 'm/s^2', state.acceleration), ('effort', 'N', forces.total))))
 
 
-def _stacked(motion: PlatformMotion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...]], ...],
+def _stacked(motion: Motion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...]], ...],
              ) -> Any:
     go = plotly_objects()
     from plotly.subplots import make_subplots

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,9 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 
 # Stamps to see before their step is known; more than a late first message or two.
@@ -41,8 +43,9 @@ class Compared(NamedTuple):
     ----------
     time : (n,) array
         Stamps as they came [s].
-    model, residual : (n, 6) arrays
-        The model's effort, and measured minus model [N]; the latter NaN where not measured.
+    model, residual : (n, D) arrays
+        The model's effort, and measured minus model [N, N m]; the latter NaN where not measured,
+        and where a joint of an arm stands.
     """
 
     time: Array
@@ -58,14 +61,14 @@ class LiveComparison:
 
     Parameters
     ----------
-    model : DriveModel
+    model : DriveModel or ArmModel
     window : float
         Duration of the smoothing window [s].
     span : float
         Duration over which the running error is taken [s].
     """
 
-    def __init__(self, model: DriveModel, window: float, span: float) -> None:
+    def __init__(self, model: DriveModel | ArmModel, window: float, span: float) -> None:
         self._window, self._span = window, span
         self._stamps: list[float] = []
         self._live: LiveReconstruction | None = None
@@ -73,7 +76,7 @@ class LiveComparison:
         self._recent: deque[tuple[float, Array]] = deque()
         self.use_model(model)
 
-    def use_model(self, model: DriveModel) -> None:
+    def use_model(self, model: DriveModel | ArmModel) -> None:
         """Compare with another model from the next sample on; the running error starts afresh."""
         self._model = model
         self._state = model.initial_state()
@@ -94,11 +97,11 @@ class LiveComparison:
         return 0 if self._live is None else self._live.gaps
 
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
-        """Take one sample, drives in order; effort NaN means no measurement."""
+        """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
         if self._live is None:
             self._learn(time)
         if self._live is not None:
-            sample = self._live.push(time, position, effort)
+            sample = self._live.push(time, position, np.asarray(effort) / self._model.amperes)
             if sample is not None:
                 self._waiting.append(sample)
 
@@ -128,6 +131,10 @@ class LiveComparison:
         time = np.array([sample.time for sample in samples])
         model = np.concatenate(model_effort)
         residual = np.stack([sample.effort for sample in samples]) - model
+        if self._model.rest_speed:
+            # Where a joint stands, its gear holds any torque within its static friction.
+            moving = np.abs([sample.velocity for sample in samples]) >= self._model.rest_speed
+            residual = np.where(moving, residual, np.nan)
         for moment, error in zip(time, residual, strict=True):
             self._recent.append((moment, error))
         while self._recent and self._recent[0][0] < time[-1] - self._span:
@@ -135,13 +142,14 @@ class LiveComparison:
         return Compared(time, model, residual)
 
     def running_error(self) -> Array:
-        """Return the root of the mean squared residual of the last span, (6,); NaN: none."""
+        """Return the root of the mean squared residual of the last span, (D,); NaN: none."""
+        none = np.full(len(self._model.drives), np.nan)
         if not self._recent:
-            return np.full(6, np.nan)
+            return none
         squares = np.stack([error for _, error in self._recent]) ** 2
         known = np.isfinite(squares)
         total, count = np.where(known, squares, 0.0).sum(axis=0), known.sum(axis=0)
-        rms: Array = np.sqrt(np.divide(total, count, out=np.full(6, np.nan), where=count > 0))
+        rms: Array = np.sqrt(np.divide(total, count, out=none, where=count > 0))
         return rms
 
     def _learn(self, time: float) -> None:
@@ -155,12 +163,21 @@ class LiveComparison:
         self._live = LiveReconstruction(LocalPolynomial(samples, step))
 
     def _forces(self, samples: list[LiveSample]) -> Array:
-        found = solve_forward_motion(
-            self._model.robot.geometry,
-            np.stack([sample.position for sample in samples]) - self._model.position_error,
+        model: Any = self._model
+        motion = self._followed(
+            np.stack([sample.position for sample in samples]) - model.position_error,
             np.stack([sample.velocity for sample in samples]),
-            np.stack([sample.acceleration for sample in samples]), self._seed)
+            np.stack([sample.acceleration for sample in samples]))
+        forces = model.drive_forces(
+            motion.with_time([sample.time for sample in samples]), self._state)
+        total: Array = model.measured(forces, self._state).total
+        return total
+
+    def _followed(self, position: Array, velocity: Array, acceleration: Array) -> Any:
+        """Return what the drives move."""
+        if isinstance(self._model, ArmModel):
+            return JointMotion(position, velocity, acceleration)
+        found = solve_forward_motion(
+            self._model.robot.geometry, position, velocity, acceleration, self._seed)
         self._seed = found.motion[-1:]
-        motion = found.motion.with_time([sample.time for sample in samples])
-        forces = self._model.drive_forces(motion, self._state)
-        return self._model.measured(forces, self._state).total
+        return found.motion

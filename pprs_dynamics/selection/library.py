@@ -202,8 +202,9 @@ class Library:
                          for effect in felt for d in regression.drives
                          if design.acts_on(effect, d) for names in effect.variants]
         self.structure = [self.placement(term, names) for term in design.structure
-                          if any(np.any(rows) for rows in term.rows.values())
-                          for names in term.effect.variants]
+                          for names in term.effect.variants
+                          if any(np.any(rows[[term.names.index(name) for name in names]])
+                                 for rows in term.rows.values())]
 
     def placement(self, term: Term, names: tuple[str, ...]) -> Placement:
         """Return a term with the coefficients that are to be fitted."""

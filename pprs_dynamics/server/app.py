@@ -36,7 +36,9 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.joint_motion_files import write_joint_motion
 from pprs_dynamics.measurement.pose_files import write_poses
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.server.bodies import (
     BadRequestError,
     number_of,
@@ -236,12 +238,19 @@ class Api:
         return self.screen(body)
 
     def experiment_file(self, query: Any) -> Response:
-        """Answer the poses of the designed motion."""
-        found = self.hub.the_session.experiment
+        """Answer the poses, or the joints' positions, of the designed motion."""
+        session = self.hub.the_session
+        found = session.experiment
         if found is None:
             raise SessionError('no experiment is designed yet')
-        return self._download('next.csv', 'text/csv',
-                              lambda path: write_poses(path, found.motion))
+        motion: Any = found.motion
+
+        def write(path: Path) -> None:
+            if isinstance(session.model, ArmModel):
+                write_joint_motion(path, session.drives, motion)
+            else:
+                write_poses(path, motion)
+        return self._download('next.csv', 'text/csv', write)
 
     def model(self, query: Any) -> Response:
         """Answer the model file, with what is ticked where that is asked for."""

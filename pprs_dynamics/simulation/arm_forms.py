@@ -83,6 +83,15 @@ def _share(low: float, high: float) -> Callable[[np.random.Generator], float]:
     return lambda rng: float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
+def _slipping(position: Array, force: float, stroke: float) -> Array:
+    """Return the force of a spring that slips once it is stretched by a stroke (Jenkins)."""
+    found, stretched = np.empty_like(position), 0.0
+    for k, moved in enumerate(np.diff(position, prepend=position[0])):
+        stretched = min(max(stretched + moved, -stroke), stroke)
+        found[k] = force * stretched / stroke
+    return found
+
+
 SIZE = _share(0.03, 0.1)  # of the largest effort
 
 
@@ -110,6 +119,12 @@ FORMS: dict[str, JointForm] = {
         'dmu |tau|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'coefficient': 2 * SIZE(rng), 'reference': m.effort},
         lambda p, m: p['coefficient'] * np.cbrt(m.load ** 2 * p['reference']) * m.sign),
+    'hysteresis': JointForm(
+        'three springs that slip one after the other, F / 3 each',
+        lambda rng, m: {'force': SIZE(rng) * m.effort, 'stroke': 0.02 * float(
+            np.ptp(m.position))},
+        lambda p, m: sum((_slipping(m.position, p['force'] / 3, share * p['stroke'])
+                          for share in (0.2, 0.6, 1.0)), np.zeros_like(m.position))),
     'friction_drift': JointForm(
         'F exp(-t / T) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'time': 0.3 * float(m.time[-1])},
@@ -134,7 +149,8 @@ FORMS: dict[str, JointForm] = {
         lambda p, m: p['mass'] * m.acceleration),
 }
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
-OF_ARM = ('payload_mass', 'base_tilt', 'external_wrench', 'effort_gain')
+OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
+          'homing_error')
 NAMES = (*FORMS, *OF_ARM)
 
 

@@ -34,6 +34,7 @@ from pprs_dynamics.mechanism.joint_series import JointSeries
 from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, require_known, truth
 from pprs_dynamics.simulation.engine_model import load_engine
+from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 RATE = 100.0  # [Hz]
 HARMONICS = 8
@@ -104,9 +105,8 @@ class ArmEngine:
     def add_payload(self, model: ArmModel, mass: float, offset: Array) -> None:
         """Hang a point mass on the tool, `offset` from its origin in its axes [m]."""
         tree = model.arm.tree
-        frame = tree.model.frames[tree.tool]
+        frame, joint = tree.model.frames[tree.tool], tree.carrier
         at = frame.placement.rotation @ offset + frame.placement.translation
-        joint = tree.joints.index(tree.model.names[frame.parentJoint])
         parameters = model.arm.inertial[joint].copy()
         parameters[0] += mass
         parameters[1:4] += mass * at
@@ -114,6 +114,13 @@ class ArmEngine:
         parameters[4:] += mass * np.array([y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z,
                                            x * x + y * y])
         self._set_body(int(self.model.jnt_bodyid[self.joints[joint].id]), parameters)
+        self.engine.mj_setConst(self.model, self.data)
+
+    def add_to_link(self, model: ArmModel, joint: int, mass: float) -> None:
+        """Make what a joint moves up to the next denser by a mass [kg]."""
+        parameters = model.arm.inertial[joint]
+        self._set_body(int(self.model.jnt_bodyid[self.joints[joint].id]),
+                       parameters * (1 + mass / parameters[0]))
         self.engine.mj_setConst(self.model, self.data)
 
     def torques(self, motion: JointMotion, gravity: Array | None = None) -> Array:
@@ -205,12 +212,20 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         mass = scale * float(random.uniform(0.05, 0.12)) * float(model.arm.masses.sum())
         engine.add_payload(model, mass, np.array([0.0, 0.0, 0.05]))
         hidden.append(truth('payload_mass', None, {'mass': mass}, 'a point 5 cm before the tool'))
+    if 'link_mass' in chosen:
+        # What turns about an upright axis shows in no weight, and the last link is the payload's.
+        links = [j for j in range(1, len(model.drives)) if j != model.arm.tree.carrier]
+        if not links:
+            raise HiddenEffectError('link_mass needs a link between the first and that of the tool')
+        joint = int(random.choice(links))
+        mass = scale * float(random.uniform(0.1, 0.3)) * float(model.arm.masses[joint])
+        engine.add_to_link(model, joint, mass)
+        hidden.append(truth('link_mass', None, {f'link_{joint + 1}': mass}, 'denser'))
     if 'base_tilt' in chosen:
         angle = scale * float(random.uniform(0.01, 0.03))
         gravity = 9.81 * np.array([0.0, np.sin(angle), -np.cos(angle)])
         hidden.append(truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x'))
-    bodies = plain if gravity is None and 'payload_mass' not in chosen else engine.torques(
-        motion, gravity)
+    bodies = engine.torques(motion, gravity) if hidden else plain
     if progress is not None:
         progress(0.8)
     efforts = bodies + _own_friction(model, motion)
@@ -228,8 +243,20 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         gain = scale * float(random.uniform(0.04, 0.1))
         efforts[:, joint] *= 1 + gain
         hidden.append(truth('effort_gain', [model.drives[joint]], {'gain': gain}, '1 + gain'))
+    if 'time_delay' in chosen:
+        assert motion.time is not None
+        delay = scale * float(random.uniform(0.008, 0.03))
+        efforts = np.stack([np.interp(motion.time - delay, motion.time, column)
+                            for column in efforts.T], axis=1)
+        hidden.append(truth('time_delay', list(model.drives), {'delay': delay}, 'all efforts late'))
+    shift = np.zeros(len(largest))
+    if 'homing_error' in chosen:
+        joint = int(random.integers(1, len(model.drives)))
+        shift[joint] = scale * float(random.uniform(0.01, 0.03))
+        hidden.append(truth('homing_error', [model.drives[joint]], {
+            model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    position = motion.position + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
+    position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden))
 

@@ -27,7 +27,9 @@ from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.experiments.next_experiment import next_experiment
 from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.mechanism.motion import PlatformMotion
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 
@@ -43,11 +45,11 @@ class DesignedMotion:
     ----------
     promise : dict
         What `pprs next-experiment --json` says of it.
-    motion : PlatformMotion
+    motion : PlatformMotion or JointMotion
     """
 
     promise: dict[str, Any]
-    motion: PlatformMotion
+    motion: PlatformMotion | JointMotion
 
 
 def diagnosed(model: ForceModel, recordings: Sequence[Recording], progress: Progress) -> Diagnosis:
@@ -62,8 +64,8 @@ def judged(model: ForceModel, request: EffectRequest, recordings: Sequence[Recor
     return adopt(model, request, recordings, validation, force, progress, diagnosis)
 
 
-def designed(model: DriveModel, recordings: Sequence[Recording], duration: float, seed: int,
-             progress: Progress) -> DesignedMotion:
+def designed(model: DriveModel | ArmModel, recordings: Sequence[Recording], duration: float,
+             seed: int, progress: Progress) -> DesignedMotion:
     """Return the motion of `pprs next-experiment`."""
     found = next_experiment(model, recordings, duration=duration, seed=seed, progress=progress)
     count = int(found.duration * RATE + 1e-9) + 1

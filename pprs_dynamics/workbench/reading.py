@@ -24,7 +24,7 @@ from pathlib import Path
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.conventions import find_mistakes
 from pprs_dynamics.measurement.readings import POSITION_UNIT
-from pprs_dynamics.measurement.recording import Recording, read_recording
+from pprs_dynamics.measurement.recording import Recording, read_for
 from pprs_dynamics.measurement.repeats import find_repeat
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
@@ -87,7 +87,7 @@ class Files:
 
 def read(path: str | PathLike[str], model: ForceModel, topic: str | None = None) -> Recording:
     """Read a recording of a model's drives; currents become efforts by their gains."""
-    return read_recording(path, model.drives, topic, None, model.gain, model.efforts_in_amperes)
+    return read_for(model, path, topic)
 
 
 def with_mistakes(model: ForceModel, recording: Recording) -> Recording:

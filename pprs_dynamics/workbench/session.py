@@ -28,6 +28,7 @@ from pprs_dynamics.adoption.request import EffectRequest
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.model.ledger import Step, read_steps, without_last_step
@@ -45,6 +46,7 @@ from pprs_dynamics.workbench.shown import (
     finite,
     names_of,
     recordings_to_json,
+    units_to_json,
 )
 from pprs_dynamics.workbench.tick_board import TickBoard
 from pprs_dynamics.workbench.what_if import WhatIf
@@ -196,7 +198,7 @@ class Session(TickBoard):
                 if what_if is self.what_if:
                     self.diagnosis, self.noise_floors = found, found.noise_floors
             return found
-        return self._begin(Job('diagnose', '', work, self._job_changed))
+        return self._begin('diagnose', '', work)
 
     def adopt(self, effect: str, drives: Sequence[str] | None = None, force: bool = False,
               revision: int | None = None) -> Job[Adoption]:
@@ -224,7 +226,7 @@ class Session(TickBoard):
 
             def work(report: Callable[[float], None]) -> Adoption:
                 return self._adopted(what_if, request, force, report)
-            return self._begin(Job('adopt', effect, work, self._job_changed))
+            return self._begin('adopt', effect, work)
 
     def _adopted(self, what_if: WhatIf, request: EffectRequest, force: bool,
                  report: Callable[[float], None]) -> Adoption:
@@ -266,30 +268,26 @@ class Session(TickBoard):
             For a model of another mechanism.
         """
         model = self.model
-        if not isinstance(model, DriveModel):
-            raise SessionError(f'motions are designed for the 3-PPRS, not for {model.title}')
+        if not isinstance(model, (DriveModel, ArmModel)):
+            raise SessionError(f'no motions are designed for {model.title}')
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
             found: DesignedMotion = run_apart(designed, model, self.what_if.recordings, duration,
                                               seed, report=report)
             self.experiment = found
             return found
-        return self._begin(Job('experiment', '', work, self._job_changed))
+        return self._begin('experiment', '', work)
 
     def cancel(self, kind: str) -> None:
         """Call off work in the background: 'adopt', 'diagnose' or 'experiment'."""
         if kind in self.jobs:
             self.jobs[kind].cancel()
 
-    def _begin(self, job: Job[Any]) -> Job[Any]:
-        before = self.jobs.get(job.kind)
-        if before is not None:
-            before.cancel()
-        self.jobs[job.kind] = job
-        return job.start()
-
-    def _job_changed(self, job: Job[Any]) -> None:
-        self.tell()
+    def _begin(self, kind: str, of: str,
+               work: Callable[[Callable[[float], None]], Any]) -> Job[Any]:
+        self.cancel(kind)
+        self.jobs[kind] = Job(kind, of, work, lambda job: self.tell())
+        return self.jobs[kind].start()
 
     def undo(self, revision: int | None = None) -> Step:
         """Take the last step of the ledger back, and return it.
@@ -348,11 +346,11 @@ class Session(TickBoard):
                 'revision': self.revision, 'version': self.version, 'stage': shown.stage,
                 'is_settled': shown.is_settled,
                 'is_approximate': shown.is_approximate, 'departure': finite(shown.departure),
-                'notice': shown.notice, 'drives': list(self.drives),
+                'notice': shown.notice, 'drives': list(self.drives), **units_to_json(self.model),
                 'noise_is_guess': self.noise_floors is None,
                 'errors': {name: one.to_json() for name, one in self.errors().items()},
                 'overall': self.overall().to_json(),
-                'effects': [effect_to_json(shown, effect, self.drives, effect.name in called_for)
+                'effects': [effect_to_json(shown, effect, self.model, effect.name in called_for)
                             for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'steps': [step.to_json() for step in self.steps],

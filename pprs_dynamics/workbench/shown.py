@@ -26,6 +26,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.mechanism.units import DriveUnits, common_effort
+from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.selection.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.selection.estimates import Estimate
 from pprs_dynamics.workbench.what_if import Exact, Offer, Tick, WhatIf
@@ -138,9 +140,10 @@ class Shown:
             tick.effect.bends_columns for tick in self.ticks.values())
 
 
-def effect_to_json(shown: Shown, effect: type[CatalogueEffect], drives: tuple[str, ...],
+def effect_to_json(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
                    is_called_for: bool) -> dict[str, Any]:
     """Return all that is shown of one effect."""
+    card, drives = effect.card_in(model.kind), model.drives
     tick = shown.ticks.get(effect.name)
     offer = next((one for one in shown.offers if one.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None
@@ -151,13 +154,23 @@ def effect_to_json(shown: Shown, effect: type[CatalogueEffect], drives: tuple[st
         'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
         'evidence_is_pending': (shown.stage == LINEAR if tick else not shown.has_offers),
         'bends_columns': effect.bends_columns, 'is_called_for': is_called_for,
-        'equation': effect.card.equation, 'looks_like': effect.card.looks_like,
-        'causes': effect.card.causes, 'confirm': effect.card.confirm,
-        'parameters': _parameters(shown, effect, drives) if tick else []}
+        'equation': card.equation, 'looks_like': card.looks_like,
+        'causes': card.causes, 'confirm': card.confirm,
+        'parameters': _parameters(shown, effect, model) if tick else []}
 
 
-def _parameters(shown: Shown, effect: type[CatalogueEffect], drives: tuple[str, ...],
+def units_to_json(model: ForceModel) -> dict[str, Any]:
+    """Return the units of all drives together, and drive by drive."""
+    return {'unit': common_effort(model.units), 'units': {
+        drive: {'effort': unit.effort, 'position': unit.position, 'velocity': unit.of('m/s'),
+                'acceleration': unit.of('m/s^2').replace('^2', '²')}
+        for drive, unit in zip(model.drives, model.units, strict=True)}}
+
+
+def _parameters(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
                 ) -> list[dict[str, Any]]:
+    drives = model.drives
+    units = dict(zip(drives, model.units, strict=True))
     tick = shown.ticks[effect.name]
     chosen = {name if d is None else f'{drives[d]}.{name}' for d, name in tick.chosen}
     known = {parameter.name: parameter for parameter in effect.parameters}
@@ -167,7 +180,8 @@ def _parameters(shown: Shown, effect: type[CatalogueEffect], drives: tuple[str, 
         parameter = known[key.rpartition('.')[2]]
         rows.append({
             'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
-            'std': finite(one.std), 'unit': parameter.unit, 'description': parameter.description,
+            'std': finite(one.std), 'description': parameter.description,
+            'unit': units.get(key.partition('.')[0], DriveUnits()).of(parameter.unit),
             'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
             'is_chosen': key in chosen})

@@ -83,7 +83,7 @@ class Curves {
       axes: [{...axis, size: is_last ? 30 : 6,
               values: is_last ? (u, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`)
                 : (u, ticks) => ticks.map(() => '')},
-             {...axis, size: 62, values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} N`),
+             {...axis, size: 62, values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} ${unitOf(drive)}`),
               space: 22}],
       series: [{},
                {stroke: css('--before'), width: 1, points: {show: false}},

@@ -1,11 +1,14 @@
 /* Anything over anything: a scatter in which a region can be marked. */
 'use strict';
 
-const UNITS = {time: 's', position: 'm', velocity: 'm/s', acceleration: 'm/s²', load: 'N',
-               rod_angle: 'rad', platform_x: 'm', platform_y: 'm', platform_z: 'm',
-               platform_tilt: 'rad', platform_turn: 'rad', direction: '', measured: 'N',
-               'error before': 'N', 'error now': 'N'};
-const titled = (name) => `${name.replaceAll('_', ' ')}${UNITS[name] ? ` [${UNITS[name]}]` : ''}`;
+const UNITS = {time: 's', rod_angle: 'rad', platform_x: 'm', platform_y: 'm', platform_z: 'm',
+               platform_tilt: 'rad', platform_turn: 'rad', direction: ''};
+/* A variable with its unit, which may be that of a drive. */
+const titled = (name, drive) => {
+  const unit = UNITS[name] ?? unitOf(drive, ['position', 'velocity', 'acceleration'].includes(name)
+    ? name : 'effort');
+  return `${name.replaceAll('_', ' ')}${unit ? ` [${unit}]` : ''}`;
+};
 
 /* Round numbers for an axis. */
 const ticksOf = (low, high, most) => {
@@ -41,8 +44,9 @@ class Scatter {
     });
   }
 
-  use(names, x, y) {
+  use(names, x, y, drive) {
     this.names = names;
+    this.drive = drive;
     [this.x, this.y] = [x, y];
     this.region = null;
     this.limits = [x, y].map((values) => {
@@ -110,11 +114,11 @@ class Scatter {
       context.fillText(String(+t.toPrecision(4)), left - 5, py(t) + 4);
     }
     context.textAlign = 'center';
-    context.fillText(titled(this.names[0]), (left + right) / 2, bottom + 32);
+    context.fillText(titled(this.names[0], this.drive), (left + right) / 2, bottom + 32);
     context.save();
     context.translate(12, (top + bottom) / 2);
     context.rotate(-Math.PI / 2);
-    context.fillText(titled(this.names[1]), 0, 0);
+    context.fillText(titled(this.names[1], this.drive), 0, 0);
     context.restore();
     context.fillStyle = css('--now');
     context.globalAlpha = Math.max(0.12, Math.min(0.8, 1500 / this.x.length));

@@ -16,8 +16,11 @@ const digits = (value, std) => {
   const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(Math.abs(std)))));
   return value.toFixed(places);
 };
-const newtons = (value) => (value === null || value === undefined ? '–'
+const amount = (value) => (value === null || value === undefined ? '–'
   : value >= 10 ? value.toFixed(1) : value.toFixed(3));
+/* The unit of a drive's quantity, or of the efforts of all drives. */
+const unitOf = (drive, quantity = 'effort') => bench.state?.units?.[drive]?.[quantity]
+  ?? bench.state?.unit ?? 'N';
 const plain = (value) => (value === null || value === undefined ? '…'
   : Math.abs(value) < 9999.5 ? value.toFixed(0).replace('-', '−')
     : `${(value / 1000).toFixed(0).replace('-', '−')} k`);
@@ -204,8 +207,8 @@ const showVerdict = (state) => {
                  unknown: 'something no effect explains'};
   const running = Object.values(state.jobs).filter((job) => job.is_running);
   const line = make('span');
-  line.append('error ', make('b', `${newtons(before)} → ${newtons(now)} N`),
-              ` · noise ${newtons(noise)} N${state.noise_is_guess ? ' (first guess)' : ''}`);
+  line.append('error ', make('b', `${amount(before)} → ${amount(now)} ${unitOf()}`),
+              ` · noise ${amount(noise)} ${unitOf()}${state.noise_is_guess ? ' (first guess)' : ''}`);
   if (state.verdict) line.append(` · diagnosis: ${words[state.verdict]}`);
   const nodes = [line];
   for (const job of running) {
@@ -257,8 +260,8 @@ const showErrors = (state) => {
     box.querySelector('.fall').textContent = Math.abs(fall) < 0.5 ? '' : `${fall > 0 ? '+' : '−'}${
       Math.abs(fall).toFixed(0)} %`;
     const figures = box.querySelector('.figures');
-    figures.replaceChildren(`${newtons(one.before)} → `, make('span', newtons(one.now), 'now'),
-                            ` → noise ${newtons(one.noise)} N`);
+    figures.replaceChildren(`${amount(one.before)} → `, make('span', amount(one.now), 'now'),
+                            ` → noise ${amount(one.noise)} ${unitOf(name)}`);
     const canvas = box.querySelector('canvas');
     const scale = devicePixelRatio || 1;
     const width = canvas.clientWidth || 140;
@@ -275,8 +278,8 @@ const showErrors = (state) => {
       context.fillRect(Math.min(width * one.noise / most, width - 2), 0, 2, 22);
     }
     canvas.setAttribute('role', 'img');
-    canvas.setAttribute('aria-label', `${name}: ${newtons(one.before)} N before, ${
-      newtons(one.now)} N now, noise ${newtons(one.noise)} N`);
+    canvas.setAttribute('aria-label', `${name}: ${amount(one.before)} before, ${
+      amount(one.now)} now, noise ${amount(one.noise)} ${unitOf(name)}`);
   });
 };
 
@@ -512,13 +515,14 @@ const filter = () => {
 const showLedger = (state) => {
   const start = make('li');
   const first = state.steps[0];
-  start.append(make('b', 'model'), make('div', first ? `${newtons(first.error_before)} N` : ''));
+  start.append(make('b', 'model'),
+               make('div', first ? `${amount(first.error_before)} ${unitOf()}` : ''));
   $('ledger').replaceChildren(start, ...state.steps.map((step) => {
     const item = make('li');
     item.append(make('b', titleOf(step.effect)), step.drives ? ` on ${step.drives.join(', ')}` : '',
-                make('div', `${newtons(step.error_before)} → ${newtons(step.error_after)} N`),
-                make('div', `held out ${newtons(step.held_out_before)} → ${
-                  newtons(step.held_out_after)} N`, 'quiet'));
+                make('div', `${amount(step.error_before)} → ${amount(step.error_after)} ${unitOf()}`),
+                make('div', `held out ${amount(step.held_out_before)} → ${
+                  amount(step.held_out_after)} ${unitOf()}`, 'quiet'));
     item.title = `${step.date}, held out on ${step.held_out_on}${step.forced ? ', forced' : ''}`;
     return item;
   }));
@@ -530,8 +534,8 @@ const showRecordings = (state) => {
     const item = make('li');
     const button = make('button');
     button.type = 'button';
-    button.append(make('b', one.name), make('div', `${newtons(one.before)} → ${
-      newtons(one.now)} N`), make('div', `${(one.end - one.start).toFixed(1)} s`, 'quiet'));
+    button.append(make('b', one.name), make('div', `${amount(one.before)} → ${
+      amount(one.now)} ${unitOf()}`), make('div', `${(one.end - one.start).toFixed(1)} s`, 'quiet'));
     button.addEventListener('click', () => {
       open('curves');
       curves.zoom([one.start, one.end]);
@@ -691,7 +695,7 @@ const loadScatter = async () => {
   const {arrays} = await ask(`scatter?${new URLSearchParams({x, y, drive})}`);
   const {region} = scatter;
   const same = scatter.names[0] === x && scatter.names[1] === y;
-  scatter.use([x, y], arrays.x.values, arrays.y.values);
+  scatter.use([x, y], arrays.x.values, arrays.y.values, drive);
   if (same && mark && !mark.time) {
     scatter.region = region;
     scatter.draw();
@@ -705,7 +709,7 @@ const loadRobot = async () => {
     $('robot-time').max = arrays.time.values.length - 1;
     robot.use(arrays.time.values, arrays.joints.values, arrays.before.values, arrays.now.values,
               header.angles);
-    $('robot-most').textContent = `0 to ${newtons(robot.most)} N`;
+    $('robot-most').textContent = `0 to ${amount(robot.most)} ${unitOf()}`;
     robot.moved(robot.frame);
   } catch (error) {
     tell(error.message);
@@ -838,10 +842,10 @@ const showLive = async () => {
     return known.length ? Math.sqrt(known.reduce((a, v) => a + v * v, 0) / known.length) : null;
   };
   const running = found.age !== null && found.age < 2;
-  const monitor = found.monitor_error ? ` · the monitor says ${newtons(rms(found.monitor_error))} N`
-    : '';
+  const monitor = found.monitor_error
+    ? ` · the monitor says ${amount(rms(found.monitor_error))} ${unitOf()}` : '';
   $('live-state').textContent = running
-    ? `error of the last 2 s ${newtons(rms(found.error))} N with ${found.effects.length
+    ? `error of the last 2 s ${amount(rms(found.error))} ${unitOf()} with ${found.effects.length
       ? found.effects.map(titleOf).join(', ') : 'no added effect'}${monitor} · ${
       found.kept.toFixed(0)} s kept${found.trouble ? ` · ${found.trouble}` : ''}`
     : `Nothing comes in on joint_states${found.received ? ' any more' : ''}. ${found.trouble}`;
@@ -866,7 +870,7 @@ const showLive = async () => {
         padding: [8, 6, 0, 0], cursor: {show: false}, scales: {x: {time: false}},
         axes: [{...axis, size: 20, values: (u, ticks) => ticks.map((t) => `${t} s`)},
                {...axis, size: 62, space: 22,
-                values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} N`)}],
+                values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} ${unitOf(drive)}`)}],
         series: [{}, {stroke: css('--now'), width: 1, points: {show: false}}],
       }, [time, found.residual[d]], box);
       return {plot, reading};
@@ -874,7 +878,7 @@ const showLive = async () => {
   }
   livePlots.forEach(({plot, reading}, d) => {
     plot.setData([time, found.residual[d]]);
-    reading.textContent = `${newtons(found.error[d])} N`;
+    reading.textContent = `${amount(found.error[d])} ${unitOf(found.drives[d])}`;
   });
 };
 

@@ -1,0 +1,169 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How often `diagnose` is right about physics hidden in recordings of a simulated arm.
+
+    python benchmarks/arm_score.py --model base.yaml --seeds 2 --nothing 10 --table arm_score.md
+
+By the commands alone: `pprs simulate --model … --effect …`, then `pprs diagnose` of one recording.
+Every outcome is appended to FILE at once, and what is there is not run again. Each seed has a
+motion, an effect's drives and sizes, and noise of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+# The arrays are small: threads of the linear algebra would only wait for one another.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+from pprs_dynamics.commands.pprs import main as pprs
+from pprs_dynamics.simulation.arm_forms import NAMES
+
+OUTPUT = Path(__file__).resolve().parents[1] / 'output'
+Outcome = dict[str, Any]
+
+
+def outcomes(file: Path) -> list[Outcome]:
+    """Return what was run before."""
+    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def run_case(model: Path, effect: str, seed: int, duration: float) -> Outcome:
+    """Simulate and diagnose one recording; `effect` is empty for nothing."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+        run, truth, said = (str(Path(folder) / name) for name in (
+            'run.csv', 'truth.json', 'said.json'))
+        hidden = ['--effect', effect] if effect else []
+        status = pprs(['simulate', '--model', str(model), '--output', run, '--seed', str(seed),
+                       '--path-seed', str(seed), '--duration', str(duration), '--json', truth,
+                       *hidden])
+        begin = time.process_time()
+        status = status or pprs(['diagnose', run, '--model', str(model), '--json', said])
+        seconds = time.process_time() - begin
+        if status:
+            return {'effect': effect, 'seed': seed, 'failed': status}
+        found = json.loads(Path(said).read_text())
+        return {'effect': effect, 'seed': seed, 'seconds': seconds,
+                'truth': json.loads(Path(truth).read_text())['effects'],
+                'verdict': found['verdict'], 'sets': found['indistinguishable'],
+                'effects': [{key: one[key] for key in ('name', 'drives', 'parameters')}
+                            for one in found['effects']]}
+
+
+def judge(outcome: Outcome) -> dict[str, bool]:
+    """Return what is right about an outcome, as `score_table.judge` has it for the 3-PPRS."""
+    named = [one['name'] for one in outcome['effects']]
+    name = outcome['effect']
+    if not name:
+        return {'claimed': bool(named) or outcome['verdict'] != 'adequate'}
+    in_set = any(name in one for one in outcome['sets'])
+    first = named[:1] == [name]
+    told = next((one['drives'] for one in outcome['effects'] if one['name'] == name), None)
+    true = outcome['truth'][0]['drives']
+    # A payload that is not at the tool's origin has a first moment, too.
+    whole = {name, 'payload_moment'} if name == 'payload_mass' else {name}
+    judged = {'first_or_set': first or in_set, 'exact': first and set(named) <= whole,
+              'wrong_alone': bool(named) and name not in named and not in_set}
+    if told is not None and true is not None:
+        judged['drives'] = set(told) == set(true)
+    return judged
+
+
+def described(outcome: Outcome) -> str:
+    """Return what was hidden and what was said, in a line."""
+    if 'failed' in outcome:
+        return f'FAILED {outcome["effect"]} {outcome["seed"]}'
+    named = '; '.join(one['name'] + (f'({",".join(one["drives"])})' if one['drives'] else '')
+                      for one in outcome['effects']) or '-'
+    drives = outcome['truth'][0]['drives'] if outcome['truth'] else None
+    return (f'{outcome["effect"] or "nothing"} {outcome["seed"]} {drives or ""} -> '
+            f'{outcome["verdict"]}: {named} {outcome["sets"] or ""} {outcome["seconds"]:.0f} s')
+
+
+def table(found: Sequence[Outcome]) -> str:
+    """Return the table in Markdown, then each effect that was not found, or not alone."""
+    told = [(one, judge(one)) for one in found if 'failed' not in one]
+    lines = ['| figure | goal | found |', '|---|---|---|']
+    for text, goal, what in (
+            ('true effect first or in the named set', '≥ 98 %', 'first_or_set'),
+            ('exactly the true effect, nothing added', '', 'exact'),
+            ('a wrong effect alone', '≤ 1 %', 'wrong_alone'),
+            ('right joints', '≥ 95 %', 'drives'),
+            ('nothing missing: something claimed', '≤ 5 %', 'claimed')):
+        known = [judged[what] for _, judged in told if what in judged]
+        if known:
+            lines.append(f'| {text} | {goal} | {sum(known)} of {len(known)} |')
+    failed = len(found) - len(told)
+    if failed:
+        lines.append(f'| refused or failed | 0 | {failed} |')
+    lines += ['', '| hidden | on | said |', '|---|---|---|']
+    for one, judged in told:
+        if not judged.get('exact', not judged.get('claimed')):
+            drives = one['truth'][0]['drives'] if one['truth'] else None
+            said = ', '.join(named['name'] for named in one['effects']) or 'nothing'
+            lines.append(f'| {one["effect"] or "nothing"} | {", ".join(drives or ["the arm"])} | '
+                         f'{one["verdict"]}: {said} |')
+    return '\n'.join(lines) + '\n'
+
+
+def todo(seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
+    """Yield effects and seeds, every effect once before any twice."""
+    for seed in range(max(seeds, nothing)):
+        if seed < seeds:
+            yield from ((name, seed) for name in NAMES)
+        if seed < nothing:
+            yield '', seed
+
+
+def main() -> int:
+    """Run what is asked for, and print or write the table."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--model', type=Path, required=True, help='model file of an arm')
+    parser.add_argument('--seeds', type=int, default=2, help='per effect (default 2)')
+    parser.add_argument('--nothing', type=int, default=10, help='recordings without (default 10)')
+    parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
+    parser.add_argument('--file', type=Path, default=OUTPUT / 'arm_score.jsonl')
+    parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
+    options = parser.parse_args()
+    options.file.parent.mkdir(parents=True, exist_ok=True)
+    done = {(one['effect'], one['seed']) for one in outcomes(options.file)}
+    for effect, seed in todo(options.seeds, options.nothing):
+        if (effect, seed) in done:
+            continue
+        outcome = run_case(options.model, effect, seed, options.duration)
+        with options.file.open('a') as stream:
+            stream.write(json.dumps(outcome) + '\n')
+        print(described(outcome), flush=True)
+    text = table(outcomes(options.file))
+    if options.table:
+        options.table.write_text(text)
+    else:
+        print(text)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
