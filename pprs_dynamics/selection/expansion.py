@@ -44,6 +44,7 @@ from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.terms import PlacedEffect, Point
 from pprs_dynamics.selection.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.selection.decisions import Decisions
+from pprs_dynamics.selection.form import without_remainders
 from pprs_dynamics.selection.search import Search
 
 # What the exact model may differ from the linear one by, in whitened squares, and how often the
@@ -95,21 +96,18 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
-    first = search = Search(design, decisions,
-                            progress=lambda share: report(0.25 + 0.35 * share))
-    best = search.run()
-    for number in range(MOST_SEARCHES):
-        starts = _starts(search, best)
-        try:
-            around = linearised(search, starts[0], decisions)
-        except PprsError:
-            break  # values that no model may have: the linear form is all there is
-        if around is None:
-            break
-        start = 0.6 + 0.4 * number / MOST_SEARCHES
-        search = Search(around, decisions, first.regression.error_scale,
-                        _share_of(report, start, 0.4 / MOST_SEARCHES))
-        best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
+    first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
+    best = first.run()
+    found = _around_fitted(first, _starts(first, best), decisions, report)
+    bending = tuple(filter(_bends, best.candidates))
+    if bending and _stands_out(*found):
+        # What was found beside an effect that bends the columns may only make good that they were
+        # not bent: once more from that effect alone.
+        alone = first.rescanned(first.evaluate(bending))
+        starts = [first.at_noise_of(best, alone.candidates), best]
+        found = min(found, _around_fitted(first, starts, decisions, report),
+                    key=lambda one: without_remainders(*one)[0].total)
+    search, best = found
     # Rivals that bend no columns are judged where none are bent.
     for one in list(search.evaluated.values()) if search is not first else ():
         if (one.cost < best.cost + decisions.rival_margin and one.effects and not one.unknowns
@@ -119,17 +117,40 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     return Selection(first, search, best)
 
 
-def _starts(search: Search, best: CandidateSet) -> list[CandidateSet]:
-    """Return the sets around which to expand and from which to go on.
+def _around_fitted(search: Search, starts: Sequence[CandidateSet], decisions: Decisions,
+                   report: Callable[[float], None]) -> tuple[Search, CandidateSet]:
+    """Search again around the fitted model, until that is where columns were computed.
 
-    What was found beside an effect that bends the columns may only make good that they were not
-    bent: the first step leaves it out.
+    Each search goes on from all starts; the model is that of the first of them.
     """
-    if not search.is_beyond_point:
-        return [best]
-    bending = tuple(filter(_bends, best.candidates))
-    alone = search.rescanned(search.evaluate(bending))
-    return [search.at_noise_of(best, alone.candidates), best]
+    best, scale = starts[-1], search.regression.error_scale
+    for number in range(MOST_SEARCHES):
+        try:
+            around = linearised(search, starts[0], decisions)
+        except PprsError:
+            break  # values that no model may have: the linear form is all there is
+        if around is None:
+            break
+        search = Search(around, decisions, scale, _share_of(
+            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
+        best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
+        starts = _starts(search, best)
+    return search, best
+
+
+def _starts(search: Search, best: CandidateSet) -> list[CandidateSet]:
+    """Return what will be adopted of the best set, and the set."""
+    kept, _ = without_remainders(search, best)
+    return [best] if kept is best else [kept, best]
+
+
+def _stands_out(search: Search, best: CandidateSet) -> bool:
+    """Return whether lack of fit would leave a drive much more than noise."""
+    kept, _ = without_remainders(search, best)
+    left = np.sqrt(np.nanmean(np.square(linear_residual(search, kept)), axis=0))
+    ratio, regression = search.decisions.left_ratio, search.regression
+    return kept is not best and any(left[d] > ratio * regression.noise_floor(best.fit, d)
+                                    for d in regression.drives)
 
 
 def _bends(candidate: Candidate) -> bool:

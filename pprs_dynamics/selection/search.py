@@ -83,7 +83,7 @@ class Search(ScannedSets):
         """
         self.evaluate(())
         if starts:
-            self.refined(self.evaluate(starts[0]))
+            self.rescanned(self.evaluate(starts[0]))
         for start in starts[1:] or (() if starts else ((),)):
             self._descend(False, 0.0)
             self.refined(self.evaluate(start))

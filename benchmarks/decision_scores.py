@@ -1,0 +1,118 @@
+# Copyright 2026 The pprs_dynamics founders
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the score of `diagnose` owes to each number that was chosen: halved, and doubled.
+
+    python benchmarks/decision_scores.py --workers 2
+
+A result that one number makes or breaks would be tuned, not found. Outcomes are appended to a
+file as they come, and cases that are there are not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cases_on_dask import Outcome, add_options, engine, read_outcomes, run_missing
+from hidden_recordings import Case
+from score import OUTPUT, cases, diagnose_case, one_line
+
+from pprs_dynamics.diagnosis.diagnose import diagnose
+from pprs_dynamics.selection.decisions import DECISIONS, Decisions
+
+FACTORS = (0.5, 2.0)
+AS_IT_IS = ('', 1.0)
+SETS = 3  # of two and three effects, of a seed's
+EVERY = 2  # of the effects of the catalogue, every other
+# A case, the number that is changed, and by what.
+Changed = tuple[Case, str, float]
+
+
+def changes() -> list[tuple[str, float]]:
+    """Return each number with each factor, and nothing changed."""
+    return [AS_IT_IS, *((one.name, factor) for one in fields(Decisions) for factor in FACTORS)]
+
+
+def chosen_cases(first: int, seeds: int) -> list[Case]:
+    """Return cases of most kinds, few enough to be run with every change."""
+    found = cases(('nothing',), seeds, seeds, (), first) + cases(
+        ('unknown',), seeds, 0, (1.0,), first)
+    for seed in range(first, first + seeds):
+        found += cases(('effects',), 1, 0, (1.0,), seed)[seed % EVERY::EVERY]
+        found += cases(('pairs',), 1, 0, (), seed)[::2][:SETS]
+    return found
+
+
+def run_changed(changed: Changed, recordings: Path) -> Outcome:
+    """Return the outcome of a case with one number changed."""
+    case, number, factor = changed
+    decisions = DECISIONS if not number else replace(
+        DECISIONS, **{number: factor * getattr(DECISIONS, number)})
+    outcome = diagnose_case(case, partial(diagnose, decisions=decisions), recordings)
+    return {**outcome, 'number': number, 'factor': factor}
+
+
+def make_table(outcomes: Iterable[dict[str, Any]]) -> str:
+    """Return, for each number, what is right with it halved, as it is, and doubled."""
+    groups: dict[tuple[str, float], list[dict[str, Any]]] = {}
+    for one in outcomes:
+        if 'failed' not in one:
+            groups.setdefault((one['number'], one['factor']), []).append(one)
+    lines = ['| number | value | halved | doubled |', '|---|---|---|---|',
+             f'| as they are | | {_counts(groups.get(AS_IT_IS, []))} | |']
+    lines += [f'| {one.name.replace("_", " ")} | {getattr(DECISIONS, one.name):g} | '
+              + ' | '.join(_counts(groups.get((one.name, factor), [])) for factor in FACTORS)
+              + ' |' for one in fields(Decisions)]
+    return '\n'.join(lines) + '\n'
+
+
+def _counts(outcomes: Sequence[dict[str, Any]]) -> str:
+    shares = []
+    for rows in (('effects',), ('pairs',), ('unknown',), ('nothing',)):
+        own = [one for one in outcomes if one['row'] in rows]
+        shares.append(f'{sum(bool(one["judged"]["good"]) for one in own)}/{len(own)}')
+    return ', '.join(shares)
+
+
+def main() -> int:
+    """Run what is missing, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--seeds', type=int, default=1)
+    parser.add_argument('--first', type=int, default=60)
+    parser.add_argument('--file', type=Path, default=OUTPUT / 'decisions.jsonl')
+    parser.add_argument('--recordings', type=Path, default=OUTPUT / 'recordings')
+    add_options(parser)
+    options = parser.parse_args()
+    todo = {f'{case.name} {number} {factor}': (case, number, factor)
+            for case in chosen_cases(options.first, options.seeds)
+            for number, factor in changes()}
+    with engine(options) as each:
+        run_missing(each, partial(run_changed, recordings=options.recordings), todo, options.file,
+                    lambda one: f'{one["name"]} {one["number"]} {one["factor"]}',
+                    lambda one: f'{one["number"]} x {one["factor"]:g}: {one_line(one)}')
+    print('Right of effects, of sets of two and three, of what is in no catalogue, and of nothing '
+          'missing:\n')
+    print(make_table(read_outcomes(options.file)))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
