@@ -98,14 +98,9 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
     first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
     best = first.run()
-    found = _around_fitted(first, _starts(first, best), decisions, report)
-    bending = tuple(filter(_bends, best.candidates))
-    if bending and _stands_out(*found):
-        # What was found beside an effect that bends the columns may only make good that they were
-        # not bent: once more from that effect alone.
-        alone = first.rescanned(first.evaluate(bending))
-        starts = [first.at_noise_of(best, alone.candidates), best]
-        found = min(found, _around_fitted(first, starts, decisions, report),
+    found = _around_fitted(first, best, decisions, report, _bending_alone)
+    if _stands_out(*found):
+        found = min(found, _around_fitted(first, best, decisions, report, _as_it_is),
                     key=lambda one: without_remainders(*one)[0].total)
     search, best = found
     # Rivals that bend no columns are judged where none are bent.
@@ -117,31 +112,52 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     return Selection(first, search, best)
 
 
-def _around_fitted(search: Search, starts: Sequence[CandidateSet], decisions: Decisions,
-                   report: Callable[[float], None]) -> tuple[Search, CandidateSet]:
+def _around_fitted(
+    search: Search, best: CandidateSet, decisions: Decisions, report: Callable[[float], None],
+    first_step: Callable[[Search, CandidateSet], CandidateSet],
+) -> tuple[Search, CandidateSet]:
     """Search again around the fitted model, until that is where columns were computed.
 
-    Each search goes on from all starts; the model is that of the first of them.
+    Parameters
+    ----------
+    search : Search
+    best : CandidateSet
+        Of the search.
+    decisions : Decisions
+    report : callable
+    first_step : callable
+        Returns the set around which to expand where effects bend the columns that did not yet.
     """
-    best, scale = starts[-1], search.regression.error_scale
+    scale = search.regression.error_scale
     for number in range(MOST_SEARCHES):
+        kept, _ = without_remainders(search, best)
+        if search.is_beyond_point:
+            kept = first_step(search, best)
         try:
-            around = linearised(search, starts[0], decisions)
+            around = linearised(search, kept, decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
         if around is None:
             break
+        starts = [kept] if kept is best else [kept, best]
         search = Search(around, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
         best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
-        starts = _starts(search, best)
     return search, best
 
 
-def _starts(search: Search, best: CandidateSet) -> list[CandidateSet]:
-    """Return what will be adopted of the best set, and the set."""
-    kept, _ = without_remainders(search, best)
-    return [best] if kept is best else [kept, best]
+def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:
+    """Return the effects of a set that bend the columns, at its noise.
+
+    What was found beside them may only make good that columns were not bent.
+    """
+    alone = search.rescanned(search.evaluate(tuple(filter(_bends, best.candidates))))
+    return search.at_noise_of(best, alone.candidates)
+
+
+def _as_it_is(search: Search, best: CandidateSet) -> CandidateSet:
+    """Return the whole set: without what else is strong, effects that bend are fitted wrong."""
+    return best
 
 
 def _stands_out(search: Search, best: CandidateSet) -> bool:
