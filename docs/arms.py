@@ -55,7 +55,7 @@ GATE = 'free_40s_12harm'
 MASS = 2.805  # [kg], as weighed
 GOALS = (2.8, 3.9, 1.7, 0.42, 0.56, 0.40)  # [N m rms], of the base model on a run not fitted
 PITCH = np.pi / 101  # [rad]: a harmonic drive ripples twice a turn of its motor
-SEEDS, NOTHING, DURATION = 5, 20, 30.0  # of the score on simulated arms
+SEEDS, NOTHING, DURATION = 3, 10, 30.0  # of the score on simulated arms
 MODEL = '''/**:
   ros__parameters:
     arm:
