@@ -137,6 +137,18 @@ def todo(seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
             yield '', seed
 
 
+def run(model: Path, seeds: int, nothing: int, duration: float, file: Path) -> None:
+    """Run the cases that are not in a file of outcomes yet; append and print theirs."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    done = {(one['effect'], one['seed']) for one in outcomes(file)}
+    for effect, seed in todo(seeds, nothing):
+        if (effect, seed) not in done:
+            outcome = run_case(model, effect, seed, duration)
+            with file.open('a') as stream:
+                stream.write(json.dumps(outcome) + '\n')
+            print(described(outcome), flush=True)
+
+
 def main() -> int:
     """Run what is asked for, and print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__,
@@ -148,15 +160,7 @@ def main() -> int:
     parser.add_argument('--file', type=Path, default=OUTPUT / 'arm_score.jsonl')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
     options = parser.parse_args()
-    options.file.parent.mkdir(parents=True, exist_ok=True)
-    done = {(one['effect'], one['seed']) for one in outcomes(options.file)}
-    for effect, seed in todo(options.seeds, options.nothing):
-        if (effect, seed) in done:
-            continue
-        outcome = run_case(options.model, effect, seed, options.duration)
-        with options.file.open('a') as stream:
-            stream.write(json.dumps(outcome) + '\n')
-        print(described(outcome), flush=True)
+    run(options.model, options.seeds, options.nothing, options.duration, options.file)
     text = table(outcomes(options.file))
     if options.table:
         options.table.write_text(text)

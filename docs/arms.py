@@ -55,6 +55,7 @@ GATE = 'free_40s_12harm'
 MASS = 2.805  # [kg], as weighed
 GOALS = (2.8, 3.9, 1.7, 0.42, 0.56, 0.40)  # [N m rms], of the base model on a run not fitted
 PITCH = np.pi / 101  # [rad]: a harmonic drive ripples twice a turn of its motor
+SEEDS, NOTHING, DURATION = 3, 10, 30.0  # of the score on simulated arms
 MODEL = '''/**:
   ros__parameters:
     arm:
@@ -276,7 +277,14 @@ def tell(bench: Bench) -> dict[str, str]:
         ['50 s, six joints, processor time', '≤ 10 s', f'{seconds[0]:.0f} to {seconds[-1]:.0f} s'],
         ['one sample with friction / bare `pin.rnea`', '≤ 1.5', f'{whole / rnea:.2f}'],
     ]
+    sys.path.insert(0, str(DOCS.parent / 'benchmarks'))
+    import arm_score
+
+    if not bench.as_far:
+        arm_score.run(bench.folder / 'base.yaml', SEEDS, NOTHING, DURATION,
+                      bench.folder / 'score.jsonl')
     return {
+        'SCORE': arm_score.table(arm_score.outcomes(bench.folder / 'score.jsonl')).rstrip(),
         'MODEL': MODEL.rstrip(), 'PROOF': table(('figure', 'goal', 'found'), proof),
         'ERRORS': table(('joint', 'URDF', 'fitted to', 'not fitted to', 'goal'), errors),
         'LOAD': bench.said('load').split('\n\n')[0].rstrip(),

@@ -24,6 +24,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import made_up_arm as arm
 import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
@@ -312,3 +313,21 @@ def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> N
     assert said.endswith("['payload_mass']\n[]\n")
     costs = names['costs']
     assert costs[0] > costs[4] < costs[-1]
+
+
+def test_an_arm_is_shown_in_its_own_words_and_units(tmp_path: Path) -> None:
+    model = arm.real_arm(tmp_path)
+    real = arm.real_arm(tmp_path, **{'friction.viscous': (14.0, 5.0, 20.0)})
+    session = Session(model, {'run': arm.record(real, arm.motion(10.0))})
+    session.tick('viscous_friction', ['turn'])
+    session.settle()
+    state = session.to_json()
+    assert state['unit'] == 'N or N m'
+    assert state['units']['turn'] == {'effort': 'N m', 'position': 'rad', 'velocity': 'rad/s',
+                                      'acceleration': 'rad/s²'}
+    assert state['units']['reach']['position'] == 'm'
+    effects = {one['name']: one for one in state['effects']}
+    assert effects['payload_mass']['equation'].startswith('tau')
+    shown, = effects['viscous_friction']['parameters']
+    assert (shown['key'], shown['unit']) == ('turn.coefficient', 'N m s/rad')
+    assert shown['value'] == pytest.approx(6.0, rel=0.05)

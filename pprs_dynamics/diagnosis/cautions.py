@@ -113,10 +113,11 @@ def _unexcited(search: Search, best: CandidateSet) -> list[str]:
         own = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])
         sizes = np.diag(own) * scales ** 2
-        if np.any(sizes < UNEXCITED):
-            names = [c.name for c, size in zip(term.effect.coefficients, sizes, strict=True)
-                     if size < UNEXCITED]
-            weak.append(term.effect.name if len(names) == len(sizes)
+        present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)
+                   if c.name not in search.design.absent(term.effect)}
+        names = [name for name, size in present.items() if size < UNEXCITED]
+        if names:
+            weak.append(term.effect.name if len(names) == len(present)
                         else f'{term.effect.name} ({", ".join(names)})')
     if not weak:
         return []

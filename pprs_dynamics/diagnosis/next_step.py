@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 from pprs_dynamics.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.diagnosis.quantities import listed
-from pprs_dynamics.effects.effect import ARM
 
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 
@@ -70,10 +69,6 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Look at that place on the machine, and record the motion again: what comes back '
                 'is the machine. Then diagnose both recordings', repeat)
     if diagnosis.verdict == 'ambiguous':
-        if diagnosis.model.kind == ARM:
-            return ('Record another motion, which may tell the candidates apart; this designs one '
-                    'that excites all joints', files.command(
-                        'next-experiment', '--purpose', 'commission', '--output', 'next.csv'))
         return ('Record a motion that tells the candidates apart; this designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if doubted := [one.name for one in diagnosis.effects if not one.is_confirmed]:

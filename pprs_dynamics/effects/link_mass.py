@@ -64,8 +64,9 @@ class LinkMass(BodyEffect):
             inertial[k] *= 1 + self.values[parameter.name] / inertial[k, 0]
         return replace(robot, inertial=inertial)
 
-    def absent(self, robot: Arm) -> frozenset[str]:
+    @classmethod
+    def absent(cls, robot: Arm) -> frozenset[str]:
         """Return the links that the arm does not have, and the one that carries the tool."""
         last = robot.tree.carrier
-        return frozenset(parameter.name for k, parameter in enumerate(self.linear)
+        return frozenset(parameter.name for k, parameter in enumerate(cls.linear)
                          if k >= len(robot.inertial) or k == last)

@@ -65,7 +65,8 @@ class BodyEffect(StructureEffect):
         """Return the robot, a `Robot` or an `Arm`, with the effect; by default as it was."""
         return robot
 
-    def absent(self, robot: Any) -> frozenset[str]:
+    @classmethod
+    def absent(cls, robot: Any) -> frozenset[str]:
         """Return the coefficients that a robot has no body for; by default none."""
         return frozenset()
 

@@ -186,8 +186,9 @@ def _excitation(search: Search, nothing: CandidateSet) -> Question:
     for term in search.design.structure:
         block = regression.block(term.rows)
         gain = np.diag(regression.own_information(nothing.fit, block))
-        found = FittedTerm.at_scale(term.effect, None, {})
-        if np.any(gain * found.scales ** 2 < UNEXCITED):
+        found = FittedTerm.at_scale(term.effect, None, {}, search.design.absent(term.effect))
+        here = [term.names.index(name) for name in found.names]
+        if np.any(gain[here] * found.scales ** 2 < UNEXCITED):
             weak.append(found)
     plan = ColumnPlan.of_design(search.design, weak)
     subjects = subjects_of(plan, search.library.prices)

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,11 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import EffectError, PprsError
 from pprs_dynamics.mechanism.units import common_effort
+from pprs_dynamics.model.keys import is_arm
 from pprs_dynamics.model.preparation import prepare
 from pprs_dynamics.nodes import conversions
 from pprs_dynamics.nodes.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.nodes.parameters import NodeParameter, declare_own
+from pprs_dynamics.nodes.parameters import NodeParameter, declare_own, overrides
 from pprs_dynamics.nodes.qos import EVERY_MESSAGE
 from pprs_dynamics.nodes.rejection import CODES, Rejection
 from pprs_dynamics.nodes.status import StatusReporter
@@ -42,13 +44,20 @@ PARAMETERS = (
 )
 
 
+# Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
+ARM_WINDOW = 0.25  # [s]
+
+
 class MonitorNode(ExplainsRefusals):
     """Publishes what the model says at every measured stamp, and how wrong it is."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
-        own = declare_own(self, PARAMETERS)
-        self._settings = ModelParameters(self, PARAMETERS, self._use)
+        parameters = PARAMETERS
+        if is_arm(overrides(self)):
+            parameters = (replace(PARAMETERS[0], default=ARM_WINDOW), *PARAMETERS[1:])
+        own = declare_own(self, parameters)
+        self._settings = ModelParameters(self, parameters, self._use)
         prepare(self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])

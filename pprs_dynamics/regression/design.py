@@ -41,9 +41,10 @@ from pprs_dynamics.effects.drive_effect import (
     MeasurementEffect,
 )
 from pprs_dynamics.effects.effect import CatalogueEffect
-from pprs_dynamics.effects.structure_effect import StructureEffect
+from pprs_dynamics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.measurement.reconstruction import Reconstruction, reconstruct, with_zeros
 from pprs_dynamics.measurement.recording import Recording
+from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.force_model import ForceModel
 from pprs_dynamics.regression.base_columns import (
     BaseColumn,
@@ -229,6 +230,12 @@ class Design:
         return (issubclass(effect, DriveEffect) and self.given.offers(effect)
                 and not (isinstance(present, DriveEffect) and self.drives[drive] in present.drives)
                 and (not effect.is_friction or self.moves(drive)))
+
+    def absent(self, effect: type[CatalogueEffect]) -> frozenset[str]:
+        """Return the coefficients of an effect that the model has no body for."""
+        if isinstance(self.model, ArmModel) and issubclass(effect, BodyEffect):
+            return effect.absent(self.model.arm)
+        return frozenset()
 
     def drive_rows(self, effect: type[DriveEffect], drive: int,
                    shape: Mapping[str, float]) -> Array:

@@ -45,11 +45,11 @@ changes how others show; with it added or taken away, the figures are only nearl
 <div class="effects"><table><thead><tr><th scope="col">effect</th>
 <th scope="col">evidence at this noise</th></tr></thead><tbody></tbody></table></div></div>
 <div><p role="status"></p>
-<div class="scroll"><table class="errors"><caption><span>Error, rms [N], as given (grey) and with
+<div class="scroll"><table class="errors"><caption><span>Error, rms [UNIT], as given (grey) and with
 the effects ticked (blue); dotted: the noise.</span></caption><thead><tr>{_HEADINGS}</tr></thead>
 <tbody></tbody></table></div>
-<p class="note">Error over time [s, N]; dotted: two standard deviations of the noise. Drag to zoom,
-on all drives at once; double-click to return.</p><div class="charts"></div></div></div></div>
+<p class="note">Error over time [s, UNIT]; dotted: two standard deviations of the noise. Drag to
+zoom, on all drives at once; double-click to return.</p><div class="charts"></div></div></div></div>
 '''
 
 
@@ -64,7 +64,7 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
         Of the model as given.
     """
     with page.fold('What if: tick effects, and see what would be left'):
-        page.interactive(_ELEMENTS, 'what-if-data', json.dumps({
+        page.interactive(_ELEMENTS.replace('UNIT', residuals.unit), 'what-if-data', json.dumps({
             'effects': [{'name': one.name, 'isApproximate': one.is_approximate, 'placements': [
                 _placement(placement) for placement in one.placements]} for one in system.effects],
             'always': system.always, 'limited': system.limited,

@@ -339,17 +339,15 @@ class Session(TickBoard):
     def to_json(self) -> dict[str, Any]:
         """Return all that one screen shows, but for the curves."""
         with self._lock:
-            shown, diagnosis = self.shown, self.diagnosis
+            shown, diagnosis, adoption = self.shown, self.diagnosis, self.last_adoption
             called_for = {one.name for one in diagnosis.effects} if diagnosis else set()
-            adoption = self.last_adoption
             return {
                 'revision': self.revision, 'version': self.version, 'stage': shown.stage,
-                'is_settled': shown.is_settled,
-                'is_approximate': shown.is_approximate, 'departure': finite(shown.departure),
-                'notice': shown.notice, 'drives': list(self.drives), **units_to_json(self.model),
-                'noise_is_guess': self.noise_floors is None,
+                'is_settled': shown.is_settled, 'is_approximate': shown.is_approximate,
+                'departure': finite(shown.departure), 'notice': shown.notice,
+                'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
                 'errors': {name: one.to_json() for name, one in self.errors().items()},
-                'overall': self.overall().to_json(),
+                'overall': self.overall().to_json(), **units_to_json(self.model),
                 'effects': [effect_to_json(shown, effect, self.model, effect.name in called_for)
                             for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
