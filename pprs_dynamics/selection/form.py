@@ -26,8 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.selection.allowance import share_of_allowance
-from pprs_dynamics.selection.candidates import Candidate, CandidateSet
+from pprs_dynamics.selection.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.selection.search import Search
 
 
@@ -62,7 +63,8 @@ def without_remainders(search: Search, best: CandidateSet,
         without = {candidate: search.evaluate(
             tuple(c for c in kept.candidates if c is not candidate), kept) for candidate in small}
         without = {candidate: found for candidate, found in without.items()
-                   if _over_noise(search, best, found) <= search.decisions.left_ratio}
+                   if _is_of_loads(kept, candidate)
+                   or _over_noise(search, best, found) <= search.decisions.left_ratio}
         if not without:
             break
         least = min(without, key=lambda candidate: without[candidate].total)
@@ -75,6 +77,17 @@ def without_remainders(search: Search, best: CandidateSet,
         kept = better
     return kept, tuple(one for one in remainders if one.candidate.name not in {
         candidate.name for candidate in kept.candidates})
+
+
+def _is_of_loads(found: CandidateSet, candidate: Candidate) -> bool:
+    """Return whether a candidate is friction of drives that an effect beside it loads.
+
+    Friction may follow such loads or not, which is known to first order only.
+    """
+    return (isinstance(candidate, EffectCandidate) and candidate.effect.is_friction
+            and issubclass(candidate.effect, DriveEffect)
+            and any(placement.bare for other in found.effects if other is not candidate
+                    for placement in other.placements))
 
 
 def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:
