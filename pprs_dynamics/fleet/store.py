@@ -194,7 +194,9 @@ class Store:
         try:
             data = pa.dataset.dataset(path, schema=every, filesystem=system, format='parquet',
                                       partitioning=partitioning)
-            if not data.files:
+            # Parquet files may be somebody else's.
+            first = next(data.get_fragments(), None)
+            if first is None or 'sha256' not in first.physical_schema.names:
                 raise UnreadableFileError(self.path, 'there is no store of pprs survey')
             return data.to_table(columns=list(columns) if columns else None, filter=filters)
         except (pa.ArrowInvalid, pa.ArrowTypeError) as error:

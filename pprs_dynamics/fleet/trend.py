@@ -30,7 +30,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.catalogue import find_effect
-from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.fleet.changes import NORMAL, Change, Changes, find_changes
 from pprs_dynamics.fleet.named_effects import OWN
 from pprs_dynamics.fleet.store import Store
@@ -185,9 +184,6 @@ def fleet_trends(store: Store, limits: Mapping[str, float] | None = None) -> Fle
     table = store.read(('robot', 'recording', 'path', 'sha256', 'time', 'model', 'options',
                         'version', 'drive', 'effect', 'parameter', 'value', 'std', 'unit', 'rms',
                         'relative', 'noise', 'conditions', 'error'))
-    if not len(table) or not any(table.column('version').to_pylist()):
-        # Parquet files, but of somebody else.
-        raise UnreadableFileError(store.path, 'there is no store of pprs survey')
     rows = _Rows(table)
     series = rows.series()
     per_robot = Counter(robot for robot, _ in series)
