@@ -90,26 +90,28 @@ def workers(folder: Path, count: int) -> None:
               f'{os.getloadavg()[0]:.1f} after', flush=True)
 
 
-def small_jobs(folder: Path, count: int) -> Iterator[Job]:
-    """Yield small recordings, each written when it is asked for."""
+def small_jobs(folder: Path, count: int, refused: bool) -> Iterator[Job]:
+    """Yield small recordings, or files that are refused, each written when it is asked for."""
     model = load_model(MODEL)
     name = fingerprint(model)
     text = write_axis(folder / 'whole.csv').read_text().splitlines(keepends=True)[:SMALL + 1]
     for k in range(count):
         path = folder / f'robot_{k % 100}' / f'{k}.csv'
         path.parent.mkdir(exist_ok=True)
-        # The same but for one digit nobody sees, so that contents differ.
-        path.write_text(''.join(text[:-1]) + f'{text[-1].rstrip()}{k:05d}\n')
+        # The same but for a digit that nobody sees, so that contents differ.
+        path.write_text(f'no recording {k}\n' if refused else
+                        ''.join(text[:-1]) + f'{text[-1].rstrip()}{k:05d}\n')
         yield Job(Entry(str(path), f'robot_{k % 100}', float(k)), model.values, name, EFFECTS)
 
 
-def memory(folder: Path, count: int) -> None:
+def memory(folder: Path, count: int, refused: bool) -> None:
     """Print the memory of the client, in which the scheduler is, as a survey goes on."""
     with cluster(1) as client:
-        results = run_survey(client, small_jobs(folder, count), Store(str(folder / 'store')))
+        store = Store(str(folder / 'store'))
+        results = run_survey(client, small_jobs(folder, count, refused), store)
         for done, result in enumerate(results, start=1):
             assert result is not None
-            assert result.error is None, result.error
+            assert (result.error is not None) == refused, result.error
             if done in (100, 300, 1000, 3000) or done % 10_000 == 0:
                 pages = int(Path('/proc/self/statm').read_text().split()[1])
                 print(f'{done} recordings: {pages * PAGE / 1e6:.0f} MB', flush=True)
@@ -120,6 +122,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('what', choices=('cost', 'workers', 'memory'))
     parser.add_argument('--recordings', type=int)
+    parser.add_argument('--refused', action='store_true', help='for memory: files that are no '
+                        'recordings, which take the same way with less work')
     options = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix='survey'))
     try:
@@ -128,7 +132,7 @@ def main() -> None:
         elif options.what == 'workers':
             workers(folder, options.recordings or 60)
         else:
-            memory(folder, options.recordings or 10_000)
+            memory(folder, options.recordings or 10_000, options.refused)
     finally:
         shutil.rmtree(folder)
 

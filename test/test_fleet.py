@@ -163,9 +163,56 @@ def test_a_manifest_says_whose_and_when(tmp_path: Path) -> None:
     manifest.write_text('path,robot,time,temperature\nx.csv,7,1970-01-02T00:00:00,21.5\n')
     (entry,) = entries((), str(manifest))
     assert entry == Entry(str(tmp_path / 'x.csv'), '7', 86400.0, None, {'temperature': 21.5})
-    manifest.write_text('path,robot,time\nx.csv,7,yesterday\n')
-    with pytest.raises(ManifestError, match="line 2: time 'yesterday', must be an ISO 8601"):
+
+
+@pytest.mark.parametrize(('text', 'rule'), [
+    *((f'path,robot,time\nx.csv,7,{time}\n', f"line 2: time '{time}', must be an ISO 8601 date")
+      # The last in milliseconds, a year after 50 000.
+      for time in ('yesterday', '-5', '1e300', '1767225600000')),
+    ('path;robot\nx;7\n', 'line 1: there is no column path, must have the columns path and'),
+    ('', 'line 1: there is no column path'), ('path,robot\nx.csv,\n', 'line 2: robot is empty')])
+def test_a_manifest_that_says_something_impossible_is_refused(
+        tmp_path: Path, text: str, rule: str) -> None:
+    manifest = tmp_path / 'robots.csv'
+    manifest.write_text(text)
+    with pytest.raises(ManifestError, match=re.escape(rule)):
         list(entries((), str(manifest)))
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    (['--output', 'file'], '--output file: is a file, must be a folder'),
+    (['--output', 'file/store'], 'file/store: Not a directory'),
+    (['--output', 'foo://store'], 'foo://store: Protocol not known: foo'),
+    (['--output', 's', '--effects', ''], "--effects '': must be auto or names of effects"),
+    (['--output', 's', '--effects', 'friction'], "unknown effect 'friction' (did you mean"),
+    (['--output', 's', '--manifest', 'binary'], 'binary: is no text, must be CSV in UTF-8'),
+    (['--output', 's', '--manifest', 'empty'], 'empty: no recording is listed')])
+def test_what_cannot_be_is_said_before_anything_is_started(
+        recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
+    def started(*_: object) -> None:
+        raise AssertionError('a cluster was started')
+
+    monkeypatch.setattr('pprs_dynamics.commands.survey.cluster', started)
+    model = Path(MODEL).absolute()
+    monkeypatch.chdir(tmp_path)
+    Path('file').write_text('x')
+    Path('binary').write_bytes(b'\xff\xfe\x00')
+    Path('empty').write_text('path,robot\n')
+    given = [] if '--manifest' in arguments else [str(recordings)]
+    effects = [] if '--effects' in arguments else ['--effects', EFFECTS]
+    assert main(['survey', *given, '--model', str(model), *effects, *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f'pprs survey: {said}')
+    assert error.count('\n') == 1
+    assert not Path('s').exists()
+
+
+def test_parquet_files_of_others_are_no_store(tmp_path: Path,
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    pyarrow.parquet.write_table(pyarrow.table({'a': [1]}), tmp_path / 'x.parquet')
+    assert main(['trend', str(tmp_path)]) == 2
+    assert 'there is no store of pprs survey' in capsys.readouterr().err
 
 
 def test_robots_are_called_as_their_folders(tmp_path: Path) -> None:

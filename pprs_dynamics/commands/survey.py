@@ -84,7 +84,8 @@ def run(options: argparse.Namespace) -> int:
     arrow()
     model_of = lru_cache(maxsize=None)(_model)
     base, _ = model_of(options.model)
-    requests_of('' if options.effects == AUTO else options.effects, base)
+    if options.effects != AUTO and not requests_of(options.effects, base):
+        raise SurveyError(f'--effects {options.effects!r}: must be auto or names of effects')
 
     def jobs() -> Iterator[Job]:
         for entry in entries(options.recordings, options.manifest):
@@ -95,14 +96,15 @@ def run(options: argparse.Namespace) -> int:
     if not total:
         raise SurveyError(f'{options.manifest}: no recording is listed')
     store = Store(options.output)
+    store.begin()
     done, failures = _run(options, screen, jobs(), total, store)
     for recording, error in failures[:MOST_SHOWN]:
         screen.print(f'[yellow]![/] {shown(recording)}: {shown(error)}')
     if len(failures) > MOST_SHOWN:
         screen.print(f'… and {len(failures) - MOST_SHOWN} more, in the store')
     earlier = total - done - len(failures)
-    screen.print(f'{total} recordings: {done} done, {earlier} done before, {len(failures)} '
-                 f'without a result; store: {shown(options.output)}')
+    screen.print(f'{total} recording{"s" * (total != 1)}: {done} done, {earlier} done before, '
+                 f'{len(failures)} without a result; store: {shown(options.output)}')
     if options.json:
         write_json(options.json, {
             'recordings': total, 'done': done, 'done_before': earlier,

@@ -80,10 +80,14 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
                     # Workers that are killed with their nannies are nobody's to restart.
                     'distributed.worker.daemon': True}
         with dask.config.set(settings), _workers_spared():
-            local = library.LocalCluster(
-                n_workers=workers or len(os.sched_getaffinity(0)), threads_per_worker=1,
-                processes=True, host=LOOPBACK, dashboard_address=f'{LOOPBACK}:0',
-                worker_dashboard_address=f'{LOOPBACK}:0', silence_logs='CRITICAL')
+            try:
+                local = library.LocalCluster(
+                    n_workers=workers or len(os.sched_getaffinity(0)), threads_per_worker=1,
+                    processes=True, host=LOOPBACK, dashboard_address=f'{LOOPBACK}:0',
+                    worker_dashboard_address=f'{LOOPBACK}:0', silence_logs='CRITICAL')
+            except (OSError, RuntimeError) as error:
+                raise SchedulerError(f'a cluster of this machine cannot be started: {error}'
+                                     ) from None
         with local, library.Client(local, set_as_default=False) as client:
             yield client
 

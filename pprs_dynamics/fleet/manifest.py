@@ -24,6 +24,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
@@ -33,6 +34,7 @@ from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileE
 
 ENDINGS = ('.csv', '.mcap', '.db3')
 BAG = 'metadata.yaml'  # a folder that holds it is a rosbag2 recording
+LATEST = 2 ** 63 / 1e9  # [s], of 2262: readers of Parquet count nanoseconds, pandas for one
 KNOWN = ('path', 'robot', 'time', 'model')
 
 
@@ -86,9 +88,11 @@ def read_manifest(path: str) -> Iterator[Entry]:
                                     'have the columns path and robot')
             for row in rows:
                 yield _entry(path, rows.line_num, row)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        if isinstance(error, PprsError):
-            raise
+    except PprsError:
+        raise
+    except UnicodeDecodeError:
+        raise UnreadableFileError(path, 'is no text, must be CSV in UTF-8') from None
+    except (OSError, csv.Error) as error:
         raise UnreadableFileError(path, getattr(error, 'strerror', None) or str(error)) from None
 
 
@@ -121,14 +125,17 @@ def _number(text: Any) -> float | None:
 def read_time(path: str, line: int, text: str) -> float:
     """Return seconds since 1970 of an ISO 8601 date (UTC unless it says otherwise) or a number."""
     value = _number(text)
-    if value is not None:
-        return value
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
+    if value is None:
+        try:
+            moment = datetime.fromisoformat(text)
+        except ValueError:
+            moment = None
+        if moment is not None:
+            value = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    if value is None or not 0 <= value < LATEST:
         raise ManifestError(path, line, f'time {text!r}', 'be an ISO 8601 date such as '
-                            '2026-03-04T10:00:00Z, or seconds since 1970') from None
-    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+                            '2026-03-04T10:00:00Z, or seconds since 1970')
+    return value
 
 
 def is_remote(path: str) -> bool:
@@ -155,6 +162,26 @@ def filesystem(path: str) -> tuple[Any, str]:
     return system, within
 
 
+@contextmanager
+def reached(path: str) -> Iterator[None]:
+    """Turn what libraries of file systems raise, and they raise what they like, into one sentence.
+
+    Raises
+    ------
+    UnreadableFileError
+    """
+    try:
+        yield
+    except PprsError:
+        raise
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    except Exception as error:
+        if not is_remote(path):
+            raise
+        raise UnreadableFileError(path, f'cannot be reached: {error}') from None
+
+
 def find_recordings(patterns: Sequence[str]) -> Iterator[Entry]:
     """Yield what files, folders and globs hold; a robot is called as the folder is.
 
@@ -176,15 +203,13 @@ def find_recordings(patterns: Sequence[str]) -> Iterator[Entry]:
 def _matching(pattern: str) -> Iterator[str]:
     system, root = filesystem(pattern)
     named = system.unstrip_protocol if is_remote(pattern) else str
-    try:
+    with reached(pattern):
         places = sorted(system.glob(root)) if any(c in root for c in '*?[') else [root]
         for place in places:
             if system.isdir(place):
                 yield from map(named, _within(system, place))
             elif system.exists(place):
                 yield named(place)
-    except OSError as error:
-        raise UnreadableFileError(pattern, error.strerror or str(error)) from None
 
 
 def _within(system: Any, folder: str) -> Iterator[str]:

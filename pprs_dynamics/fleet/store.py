@@ -32,7 +32,7 @@ from urllib.parse import quote
 from uuid import uuid4
 
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.fleet.manifest import filesystem, is_remote
+from pprs_dynamics.fleet.manifest import filesystem, is_remote, reached
 
 DONE, FAILED = '.parquet', '.failed.parquet'
 KEY_LENGTH = 40  # hexadecimal digits of the key: 160 bits, as of a git object
@@ -112,10 +112,17 @@ class Store:
         """Return where the rows of a recording are."""
         return f'{self.path.rstrip("/")}/robot={quote(robot, safe="")}/{key}{ending}'
 
+    def begin(self) -> None:
+        """Make the folder; errors as `write`, before work is done in vain."""
+        system, path = filesystem(self.path)
+        with reached(self.path):
+            system.makedirs(path, exist_ok=True)
+
     def has(self, robot: str, key: str) -> bool:
         """Return whether a recording is done."""
         system, path = filesystem(self.place(robot, key))
-        return bool(system.exists(path))
+        with reached(self.path):
+            return bool(system.exists(path))
 
     def write(self, robot: str, key: str, rows: Sequence[Mapping[str, Any]],
               failed: bool = False) -> None:
@@ -139,15 +146,12 @@ class Store:
         buffer = BytesIO()
         pa.parquet.write_table(table, buffer, compression='zstd')
         place = self.place(robot, key, FAILED if failed else DONE)
-        try:
+        with reached(place):
             self._put(place, buffer.getvalue())
             if not failed:
                 system, path = filesystem(self.place(robot, key, FAILED))
                 if system.exists(path):
                     system.rm_file(path)
-        except OSError as error:
-            raise UnreadableFileError(
-                place, f'cannot be written: {error.strerror or error}') from None
 
     @staticmethod
     def _put(place: str, content: bytes) -> None:
@@ -182,14 +186,17 @@ class Store:
         """
         pa = arrow()
         system, path = filesystem(self.path)
-        if not system.isdir(path):
-            raise UnreadableFileError(self.path, 'there is no store of pprs survey')
+        with reached(self.path):
+            if not system.isdir(path):
+                raise UnreadableFileError(self.path, 'there is no store of pprs survey')
         every = schema().append(pa.field('robot', pa.string()))
         partitioning = pa.dataset.partitioning(pa.schema([('robot', pa.string())]), flavor='hive')
         try:
             data = pa.dataset.dataset(path, schema=every, filesystem=system, format='parquet',
                                       partitioning=partitioning)
-            if not data.files:
+            # Parquet files may be somebody else's.
+            first = next(data.get_fragments(), None)
+            if first is None or 'sha256' not in first.physical_schema.names:
                 raise UnreadableFileError(self.path, 'there is no store of pprs survey')
             return data.to_table(columns=list(columns) if columns else None, filter=filters)
         except (pa.ArrowInvalid, pa.ArrowTypeError) as error:

@@ -72,8 +72,9 @@ def reach_text(trend: Trend) -> str:
     limit = f'; limit {trend.reach.limit:g} {trend.quantity.unit}'
     if not middle < FAR:
         return f'{limit} not within {FAR / 365:.0f} years'
-    last = f'{_span(high)}' if high < FAR else 'more'
-    return f'{limit} in about {_span(middle)} ({_span(low)} to {last})'
+    first, about, last = _span(low), _span(middle), _span(high) if high < FAR else 'more'
+    around = '' if first == about == last else f' ({first} to {last})'
+    return f'{limit} in about {about}{around}'
 
 
 def _span(days: float) -> str:

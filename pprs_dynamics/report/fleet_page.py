@@ -66,7 +66,8 @@ function showTrend(robot, quantity) {
   if (data.beside) {
     traces.push({x: stamps, y: trend.r.map(k => data.recordings[k][3]), mode: 'lines+markers',
       name: data.beside, yaxis: 'y2', opacity: 0.5, line: {color: data.colours[2]}});
-    layout.yaxis2 = {overlaying: 'y', side: 'right', title: {text: data.beside}};
+    layout.yaxis2 = {overlaying: 'y', side: 'right', title: {text: data.beside}, tickmode: 'auto',
+      showgrid: false};
   }
   place.setAttribute('aria-label', quantity + ' of ' + robot + ' over time');
   const drawn = window.themed(JSON.stringify({data: traces, layout}));
