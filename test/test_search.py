@@ -111,6 +111,19 @@ def test_the_search_ends_at_the_best_of_all_sets(
     assert {one.name for one in found.effects} == set(hidden)
 
 
+@pytest.mark.usefixtures('small_catalogue')
+def test_what_does_not_pay_in_a_set_is_pruned() -> None:
+    recording = axis_recording({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1)
+    search = Search(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS,
+                    with_unknown=False)
+    search.evaluate(())
+    spring, drag, gain = (search.library.candidate(CATALOGUE[name], [search.library.placed(
+        CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
+        for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
+    assert names(search.pruned(search.evaluate((spring, drag, gain)))) == ['drive_spring']
+    assert search.pruned(search.evaluate(())).candidates == ()
+
+
 def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -> Recording:
     """Return a recording of the paper's robot with effects, {name: {drive or key: ...}}."""
     values = {}

@@ -75,8 +75,11 @@ def without_remainders(search: Search, best: CandidateSet,
         if better is kept:
             break
         kept = better
-    return kept, tuple(one for one in remainders if one.candidate.name not in {
-        candidate.name for candidate in kept.candidates})
+    if remainders:
+        # What paid beside them only is not kept for their sake.
+        kept = search.pruned(kept)
+    names = {candidate.name for candidate in kept.candidates}
+    return kept, tuple(one for one in remainders if one.candidate.name not in names)
 
 
 def _is_of_loads(found: CandidateSet, candidate: Candidate) -> bool:

@@ -229,6 +229,16 @@ class Search(ScannedSets):
         return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
                     found)
 
+    def pruned(self, found: CandidateSet) -> CandidateSet:
+        """Return a set without the candidates that do not pay in it."""
+        while found.candidates:
+            less = min((self.evaluate(tuple(c for c in found.candidates if c is not gone), found)
+                        for gone in found.candidates), key=lambda one: one.total)
+            if less.total > found.total:
+                break
+            found = less
+        return found
+
     def _replacements(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
         """Yield sets in which something else stands for one or two candidates, or for a drive's.
 
