@@ -39,8 +39,8 @@ from pprs_dynamics.selection.decisions import DECISIONS, Decisions
 
 FACTORS = (0.5, 2.0)
 AS_IT_IS = ('', 1.0)
-SETS = 3  # of two and three effects, of a seed's
-EVERY = 2  # of the effects of the catalogue, every other
+SETS = 2  # of two and three effects, of a seed's
+EVERY = 3  # of the effects of the catalogue, every third
 # A case, the number that is changed, and by what.
 Changed = tuple[Case, str, float]
 
@@ -56,7 +56,7 @@ def chosen_cases(first: int, seeds: int) -> list[Case]:
         ('unknown',), seeds, 0, (1.0,), first)
     for seed in range(first, first + seeds):
         found += cases(('effects',), 1, 0, (1.0,), seed)[seed % EVERY::EVERY]
-        found += cases(('pairs',), 1, 0, (), seed)[::2][:SETS]
+        found += cases(('pairs',), 1, 0, (), seed)[::3][:SETS]
     return found
 
 
