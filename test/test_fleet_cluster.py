@@ -75,14 +75,15 @@ def test_worker_scheduler_and_client_killed_leave_the_same_store(
 def test_interrupted_it_ends_in_one_line_and_goes_on_from_there(
         recordings: Path, reference: Path, tmp_path: Path) -> None:
     store = tmp_path / 'store'
-    # As a terminal does it: all processes of the command hear the signal.
-    process = survey(recordings, store, '--workers', '2', start_new_session=True)
-    wait_for(lambda: len(files(store)) >= 3)
+    # As a terminal does it: all processes of the command hear the signal. One worker, and at once,
+    # so that a busy machine does not finish before it is interrupted.
+    process = survey(recordings, store, '--workers', '1', start_new_session=True)
+    wait_for(lambda: len(files(store)) >= 1)
     os.killpg(process.pid, signal.SIGINT)
     _, wrong = process.communicate(timeout=PATIENCE)
     assert (process.returncode, wrong) == (130, 'pprs survey: interrupted\n')
     kept = files(store)
-    assert 3 <= len(kept) < COUNT
+    assert 1 <= len(kept) < COUNT
     said, _ = survey(recordings, store, '--workers', '2').communicate(timeout=PATIENCE)
     assert f'{len(kept)} done before' in said
     assert rows(store) == rows(reference)
