@@ -176,7 +176,7 @@ def test_the_timeouts_action_is_that_of_stale_commands(package: ModuleType, acti
         assert len(node.commands) == (2 if action == 'zero' else 1)
         if action == 'zero':
             assert list(node.commands[-1].data) == [0.0] * 6
-        wanted = 'forces are zero' if action == 'zero' else 'the last command stays in force'
+        wanted = 'efforts are zero' if action == 'zero' else 'the last command stays in force'
         assert node.bench.spin_until(lambda: wanted in node.bench.status[-1]['message'])
 
 
