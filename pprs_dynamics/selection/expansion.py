@@ -44,7 +44,7 @@ from pprs_dynamics.regression.design import Design
 from pprs_dynamics.regression.terms import PlacedEffect, Point
 from pprs_dynamics.selection.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.selection.decisions import Decisions
-from pprs_dynamics.selection.form import without_remainders
+from pprs_dynamics.selection.form import beyond_lack_of_fit
 from pprs_dynamics.selection.search import Search
 
 # What the exact model may differ from the linear one by, in whitened squares, and how often the
@@ -100,8 +100,9 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     best = first.run()
     found = _around_fitted(first, best, decisions, report, _bending_alone)
     if _stands_out(*found):
-        found = min(found, _around_fitted(first, best, decisions, report, _as_it_is),
-                    key=lambda one: without_remainders(*one)[0].total)
+        found = min(found, _around_fitted(first, best, decisions, report, _as_it_is,
+                                          found[1].total),
+                    key=lambda one: beyond_lack_of_fit(*one)[0].total)
     search, best = found
     # Rivals that bend no columns are judged where none are bent.
     for one in list(search.evaluated.values()) if search is not first else ():
@@ -114,7 +115,7 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
 
 def _around_fitted(
     search: Search, best: CandidateSet, decisions: Decisions, report: Callable[[float], None],
-    first_step: Callable[[Search, CandidateSet], CandidateSet],
+    first_step: Callable[[Search, CandidateSet], CandidateSet], rival: float = np.inf,
 ) -> tuple[Search, CandidateSet]:
     """Search again around the fitted model, until that is where columns were computed.
 
@@ -127,10 +128,12 @@ def _around_fitted(
     report : callable
     first_step : callable
         Returns the set around which to expand where effects bend the columns that did not yet.
+    rival : float
+        Cost that each search has to reach for another one.
     """
     scale = search.regression.error_scale
     for number in range(MOST_SEARCHES):
-        kept, _ = without_remainders(search, best)
+        kept, _ = beyond_lack_of_fit(search, best)
         if search.is_beyond_point:
             kept = first_step(search, best)
         try:
@@ -143,6 +146,8 @@ def _around_fitted(
         search = Search(around, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
         best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
+        if best.total > rival:
+            break
     return search, best
 
 
@@ -161,12 +166,17 @@ def _as_it_is(search: Search, best: CandidateSet) -> CandidateSet:
 
 
 def _stands_out(search: Search, best: CandidateSet) -> bool:
-    """Return whether lack of fit would leave a drive much more than noise."""
-    kept, _ = without_remainders(search, best)
+    """Return whether what will be adopted leaves a drive much more than its fit does.
+
+    The fit has columns for what forms leave open, which a model has not.
+    """
+    kept, _ = beyond_lack_of_fit(search, best)
+    if kept is best:
+        return False
+    regression = search.regression
     left = np.sqrt(np.nanmean(np.square(linear_residual(search, kept)), axis=0))
-    ratio, regression = search.decisions.left_ratio, search.regression
-    return kept is not best and any(left[d] > ratio * regression.noise_floor(best.fit, d)
-                                    for d in regression.drives)
+    promised = np.sqrt(kept.fit.squares.sum(axis=1) / regression.counts.sum(axis=1))
+    return bool(np.any(left[list(regression.drives)] > search.decisions.left_ratio * promised))
 
 
 def _bends(candidate: Candidate) -> bool:

@@ -56,6 +56,22 @@ def without_remainders(search: Search, best: CandidateSet,
 
     What was best together with them may not be without: then something else may stand for it.
     """
+    kept, remainders = beyond_lack_of_fit(search, best)
+    while kept.total > best.total + search.decisions.rival_margin:
+        better = search.replaced(kept, lambda one: not _small(search, one))
+        if better is kept:
+            break
+        kept = better
+    if remainders:
+        # What paid beside them only is not kept for their sake.
+        kept = search.pruned(kept)
+    names = {candidate.name for candidate in kept.candidates}
+    return kept, tuple(one for one in remainders if one.candidate.name not in names)
+
+
+def beyond_lack_of_fit(search: Search, best: CandidateSet,
+                       ) -> tuple[CandidateSet, tuple[Remainder, ...]]:
+    """Return what a set holds beyond the model error of its effects, and what is within it."""
     remainders: list[Remainder] = []
     kept = best
     while small := _small(search, kept):
@@ -70,16 +86,7 @@ def without_remainders(search: Search, best: CandidateSet,
         least = min(without, key=lambda candidate: without[candidate].total)
         remainders.append(Remainder(least, kept, small[least]))
         kept = without[least]
-    while kept.total > best.total + search.decisions.rival_margin:
-        better = search.replaced(kept, lambda one: not _small(search, one))
-        if better is kept:
-            break
-        kept = better
-    if remainders:
-        # What paid beside them only is not kept for their sake.
-        kept = search.pruned(kept)
-    names = {candidate.name for candidate in kept.candidates}
-    return kept, tuple(one for one in remainders if one.candidate.name not in names)
+    return kept, tuple(remainders)
 
 
 def _is_of_loads(found: CandidateSet, candidate: Candidate) -> bool:
