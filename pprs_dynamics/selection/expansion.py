@@ -119,17 +119,8 @@ def _around_fitted(
 ) -> tuple[Search, CandidateSet]:
     """Search again around the fitted model, until that is where columns were computed.
 
-    Parameters
-    ----------
-    search : Search
-    best : CandidateSet
-        Of the search.
-    decisions : Decisions
-    report : callable
-    first_step : callable
-        Returns the set around which to expand where effects bend the columns that did not yet.
-    rival : float
-        Cost that each search has to reach for another one.
+    `first_step` returns the set around which to expand where effects bend the columns that did
+    not yet; `rival` is the cost that each search has to reach for another one.
     """
     scale = search.regression.error_scale
     for number in range(MOST_SEARCHES):
