@@ -17,8 +17,9 @@
     python benchmarks/arm_score.py --model base.yaml --seeds 2 --nothing 10 --table arm_score.md
 
 By the commands alone: `pprs simulate --model … --effect …`, then `pprs diagnose` of one recording.
-Every outcome is appended to FILE at once, and what is there is not run again. Each seed has a
-motion, an effect's drives and sizes, and noise of its own.
+Outcomes are appended to FILE as they come, and what is there is not run again. Each seed has a
+motion, an effect's drives and sizes, and noise of its own. `--workers` and `--scheduler` say where
+cases run, as for `pprs survey`.
 """
 
 from __future__ import annotations
@@ -32,26 +33,23 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 # The arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+from cases_on_dask import Each, Outcome, add_options, engine, read_outcomes, run_missing
 
 from pprs_dynamics.commands.pprs import main as pprs
 from pprs_dynamics.simulation.arm_forms import NAMES
 
 OUTPUT = Path(__file__).resolve().parents[1] / 'output'
-Outcome = dict[str, Any]
 
 
-def outcomes(file: Path) -> list[Outcome]:
-    """Return what was run before."""
-    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-
-
-def run_case(model: Path, effect: str, seed: int, duration: float) -> Outcome:
-    """Simulate and diagnose one recording; `effect` is empty for nothing."""
+def run_case(case: tuple[str, int], model: Path, duration: float) -> Outcome:
+    """Simulate and diagnose the recording of an effect, empty for nothing, and a seed."""
+    effect, seed = case
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         run, truth, said = (str(Path(folder) / name) for name in (
             'run.csv', 'truth.json', 'said.json'))
@@ -137,16 +135,11 @@ def todo(seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
             yield '', seed
 
 
-def run(model: Path, seeds: int, nothing: int, duration: float, file: Path) -> None:
+def run(model: Path, seeds: int, nothing: int, duration: float, file: Path, each: Each) -> None:
     """Run the cases that are not in a file of outcomes yet; append and print theirs."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    done = {(one['effect'], one['seed']) for one in outcomes(file)}
-    for effect, seed in todo(seeds, nothing):
-        if (effect, seed) not in done:
-            outcome = run_case(model, effect, seed, duration)
-            with file.open('a') as stream:
-                stream.write(json.dumps(outcome) + '\n')
-            print(described(outcome), flush=True)
+    run_missing(each, partial(run_case, model=model.resolve(), duration=duration),
+                {case: case for case in todo(seeds, nothing)}, file,
+                lambda outcome: (outcome['effect'], outcome['seed']), described)
 
 
 def main() -> int:
@@ -159,9 +152,11 @@ def main() -> int:
     parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
     parser.add_argument('--file', type=Path, default=OUTPUT / 'arm_score.jsonl')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
+    add_options(parser)
     options = parser.parse_args()
-    run(options.model, options.seeds, options.nothing, options.duration, options.file)
-    text = table(outcomes(options.file))
+    with engine(options) as each:
+        run(options.model, options.seeds, options.nothing, options.duration, options.file, each)
+    text = table(read_outcomes(options.file))
     if options.table:
         options.table.write_text(text)
     else:

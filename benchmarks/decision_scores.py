@@ -85,8 +85,8 @@ def make_table(outcomes: Iterable[dict[str, Any]]) -> str:
 
 def _counts(outcomes: Sequence[dict[str, Any]]) -> str:
     shares = []
-    for rows in (('effects',), ('pairs',), ('unknown',), ('nothing',)):
-        own = [one for one in outcomes if one['row'] in rows]
+    for row in ('effects', 'pairs', 'unknown', 'nothing'):
+        own = [one for one in outcomes if one['row'] == row]
         shares.append(f'{sum(bool(one["judged"]["good"]) for one in own)}/{len(own)}')
     return ', '.join(shares)
 

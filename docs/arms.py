@@ -279,12 +279,14 @@ def tell(bench: Bench) -> dict[str, str]:
     ]
     sys.path.insert(0, str(DOCS.parent / 'benchmarks'))
     import arm_score
+    import cases_on_dask
 
     if not bench.as_far:
         arm_score.run(bench.folder / 'base.yaml', SEEDS, NOTHING, DURATION,
-                      bench.folder / 'score.jsonl')
+                      bench.folder / 'score.jsonl', cases_on_dask.here)
     return {
-        'SCORE': arm_score.table(arm_score.outcomes(bench.folder / 'score.jsonl')).rstrip(),
+        'SCORE': arm_score.table(cases_on_dask.read_outcomes(
+            bench.folder / 'score.jsonl')).rstrip(),
         'MODEL': MODEL.rstrip(), 'PROOF': table(('figure', 'goal', 'found'), proof),
         'ERRORS': table(('joint', 'URDF', 'fitted to', 'not fitted to', 'goal'), errors),
         'LOAD': bench.said('load').split('\n\n')[0].rstrip(),

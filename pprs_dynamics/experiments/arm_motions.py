@@ -97,7 +97,7 @@ class ArmMotions:
             (motion.position - self.middle, self.reach), (motion.velocity, self.speed),
             (motion.acceleration, self.acceleration))], axis=0)
         found = replace(found, coefficients=drawn * (
-            np.broadcast_to(share, len(uses)) / np.maximum(uses, 1e-12))[:, None])
+            np.broadcast_to(share, len(uses)) / np.maximum(uses, TINY))[:, None])
         few = time[::CHECKED // LOOKED_AT]
         for _ in range(SHRINKS):
             efforts = self.model.drive_forces(found.motion(few)).total

@@ -211,6 +211,11 @@ class Regression:
         return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k], period)
                 for k, d in enumerate(self.drives)}
 
+    def left(self, fit: JointFit) -> Array:
+        """Return the root of the mean square that a fit leaves on each drive, (D,) [N]."""
+        found: Array = np.sqrt(fit.squares.sum(axis=1) / self.counts.sum(axis=1))
+        return found
+
     def noise_floor(self, fit: JointFit, d: int) -> float:
         """Return the root of the mean square of a drive's noise over its coefficients [N]."""
         k = self.drives.index(d)

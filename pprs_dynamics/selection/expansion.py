@@ -166,8 +166,8 @@ def _stands_out(search: Search, best: CandidateSet) -> bool:
         return False
     regression = search.regression
     left = np.sqrt(np.nanmean(np.square(linear_residual(search, kept)), axis=0))
-    promised = np.sqrt(kept.fit.squares.sum(axis=1) / regression.counts.sum(axis=1))
-    return bool(np.any(left[list(regression.drives)] > search.decisions.left_ratio * promised))
+    promised = search.decisions.left_ratio * regression.left(kept.fit)
+    return bool(np.any(left[list(regression.drives)] > promised))
 
 
 def _bends(candidate: Candidate) -> bool:
@@ -218,10 +218,9 @@ def next_point(search: Search, found: CandidateSet) -> Point | None:
             and _is_bent_by(before, effects)):
         return None
     loss = squared(search, found, measured - exact)
-    now = design.forces
     known = {(one.effect, one.drive): one for one in before.effects} if before else {}
     if all((one.effect, one.drive) in known for one in effects) and before is not None:
-        reached = squared(search, found, measured - now)
+        reached = squared(search, found, measured - design.forces)
         for _ in range(MOST_HALVINGS):
             if loss < reached:
                 break

@@ -103,9 +103,8 @@ def _is_of_loads(found: CandidateSet, candidate: Candidate) -> bool:
 def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:
     """Return the largest rms that a set leaves on a drive, over the noise beside the best set."""
     regression = search.regression
-    left = np.sqrt(found.fit.squares.sum(axis=1) / regression.counts.sum(axis=1))
     noise = [regression.noise_floor(best.fit, d) for d in regression.drives]
-    return float(np.max(left / np.maximum(noise, 1e-300)))
+    return float(np.max(regression.left(found.fit) / np.maximum(noise, 1e-300)))
 
 
 def _small(search: Search, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
