@@ -24,8 +24,7 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.mechanism.motion_checks import checked_matrix, checked_times
-
-QUINTIC_FROM = 6  # positions; with fewer the splines are cubic
+from pprs_dynamics.mechanism.pose_spline import spline_through
 
 
 @dataclass(frozen=True)
@@ -98,15 +97,13 @@ def position_spline_derivatives(time: Array, position: Array) -> tuple[Array, Ar
     MotionError
         For positions or times that are none.
     """
-    from scipy.interpolate import make_interp_spline
-
     places = checked_matrix('position', position, position.shape[1])
     knots = checked_times(time, len(places))
     try:
         # Positions too far apart overflow; the result is then not finite.
         with np.errstate(all='ignore'):
-            spline = make_interp_spline(knots, places, k=5 if len(knots) >= QUINTIC_FROM else 3)
-            return spline.derivative(1)(knots), spline.derivative(2)(knots)
+            _, velocity, acceleration = spline_through(knots, places, knots)
+        return velocity, acceleration
     except (ValueError, ArithmeticError, np.linalg.LinAlgError):
         unknown = np.full_like(places, np.nan)
         return unknown, unknown

@@ -32,7 +32,7 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.mechanism.motion_checks import checked_matrix, checked_times, normalised
 
 FEWEST_POSES = 4
-QUINTIC_FROM = 6  # poses; below, the splines are cubic
+QUINTIC_FROM = 6  # points; below, the splines are cubic
 
 
 def load_splines() -> None:
@@ -121,11 +121,8 @@ def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) ->
     ValueError, ArithmeticError, numpy.linalg.LinAlgError
         Where poses or times are so far apart that no spline can be computed.
     """
-    from scipy.interpolate import make_interp_spline
-
-    spline = make_interp_spline(knots, np.hstack((position, _continuous(orientation))),
-                                k=5 if len(knots) >= QUINTIC_FROM else 3)
-    place, first, second = spline(at), spline.derivative(1)(at), spline.derivative(2)(at)
+    place, first, second = spline_through(
+        knots, np.hstack((position, _continuous(orientation))), at)
     s = place[:, 3:]
     square = np.sum(s * s, axis=1, keepdims=True)
     omega = 2 * _vector_part(first[:, 3:], s) / square
@@ -134,6 +131,28 @@ def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) ->
     rows: Array = np.hstack((place[:, :3], s / np.sqrt(square), first[:, :3], omega,
                              second[:, :3], epsilon))
     return rows
+
+
+def spline_through(knots: Array, values: Array, at: Array) -> tuple[Array, Array, Array]:
+    """Return values, first and second derivatives of splines at any times, (K, D) each.
+
+    Parameters
+    ----------
+    knots : (N,) array
+        Strictly increasing times [s].
+    values : (N, D) array
+    at : (K,) array
+        [s].
+
+    Raises
+    ------
+    ValueError, ArithmeticError, numpy.linalg.LinAlgError
+        Where values or times are so far apart that no spline can be computed.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(knots, values, k=5 if len(knots) >= QUINTIC_FROM else 3)
+    return spline(at), spline.derivative(1)(at), spline.derivative(2)(at)
 
 
 def _continuous(quaternion: Array) -> Array:
