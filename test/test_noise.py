@@ -26,6 +26,7 @@ from pprs_dynamics.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 PERIOD = 0.01
 
@@ -126,7 +127,7 @@ def test_a_constant_takes_no_part_in_the_fit() -> None:
     noise = ar1(0.9, 4000, rng)[:, None]
     regression, without = fitted(noise)
     _, beside = fitted(noise + 5.0)
-    spectra = [regression.noise_shapes.spectrum(fit.amplitudes)[0, 1:] for fit in (without, beside)]
+    spectra = [regression.spectra(fit)[0, 1:] for fit in (without, beside)]
     np.testing.assert_allclose(spectra[1], spectra[0], rtol=0.05)
     assert beside.deviance > without.deviance + 1000
 
@@ -193,3 +194,16 @@ def test_short_gaps_are_bridged_and_long_ones_start_anew() -> None:
     assert np.isfinite(series.error).all()
     shapes = NoiseShapes.of(series.bands)
     assert shapes.at_bands.shape == (len(shapes.corners) + 1, len(series.bands))
+
+
+@pytest.mark.parametrize(('settings', 'most'), [
+    (SensorSettings(white_noise=0.08, coloured_noise=0.0), 0.0),
+    (SensorSettings(white_noise=0.04, coloured_noise=0.07, noise_correlation=0.999), 0.04),
+    (SensorSettings(white_noise=0.0, coloured_noise=0.0, pink_noise=0.08), 0.12)])
+def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: float) -> None:
+    beyond = []
+    for seed in range(8):
+        noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
+        regression, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
+        beyond += list(fit.squares[:, 0] > 9 * regression.spectra(fit)[:, 0])
+    assert np.mean(beyond) <= most

@@ -188,7 +188,7 @@ class Regression:
             start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
         amplitudes, before = start, np.inf
         for _ in range(MOST_ROUNDS):
-            solution = system.solve(shapes.spectrum(amplitudes), self.counts)
+            solution = system.solve(shapes.spectra(amplitudes), self.counts)
             above = solution.deviance - rival
             if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
                 break
@@ -201,15 +201,20 @@ class Regression:
     def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
         """Return the fit of blocks under given noise."""
         system = NormalEquations(self, blocks)
-        solution = system.solve(self.noise_shapes.spectrum(amplitudes), self.counts)
+        solution = system.solve(self.noise_shapes.spectra(amplitudes), self.counts)
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         solution.deviance, solution.squares, system.places)
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""
-        period = self.residuals.period
-        return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k], period)
+        constants = self.spectra(fit)[:, 0]
+        return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k],
+                                 self.residuals.period, float(constants[k]))
                 for k, d in enumerate(self.drives)}
+
+    def spectra(self, fit: JointFit) -> Array:
+        """Return S at the bands of the drives, (D, B) [N^2]."""
+        return self.noise_shapes.spectra(fit.amplitudes)
 
     def left(self, fit: JointFit) -> Array:
         """Return the root of the mean square that a fit leaves on each drive, (D,) [N]."""
@@ -217,14 +222,17 @@ class Regression:
         return found
 
     def noise_floor(self, fit: JointFit, d: int) -> float:
-        """Return the root of the mean square of a drive's noise over its coefficients [N]."""
+        """Return the root of the mean square of a drive's noise over its coefficients [N].
+
+        With the constant that the lowest frequencies show, not with what may lie below them.
+        """
         k = self.drives.index(d)
-        power = self.noise_shapes.spectrum(fit.amplitudes[k])
+        power = fit.amplitudes[k] @ self.noise_shapes.at_bands
         return float(np.sqrt(self.counts[k] @ power / max(self.counts[k].sum(), 1)))
 
     def weights(self, fit: JointFit, d: int) -> Array:
         """Return 1 / S at the bands of a drive, (B,) [1/N^2]."""
-        return 1 / self.noise_shapes.spectrum(fit.amplitudes[self.drives.index(d)])
+        return 1 / self.spectra(fit)[self.drives.index(d)]
 
     def whitened(self, fit: JointFit, d: int, rows: Array) -> Array:
         """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""

@@ -137,8 +137,7 @@ class Search(ScannedSets):
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
-        squares = found.fit.squares[:, 0] / self.regression.noise_shapes.spectrum(
-            found.fit.amplitudes)[:, 0]
+        squares = found.fit.squares[:, 0] / self.regression.spectra(found.fit)[:, 0]
         return found.cost - float(np.sum(np.maximum(squares - self.regression.counts[:, 0], 0)))
 
     @staticmethod
