@@ -127,7 +127,7 @@ def test_a_constant_takes_no_part_in_the_fit() -> None:
     noise = ar1(0.9, 4000, rng)[:, None]
     regression, without = fitted(noise)
     _, beside = fitted(noise + 5.0)
-    spectra = [regression.spectra(fit)[0, 1:] for fit in (without, beside)]
+    spectra = [fit.spectra[0, 1:] for fit in (without, beside)]
     np.testing.assert_allclose(spectra[1], spectra[0], rtol=0.05)
     assert beside.deviance > without.deviance + 1000
 
@@ -205,5 +205,5 @@ def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: f
     for seed in range(8):
         noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
         regression, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
-        beyond += list(fit.squares[:, 0] > 9 * regression.spectra(fit)[:, 0])
+        beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
     assert np.mean(beyond) <= most

@@ -192,11 +192,12 @@ class _System:
         for block in blocks:
             if block.is_fixed:
                 self.gram[self.columns[block] * 2] = 0.0
-        for d, drive in zip(self.search.regression.drives, self.equations.drives, strict=True):
+        for d, drive, index in zip(self.search.regression.drives, self.equations.drives,
+                                   self.equations.indices, strict=True):
             products, with_error = drive.weighted(
                 self.search.regression.weights(selection.best.fit, d))
-            self.gram[np.ix_(drive.index, drive.index)] += products
-            self.side[drive.index] += with_error
+            self.gram[np.ix_(index, index)] += products
+            self.side[index] += with_error
 
     def _tried(self, selection: Selection,
                ) -> Iterable[tuple[tuple[EffectCandidate, ...], CandidateSet]]:
@@ -235,8 +236,9 @@ class _System:
             tuple(always), tuple(np.flatnonzero(self.equations.limited).tolist()),
             self.gram, self.side, prices.of_name(), -2 * log(search.decisions.wrong_sign_odds),
             tuple(prices.of_drives(count + 1) for count in range(len(search.regression.drives))),
-            tuple(self._forces(d, drive) for d, drive in zip(
-                search.regression.drives, self.equations.drives, strict=True)))
+            tuple(self._forces(d, drive, index) for d, drive, index in zip(
+                search.regression.drives, self.equations.drives, self.equations.indices,
+                strict=True)))
 
     def _optional(self, placement: Placement) -> OptionalPlacement:
         effect, d = placement.term.effect, placement.drive
@@ -253,7 +255,8 @@ class _System:
                 placement.names, self.columns[placement.block], strict=False) if name in bounds),
             placement.price - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free))
 
-    def _forces(self, d: int, drive: DriveEquations) -> OptionalForces:
+    def _forces(self, d: int, drive: DriveEquations, index: np.typing.NDArray[np.int_],
+                ) -> OptionalForces:
         regression, diagnosis = self.search.regression, self.diagnosis
         series, name = regression.series[d], self.search.design.drives[d]
         rows = {int(k): row for k, row in zip(regression.base_index[d], regression.base[d],
@@ -262,8 +265,8 @@ class _System:
             if d in block.rows:
                 rows |= zip(places, block.rows[d], strict=True)
         unknown = {column for block in self.unknown for column in self.columns[block]}
-        kept = [k for k, column in enumerate(drive.index) if int(column) not in unknown]
-        columns = drive.index[kept]
+        kept = [k for k, column in enumerate(index) if int(column) not in unknown]
+        columns = index[kept]
         gram, side = drive.weighted(np.ones(len(regression.bands)))
         products = np.empty((len(kept) + 1, len(kept) + 1))
         products[:-1, :-1] = gram[np.ix_(kept, kept)]

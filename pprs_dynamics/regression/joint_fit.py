@@ -35,7 +35,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.regression.base_columns import BaseColumn
-from pprs_dynamics.regression.normal_equations import Block, NormalEquations, term_gains
+from pprs_dynamics.regression.normal_equations import (
+    Block,
+    DriveEquations,
+    NormalEquations,
+    term_gains,
+)
 from pprs_dynamics.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.residuals.residuals import Residuals, ResidualsError
@@ -44,6 +49,7 @@ LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less, or by less than this share of
 # what it lies above the one it is compared with; rounds are bounded.
 CONVERGED, HOPELESS, MOST_ROUNDS, NOISE_STEPS = 0.01, 0.005, 40, 60
+MOST_EQUATIONS = 300  # of drives that are kept: some 0.1 to 0.5 MB each
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +64,8 @@ class JointFit:
     covariance : (P, P) array
     amplitudes : (D, J + 1) array
         Of the noise spectra [N^2].
+    spectra : (D, B) array
+        At the bands [N^2].
     deviance : float
         See the module.
     squares : (D, B) array
@@ -68,6 +76,7 @@ class JointFit:
     coefficients: Array
     covariance: Array
     amplitudes: Array
+    spectra: Array
     deviance: float
     squares: Array
     places: Mapping[Block, slice] = field(repr=False)
@@ -122,6 +131,7 @@ class Regression:
         self.base_products = {d: self.series[d].products(rows, rows)
                                for d, rows in self.base.items()}
         self._products: dict[tuple[Block, Block | None, int], Array] = {}
+        self._equations: dict[tuple[int, tuple[Block, ...]], DriveEquations] = {}
         self.error_scale = error_scale or {
             d: float(np.sqrt(np.mean(rows[-1] ** 2))) for d, rows in self.base.items()}
 
@@ -170,6 +180,15 @@ class Regression:
             self._products[key] = self.series[d].products(a.rows[d], other)
         return self._products[key]
 
+    def equations(self, d: int, felt: tuple[Block, ...]) -> DriveEquations:
+        """Return the equations of a drive, kept: sets that follow each other differ on few."""
+        key = (d, felt)
+        if key not in self._equations:
+            if len(self._equations) >= MOST_EQUATIONS:
+                self._equations.clear()
+            self._equations[key] = DriveEquations(self, d, felt)
+        return self._equations[key]
+
     def fit(self, blocks: Sequence[Block], start: Array | None = None,
             rival: float = np.inf) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
@@ -187,34 +206,32 @@ class Regression:
         if start is None:
             start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
         amplitudes, before = start, np.inf
-        for _ in range(MOST_ROUNDS):
-            solution = system.solve(shapes.spectra(amplitudes), self.counts)
+        for number in range(MOST_ROUNDS):
+            spectra = shapes.spectra(amplitudes)
+            solution = system.solve(spectra, self.counts)
             above = solution.deviance - rival
-            if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
+            if (abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above)
+                    or number == MOST_ROUNDS - 1):
                 break
             before = solution.deviance
             amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,
                                          solution.leverage, NOISE_STEPS)
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
-                        solution.deviance, solution.squares, system.places)
+                        spectra, solution.deviance, solution.squares, system.places)
 
     def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
         """Return the fit of blocks under given noise."""
         system = NormalEquations(self, blocks)
-        solution = system.solve(self.noise_shapes.spectra(amplitudes), self.counts)
+        spectra = self.noise_shapes.spectra(amplitudes)
+        solution = system.solve(spectra, self.counts)
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
-                        solution.deviance, solution.squares, system.places)
+                        spectra, solution.deviance, solution.squares, system.places)
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""
-        constants = self.spectra(fit)[:, 0]
         return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k],
-                                 self.residuals.period, float(constants[k]))
+                                 self.residuals.period, float(fit.spectra[k, 0]))
                 for k, d in enumerate(self.drives)}
-
-    def spectra(self, fit: JointFit) -> Array:
-        """Return S at the bands of the drives, (D, B) [N^2]."""
-        return self.noise_shapes.spectra(fit.amplitudes)
 
     def left(self, fit: JointFit) -> Array:
         """Return the root of the mean square that a fit leaves on each drive, (D,) [N]."""
@@ -232,7 +249,8 @@ class Regression:
 
     def weights(self, fit: JointFit, d: int) -> Array:
         """Return 1 / S at the bands of a drive, (B,) [1/N^2]."""
-        return 1 / self.spectra(fit)[self.drives.index(d)]
+        weights: Array = 1 / fit.spectra[self.drives.index(d)]
+        return weights
 
     def whitened(self, fit: JointFit, d: int, rows: Array) -> Array:
         """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""

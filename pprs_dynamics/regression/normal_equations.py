@@ -102,13 +102,24 @@ class Fitted(Protocol):
     def products(self, a: Block, b: Block | None, d: int) -> Array:
         """Return band sums of products of two blocks' rows on a drive."""
 
+    def equations(self, d: int, felt: tuple[Block, ...]) -> DriveEquations:
+        """Return those of a drive and the blocks that it feels."""
+
 
 class DriveEquations:
-    """Band sums of one drive's columns with each other and with the error."""
+    """Band sums of one drive's columns with each other and with the error.
 
-    def __init__(self, regression: Fitted, d: int, blocks: Sequence[Block],
-                 places: Mapping[Block, slice]) -> None:
-        felt = [block for block in blocks if d in block.rows]
+    Columns are those of the base, then of the free blocks in order.
+
+    Parameters
+    ----------
+    regression : Fitted
+    d : int
+    felt : sequence of Block
+        With rows on the drive.
+    """
+
+    def __init__(self, regression: Fitted, d: int, felt: Sequence[Block]) -> None:
         fixed = [block for block in felt if block.is_fixed]
         free = [block for block in felt if not block.is_fixed]
         base = regression.base_products[d]
@@ -119,7 +130,6 @@ class DriveEquations:
         gram[:, :first, :first] = base[:, :-1, :-1]
         side[:, :first] = base[:, :-1, -1]
         squares = base[:, -1, -1].copy()
-        index = [regression.base_index[d]]
         at = first
         spots: list[tuple[Block, slice]] = []
         for block in free:
@@ -133,7 +143,6 @@ class DriveEquations:
                 gram[:, spot, place] = pair
                 gram[:, place, spot] = pair.transpose(0, 2, 1)
             spots.append((block, spot))
-            index.append(np.arange(places[block].start, places[block].stop))
             at += block.size
         for number, block in enumerate(fixed):
             with_base = regression.products(block, None, d)[:, 0]
@@ -143,13 +152,12 @@ class DriveEquations:
                 squares += 2 * regression.products(block, other, d)[:, 0, 0]
             for other, place in spots:
                 side[:, place] -= regression.products(other, block, d)[:, :, 0]
-        self.index = np.concatenate(index)
         self.gram, self.side, self.squares = gram, side, squares
         self._flat = gram.reshape(count, -1)
 
     def weighted(self, weights: Array) -> tuple[Array, Array]:
         """Return X^T S^-1 X and X^T S^-1 y."""
-        size = len(self.index)
+        size = self.gram.shape[1]
         return (weights @ self._flat).reshape(size, size), weights @ self.side
 
     def left(self, coefficients: Array) -> Array:
@@ -195,8 +203,13 @@ class NormalEquations:
         self.limited = np.zeros(place, dtype=bool)
         self.limited[:len(regression.columns)] = [
             isinstance(column, KnownNumber) for column in regression.columns]
-        self.drives = [DriveEquations(regression, d, blocks, self.places)
-                       for d in regression.drives]
+        self.drives: list[DriveEquations] = []
+        self.indices: list[np.typing.NDArray[np.int_]] = []
+        for d in regression.drives:
+            felt = tuple(block for block in blocks if d in block.rows)
+            self.drives.append(regression.equations(d, felt))
+            self.indices.append(np.concatenate([regression.base_index[d], *(
+                np.arange(self.places[one].start, self.places[one].stop) for one in felt)]))
 
     def solve(self, spectra: Array, counts: Array) -> Solution:
         """Return the solution under noise spectra (D, B).
@@ -205,26 +218,28 @@ class NormalEquations:
         """
         data, b = np.zeros_like(self.precision), np.zeros(len(self.precision))
         weights = 1 / spectra
-        for k, drive in enumerate(self.drives):
+        for k, (drive, index) in enumerate(zip(self.drives, self.indices, strict=True)):
             gram, side = drive.weighted(weights[k])
-            data[np.ix_(drive.index, drive.index)] += gram
-            b[drive.index] += side
+            data[np.ix_(index, index)] += gram
+            b[index] += side
         beyond = np.zeros(len(b))
         for _ in range(MOST_LIMITED):
             H = data + self.precision + np.diag(BEYOND_TOLERANCE * np.abs(beyond))
             scale = 1 / np.sqrt(np.einsum('ii->i', H))
-            factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)))
+            factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)),
+                                check_finite=False)
             side = b + BEYOND_TOLERANCE * DEVIATIONS * beyond
-            coefficients = scale * cho_solve(factor, scale * side)
+            coefficients = scale * cho_solve(factor, scale * side, check_finite=False)
             now = np.sign(coefficients) * (self.limited & (np.abs(coefficients) > DEVIATIONS))
             if np.array_equal(now, beyond):
                 break
             beyond = now
-        covariance = cho_solve(factor, np.eye(len(H))) * np.outer(scale, scale)
-        squares = np.stack([drive.left(coefficients[drive.index]) for drive in self.drives])
+        covariance = cho_solve(factor, np.eye(len(H)), check_finite=False) * np.outer(scale, scale)
+        squares = np.stack([drive.left(coefficients[index])
+                            for drive, index in zip(self.drives, self.indices, strict=True)])
         leverage = np.stack([
-            drive.leverage(covariance[np.ix_(drive.index, drive.index)], weights[k])
-            for k, drive in enumerate(self.drives)])
+            drive.leverage(covariance[np.ix_(index, index)], weights[k])
+            for k, (drive, index) in enumerate(zip(self.drives, self.indices, strict=True))])
         log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
         deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
                          + coefficients @ self.precision @ coefficients

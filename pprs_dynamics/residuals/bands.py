@@ -37,6 +37,9 @@ from pprs_dynamics.residuals.residuals import Residuals, bridged, find_stretches
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
 SINGLE_BANDS, BAND_RATIO = 12, 1.25
+# For so few pairs of rows, sums over their products are up to 15 times as fast as a product of
+# matrices for every band (measured with 40 bands of 4000 samples).
+FEW_PAIRS = 12
 
 
 @dataclass(frozen=True)
@@ -160,6 +163,8 @@ class DriveSeries:
 
     def products(self, a: Array, b: Array) -> Array:
         """Return the sums over each band of products of rows (p, n) and (q, n), (B, p, q)."""
+        if len(a) * len(b) <= FEW_PAIRS:
+            return np.moveaxis(self.sums(a[:, None] * b[None]), -1, 0)
         found = np.zeros((len(self.bands), len(a), len(b)))
         cuts = self._cuts
         for band in range(len(self.bands)):

@@ -47,9 +47,10 @@ from pprs_dynamics.selection.decisions import Decisions
 from pprs_dynamics.selection.form import beyond_lack_of_fit
 from pprs_dynamics.selection.search import Search
 
-# What the exact model may differ from the linear one by, in whitened squares, and how often the
-# expansion is repeated; less changes no cost by more than a rival's margin.
-LEAST_DIFFERENCE, MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 4.0, 5, 6, 4
+# What the exact model may differ from the linear one by, in whitened squares, and the cost of a set
+# after it was expanded around from before: less changes no cost by more than a rival's margin.
+LEAST_DIFFERENCE, LEAST_CHANGE = 4.0, 2.0
+MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 5, 6, 4  # how often all of this is repeated
 
 
 @dataclass(frozen=True)
@@ -128,10 +129,11 @@ def _around_fitted(
         if search.is_beyond_point:
             kept = first_step(search, best)
         try:
-            around = linearised(search, kept, decisions)
+            around, moved = linearised(search, kept, decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
-        if around is None:
+        if around is None or (not search.is_beyond_point
+                              and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
         starts = [kept] if kept is best else [kept, best]
         search = Search(around, decisions, scale, _share_of(
@@ -179,10 +181,11 @@ def _share_of(report: Callable[[float], None], start: float, width: float,
     return lambda share: report(start + width * share)
 
 
-def linearised(search: Search, found: CandidateSet, decisions: Decisions) -> Design | None:
-    """Return the design around the fitted model of a set; None where it would change nothing.
+def linearised(search: Search, found: CandidateSet, decisions: Decisions,
+               ) -> tuple[Design | None, CandidateSet]:
+    """Return the design around the fitted model of a set, and the set in it.
 
-    Gauss-Newton steps with the set as it is, each halved until the exact error falls.
+    None where it would change nothing. Gauss-Newton steps with the set as it is, each halved until the exact error falls.
 
     Raises
     ------
@@ -198,7 +201,7 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions) -> Des
         search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
         search.evaluate(())
         found = search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
-    return around
+    return around, found
 
 
 def next_point(search: Search, found: CandidateSet) -> Point | None:
@@ -257,7 +260,7 @@ def expanded(search: Search, found: CandidateSet, decisions: Decisions,
     ModelError
         For values that no model may have.
     """
-    around = linearised(search, found, decisions)
+    around, _ = linearised(search, found, decisions)
     if around is None:
         return search, found
     scale = search.regression.error_scale

@@ -42,6 +42,8 @@ from pprs_dynamics.selection.library import Library
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 
+SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
+
 Candidates = tuple[Candidate, ...]
 
 
@@ -63,6 +65,7 @@ class FittedSets:
         self.prices = Prices.of(self.regression, decisions)
         self.library = Library(design, self.regression, self.prices)
         self.evaluated: dict[Hashable, CandidateSet] = {}
+        self._doubtful: dict[Hashable, tuple[Block, ...]] = {}
 
     @property
     def best(self) -> CandidateSet:
@@ -82,7 +85,7 @@ class FittedSets:
         blocks = [block for candidate in candidates for block in candidate.blocks]
         if start is not None:
             # The size of its forces, in proportion to which friction is in doubt, need not be
-            # exact: the noise of a near set does.
+            # exact: the noise of a near set does, and steps of it, whose columns are kept.
             doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
         else:
             doubtful = {}
@@ -106,18 +109,26 @@ class FittedSets:
         found = {}
         for candidate in candidates:
             for placement in candidate.placements if isinstance(candidate, EffectCandidate) else ():
-                c, blocks = fit.of(placement.block), []
-                if placement.bare is not None:
-                    rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
-                    blocks.append(Block(rows, np.eye(1)))
-                left_open = self.library.open_rows(placement)
-                if left_open is not None:
-                    assert placement.drive is not None
-                    blocks.append(Block({placement.drive: np.tensordot(c, left_open, 1)},
-                                        np.eye(left_open.shape[1])))
-                if blocks:
-                    found[placement] = tuple(blocks)
+                size = _stepped(fit.of(placement.block))
+                key = (placement, tuple(size.tolist()))
+                if key not in self._doubtful:
+                    self._doubtful[key] = self._doubtful_of(placement, size)
+                if self._doubtful[key]:
+                    found[placement] = self._doubtful[key]
         return found
+
+    def _doubtful_of(self, placement: Placement, c: Array) -> tuple[Block, ...]:
+        """Return the columns of one placement, for its coefficients (k,)."""
+        blocks = []
+        if placement.bare is not None:
+            rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
+            blocks.append(Block(rows, np.eye(1)))
+        left_open = self.library.open_rows(placement)
+        if left_open is not None:
+            assert placement.drive is not None
+            blocks.append(Block({placement.drive: np.tensordot(c, left_open, 1)},
+                                np.eye(left_open.shape[1])))
+        return tuple(blocks)
 
     def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
@@ -224,3 +235,11 @@ class FittedSets:
             gap = float(known[at] - known[at - 1])
             reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
         return reach
+
+
+def _stepped(coefficients: Array) -> Array:
+    """Return coefficients rounded to steps of their logarithm."""
+    size = np.abs(coefficients)
+    steps = np.round(np.log(np.where(size > 0, size, 1.0)) / SIZE_STEP)
+    stepped: Array = np.sign(coefficients) * np.where(size > 0, np.exp(SIZE_STEP * steps), 0.0)
+    return stepped

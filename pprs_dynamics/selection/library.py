@@ -27,10 +27,10 @@ from pprs_dynamics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.effects.effect import CatalogueEffect
 from pprs_dynamics.regression.design import Design, searched_in_drives
 from pprs_dynamics.regression.joint_fit import JointFit, Regression
-from pprs_dynamics.regression.normal_equations import Block, term_gains
 from pprs_dynamics.regression.open_form import open_rows
 from pprs_dynamics.regression.terms import Term
 from pprs_dynamics.selection.candidates import Candidate, EffectCandidate, Placement, Prices
+from pprs_dynamics.selection.scan import Entry, Scan
 
 
 @dataclass(frozen=True)
@@ -48,28 +48,6 @@ class ScannedTerm:
     term: Term
     names: tuple[str, ...]
     gain: float
-
-
-@dataclass(frozen=True)
-class _Group:
-    """Terms on one drive with equally many rows in the scan.
-
-    Parameters
-    ----------
-    terms : list of n (Term, names)
-    rows : (n, k) int array
-        Places in the drive's rows.
-    gram : (n, k, k, B) array
-        Band sums.
-    precision : (n, k, k) array
-    is_fixed : bool
-    """
-
-    terms: list[tuple[Term, tuple[str, ...]]]
-    rows: np.typing.NDArray[np.int_]
-    gram: Array
-    precision: Array
-    is_fixed: bool
 
 
 class DriveLibrary:
@@ -90,7 +68,6 @@ class DriveLibrary:
                         if design.acts_on(effect, d) and not _is_felt_everywhere(effect)]
         self.trials = {effect.name: len(effect.trials(design.covered[d]))
                        for effect in self.effects}
-        self._crosses: dict[Block, Array] = {}
 
     @cached_property
     def terms(self) -> list[Term]:
@@ -100,85 +77,32 @@ class DriveLibrary:
             effect, self.d, effect.trials(covered))]
 
     @cached_property
-    def rows(self) -> Array:
-        """All rows, transformed, in single precision, (R, n)."""
-        stacked = np.concatenate([term.rows[self.d][:, self.series.index] for term in self.terms])
-        return self.series.transform(stacked.astype(np.float32))
-
-    @cached_property
-    def groups(self) -> list[_Group]:
+    def _scan(self) -> Scan[tuple[Term, tuple[str, ...]]]:
         """Terms in all variants that the rows of a scan suffice for."""
-        found: dict[tuple[int, bool], list[tuple[Term, tuple[str, ...], list[int]]]] = {}
-        first = 0
+        stacked = np.concatenate([term.rows[self.d][:, self.series.index] for term in self.terms])
+        entries, first = [], 0
         for term in self.terms:
-            count = len(term.rows[self.d])
             if term.is_fixed:
-                found.setdefault((1, True), []).append((term, (), [first]))
+                entries.append(Entry((term, ()), (first,), True))
             else:
-                for names in term.effect.variants:
-                    if set(names) <= set(term.effect.scanned):
-                        places = [first + term.names.index(name) for name in names]
-                        found.setdefault((len(places), False), []).append((term, names, places))
-            first += count
-        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
-        groups = []
-        for (size, is_fixed), listed in found.items():
-            rows = np.array([places for _, _, places in listed])
-            gram = np.empty((len(listed), size, size, len(self.series.bands)))
-            for i in range(size):
-                for j in range(i, size):
-                    gram[:, i, j] = gram[:, j, i] = self.series.sums(
-                        self.rows[rows[:, i]] * self.rows[rows[:, j]])
-            precision = gram.sum(axis=-1) / scale
-            trace = np.einsum('nkk->n', precision)[:, None, None] / size
-            precision += (1e-9 * trace + 1e-300) * np.eye(size)
-            groups.append(_Group([(term, names) for term, names, _ in listed], rows, gram,
-                                 precision, is_fixed))
-        return groups
-
-    def _cross(self, block: Block | None) -> Array:
-        """Return band sums of all rows with a block's, or with base and error, (B, R, k)."""
-        key = block or _BASE
-        if key not in self._crosses:
-            if len(self._crosses) > 60:
-                self._crosses = {_BASE: self._crosses[_BASE]}
-            other = self.regression.base[self.d] if block is None else block.rows[self.d]
-            self._crosses[key] = self.series.products(
-                self.rows, other.astype(np.float32)).astype(np.float32)
-        return self._crosses[key]
+                entries += [Entry((term, names),
+                                  tuple(first + term.names.index(name) for name in names))
+                            for names in term.effect.variants
+                            if set(names) <= set(term.effect.scanned)]
+            first += len(term.rows[self.d])
+        return Scan(self.regression, {self.d: self.series.transform(stacked.astype(np.float32))},
+                    entries)
 
     def offers(self, fit: JointFit) -> dict[str, ScannedTerm]:
         """Return the best shape and variant of every effect, by name, at the noise of a fit."""
-        if not self.terms:
-            return {}
-        weights = self.regression.weights(fit, self.d)
-        index, felt = self.regression.local(fit, self.d)
-        narrow = weights.astype(np.float32)
-
-        def weighted(block: Block | None) -> Array:
-            cross = self._cross(block)
-            return (narrow @ cross.reshape(len(narrow), -1)).reshape(cross.shape[1:]).astype(float)
-
-        with_base = weighted(None)
-        known = np.concatenate([with_base[:, :-1], *(weighted(block) for block in felt)], axis=1)
-        side = with_base[:, -1] - known @ fit.coefficients[index]
-        for block in fit.blocks:
-            if block.is_fixed and self.d in block.rows:
-                side -= weighted(block)[:, 0]
-        spread = known @ fit.covariance[np.ix_(index, index)]
         best: dict[str, ScannedTerm] = {}
-        for group in self.groups:
-            S = group.gram @ weights - spread[group.rows] @ known[group.rows].transpose(0, 2, 1)
-            gains = term_gains(S, side[group.rows], group.precision, group.is_fixed)
+        for labels, gains in self._scan.gains(fit) if self.terms else ():
             for at in np.argsort(-gains):
-                term, names = group.terms[at]
+                term, names = labels[at]
                 name = term.effect.name
                 if name not in best or best[name].gain < gains[at]:
                     best[name] = ScannedTerm(term, names, float(gains[at]))
         return best
-
-
-_BASE = Block({}, np.zeros((0, 0)))
 
 
 class Library:
@@ -205,6 +129,31 @@ class Library:
                           for names in term.effect.variants
                           if any(np.any(rows[[term.names.index(name) for name in names]])
                                  for rows in term.rows.values())]
+
+    @cached_property
+    def _scan(self) -> Scan[Placement]:
+        """Of all that more than one drive feels."""
+        placements = [*self.structure, *self.spanning]
+        series = self.regression.series
+        entries, parts, first = [], [], 0
+        for one in placements:
+            rows = one.block.rows
+            size = max((len(values) for values in rows.values()), default=0)
+            entries.append(Entry(one, tuple(range(first, first + size)), one.block.is_fixed,
+                                 one.block.precision))
+            parts.append({d: rows[d] if d in rows else np.zeros((size, len(series[d])))
+                          for d in series})
+            first += size
+        return Scan(self.regression, {
+            d: np.concatenate([part[d] for part in parts]).astype(np.float32) for d in series},
+            entries)
+
+    def shared_offers(self, fit: JointFit) -> list[tuple[Placement, float]]:
+        """Return what more than one drive feels, with its gains at the noise of a fit."""
+        if not self.structure and not self.spanning:
+            return []
+        return [(one, float(gain)) for placements, gains in self._scan.gains(fit)
+                for one, gain in zip(placements, gains, strict=True)]
 
     def placement(self, term: Term, names: tuple[str, ...]) -> Placement:
         """Return a term with the coefficients that are to be fitted."""

@@ -84,10 +84,10 @@ class ScannedSets(FittedSets):
                     found.setdefault(effect, []).append(
                         (offer.gain - price, partial(library.full, offer)))
         best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
-        for placement in (*library.structure, *library.spanning) if drive is None else ():
+        for placement, gain in library.shared_offers(fit) if drive is None else ():
             key = (placement.term.effect, placement.drive)
             if key not in taken:
-                net = self.regression.gain(fit, placement.block) - placement.price
+                net = gain - placement.price
                 if key not in best or net > best[key][0]:
                     best[key] = (net, placement)
         for (effect, _), (net, placement) in best.items():

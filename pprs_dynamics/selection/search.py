@@ -114,6 +114,7 @@ class Search(ScannedSets):
                     return
             self._simplify()
             if self.is_beyond_point:
+                self._try(self._other_bending(self.best))
                 return
 
     # Moves
@@ -137,7 +138,7 @@ class Search(ScannedSets):
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
-        squares = found.fit.squares[:, 0] / self.regression.spectra(found.fit)[:, 0]
+        squares = found.fit.squares[:, 0] / found.fit.spectra[:, 0]
         return found.cost - float(np.sum(np.maximum(squares - self.regression.counts[:, 0], 0)))
 
     @staticmethod
@@ -159,6 +160,19 @@ class Search(ScannedSets):
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
                     found += [((*base.candidates, pattern), near) for pattern in patterns]
         return found
+
+    def _other_bending(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
+        """Yield sets in which another effect that bends the columns stands for one that does.
+
+        Several add nearly constant forces: around the wrong one, all would be computed in vain.
+        """
+        for candidate in best.effects:
+            if candidate.effect.bends_columns:
+                rest = tuple(one for one in best.candidates if one is not candidate)
+                for candidates in self.proposals(self.at_noise_of(best, rest)):
+                    if any(one.effect.bends_columns for one in candidates
+                           if isinstance(one, EffectCandidate) and one not in rest):
+                        yield candidates, best
 
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 ) -> CandidateSet | None:
