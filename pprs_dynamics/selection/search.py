@@ -82,11 +82,11 @@ class Search(ScannedSets):
         they are not bent.
         """
         self.evaluate(())
-        if starts:
-            self.rescanned(self.evaluate(starts[0]))
-        for start in starts[1:] or (() if starts else ((),)):
+        for number, start in enumerate(starts):
+            found = self.evaluate(start)
+            self.refined(found) if number else self.rescanned(found)
+        if len(starts) != 1:
             self._descend(False, 0.0)
-            self.refined(self.evaluate(start))
         if self.patterns and not self.is_beyond_point:
             self._descend(True, 0.5)
         self._report(1.0)
