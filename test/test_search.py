@@ -155,7 +155,7 @@ def names(found: CandidateSet) -> list[str]:
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
     selection = select(MODEL, [recording], DECISIONS)
-    found, _ = without_remainders(selection.last, selection.best)
+    _, found, _ = without_remainders(selection.last, selection.best)
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
     last = selection.last
@@ -171,7 +171,7 @@ def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
                               'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
     selection = select(MODEL, [recording], DECISIONS)
     assert names(selection.best) == ['platform_drag', 'revolute_friction']
-    found, remainders = without_remainders(selection.last, selection.best)
+    _, found, remainders = without_remainders(selection.last, selection.best)
     assert ('revolute_friction' in names(found)) is stands_out
     assert [one.candidate.name for one in remainders] == ['revolute_friction'] * (not stands_out)
 
@@ -190,7 +190,7 @@ def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
         recording = Recording.from_arrays('made', TIME, forces.mechanism.position,
                                           effort=total + 0.05 * rng.normal(size=total.shape))
         selection = select(MODEL, [recording], DECISIONS)
-        found, _ = without_remainders(selection.last, selection.best)
+        _, found, _ = without_remainders(selection.last, selection.best)
         assert names(found) == ['external_wrench'], follows
 
 

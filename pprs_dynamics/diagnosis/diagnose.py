@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -175,12 +175,11 @@ class _Answer:
 
     def __init__(self, selection: Selection, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
-        self.selection, self.decisions = selection, decisions
-        self.validate = validate
+        self.decisions, self.validate = decisions, validate
         self.search: Search = selection.last
         self.design = self.search.design
-        self.best = selection.best
-        self.kept, self.remainders = without_remainders(self.search, self.best)
+        self.best, self.kept, self.remainders = without_remainders(self.search, selection.best)
+        self.selection = replace(selection, best=self.best)
         self.drives = self.design.drives
 
     def diagnosis(self) -> Diagnosis:
@@ -314,7 +313,8 @@ class _Answer:
             names = tuple((c.name, self._names(c)) for c in one.candidates)
             key = frozenset(name for name, _ in names)
             if key not in found:
-                found[key] = RankedSet(names, one.cost - self.best.cost)
+                # Of a set that bends nothing the cost is that in the first design.
+                found[key] = RankedSet(names, max(one.cost - self.best.cost, 0.0))
             if len(found) == MOST_SETS:
                 break
         return tuple(found.values())

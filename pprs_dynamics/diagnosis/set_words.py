@@ -26,7 +26,8 @@ def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     every = diagnosis.residuals.drives
     return [(' and '.join(with_drives(_plain_name(name), drives, every)
                           for name, drives in one.names) or 'nothing missing',
-             'the best' if one.cost <= 0 else f'+{plain(one.cost, 2)}') for one in diagnosis.sets]
+             f'+{plain(one.cost, 2)}' if number else 'the best')
+            for number, one in enumerate(diagnosis.sets)]
 
 
 def runner_up(diagnosis: Diagnosis) -> str:

@@ -22,7 +22,7 @@ effort_offset (F_f - F_b) / 2, which is also what it gives at rest.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from typing import ClassVar
 
 from pprs_dynamics.arrays import Array
@@ -63,3 +63,9 @@ class AsymmetricFriction(DriveEffect):
         forward = (1 + drive.direction) / 2
         backward = (1 - drive.direction) / 2
         return (forward, -backward, forward * drive.velocity, backward * drive.velocity)
+
+    @classmethod
+    def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:
+        """Return which parts there are: dry and viscous friction are two things."""
+        parts = {'dry': FORCES, 'viscous': VISCOUS}
+        return frozenset(part for part, those in parts.items() if set(names) & set(those))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -253,6 +253,11 @@ class CatalogueEffect(Effect):
     def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
         """Return the linear parameters that belong to coefficients."""
         return dict(coefficients)
+
+    @classmethod
+    def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:
+        """Return what is claimed with these coefficients; each is priced as a name."""
+        return frozenset({names})
 
     @classmethod
     def _checked(cls, prefix: str, values: Any, complete: bool) -> dict[str, float]:

@@ -19,9 +19,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
+
+
+# By how much real viscous friction differs by direction, as a share, and its exponent of the speed
+# from 1: grease and oil of gears thin with speed.
+DIRECTIONS, EXPONENTS = 0.1, 1 / 3
+LEAST_SPEED = 1e-3  # of the usual one, below which the logarithm goes no further
 
 
 class ViscousFriction(DriveEffect):
@@ -46,3 +54,11 @@ class ViscousFriction(DriveEffect):
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return (q_dot,)."""
         return (drive.velocity,)
+
+    @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return what a difference by direction adds, and another exponent, to first order."""
+        speed = np.abs(drive.velocity)
+        usual = np.sqrt(np.mean(speed ** 2)) or 1.0
+        logarithm = np.log(np.maximum(speed / usual, LEAST_SPEED))
+        return ((DIRECTIONS * speed,), (EXPONENTS * logarithm * drive.velocity,))

@@ -100,7 +100,8 @@ def question_of(model: ForceModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
     selection = select(model, recordings, DECISIONS, progress)
-    adopted, remainders = without_remainders(selection.last, selection.best)
+    best, adopted, remainders = without_remainders(selection.last, selection.best)
+    selection = replace(selection, best=best)
     rivals = find_rivals(selection, adopted, DECISIONS.rival_margin,
                          {one.candidate.name for one in remainders})
     return question_after(selection, adopted, rivals)

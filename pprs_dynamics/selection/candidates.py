@@ -97,12 +97,15 @@ class EffectCandidate:
     placements : tuple of Placement
         One for each drive, ascending, or one.
     price : float
-        Of its name and its drives.
+        Of its hypotheses and its drives.
+    hypotheses : frozenset
+        That it claims, each priced as a name.
     """
 
     effect: type[CatalogueEffect]
     placements: tuple[Placement, ...]
     price: float
+    hypotheses: frozenset[Hashable]
 
     @property
     def name(self) -> str:

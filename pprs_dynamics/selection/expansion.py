@@ -71,7 +71,7 @@ class Selection:
 
     @property
     def ranked(self) -> list[CandidateSet]:
-        """Sets of both searches by cost, the best first.
+        """Sets of both searches, the best first, the others by cost.
 
         A set belongs to the search around whose point it is linear: those with an effect that
         bends the columns to the last, the others to the first.
@@ -82,8 +82,8 @@ class Selection:
                 return any(map(_bends, one.candidates))
             found = [one for one in found if is_bent(one)] + [
                 one for one in self.first.evaluated.values() if not is_bent(one)]
-            found = [self.best, *(one for one in found if one is not self.best)]
-        return sorted(found, key=lambda one: one.cost)
+        others = [one for one in found if one is not self.best]
+        return [self.best, *sorted(others, key=lambda one: one.cost)]
 
 
 def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,

@@ -29,6 +29,7 @@ import numpy as np
 from pprs_dynamics.effects.drive_effect import DriveEffect
 from pprs_dynamics.selection.allowance import share_of_allowance
 from pprs_dynamics.selection.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.selection.fitted_sets import LEAST_IMPROVEMENT
 from pprs_dynamics.selection.search import Search
 
 
@@ -51,10 +52,11 @@ class Remainder:
 
 
 def without_remainders(search: Search, best: CandidateSet,
-                       ) -> tuple[CandidateSet, tuple[Remainder, ...]]:
-    """Return the set without candidates that are within the model error of others.
+                       ) -> tuple[CandidateSet, CandidateSet, tuple[Remainder, ...]]:
+    """Return the best set, that without candidates within the model error of others, and these.
 
     What was best together with them may not be without: then something else may stand for it.
+    Where that, with a lack of fit of its own, costs less than the set given, it is the best.
     """
     kept, remainders = beyond_lack_of_fit(search, best)
     while kept.total > best.total + search.decisions.rival_margin:
@@ -62,11 +64,13 @@ def without_remainders(search: Search, best: CandidateSet,
         if better is kept:
             break
         kept = better
+    if search.best.cost < best.cost - LEAST_IMPROVEMENT and not search.is_beyond_point:
+        return without_remainders(search, search.best)
     if remainders:
         # What paid beside them only is not kept for their sake.
         kept = search.pruned(kept)
     names = {candidate.name for candidate in kept.candidates}
-    return kept, tuple(one for one in remainders if one.candidate.name not in names)
+    return best, kept, tuple(one for one in remainders if one.candidate.name not in names)
 
 
 def beyond_lack_of_fit(search: Search, best: CandidateSet,

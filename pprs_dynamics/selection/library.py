@@ -211,14 +211,16 @@ class Library:
                   placements: Sequence[Placement]) -> EffectCandidate:
         """Return an effect with the price of its name and drives.
 
-        With other coefficients on other drives it is more than one hypothesis: asymmetric
-        friction that is dry on one drive and viscous on another is two.
+        With other coefficients, on other drives or on one, it may be more than one hypothesis:
+        asymmetric friction that is dry and viscous is two.
         """
         ordered = tuple(sorted(placements, key=lambda one: -1 if one.drive is None else one.drive))
-        price = len({one.names for one in ordered}) * self.prices.of_name()
+        hypotheses = frozenset[Hashable]().union(*(effect.hypotheses(one.names)
+                                                   for one in ordered))
+        price = len(hypotheses) * self.prices.of_name()
         if ordered[0].drive is not None:
             price += self.prices.of_drives(len(ordered))
-        return EffectCandidate(effect, ordered, price)
+        return EffectCandidate(effect, ordered, price, hypotheses)
 
     def rebuilt(self, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
         """Return the candidates of another library with the columns of this one."""

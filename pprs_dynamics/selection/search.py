@@ -280,6 +280,21 @@ class Search(ScannedSets):
         for candidate in best.effects:
             for other in self._alternatives(candidate):
                 yield self._exchanged(best, candidate, other), best
+            if len(candidate.hypotheses) > 1:
+                yield from self._two_for(best, candidate)
+
+    def _two_for(self, best: CandidateSet, gone: EffectCandidate,
+                 ) -> Iterable[tuple[Candidates, CandidateSet]]:
+        """Yield sets in which two other effects stand for one that claims more than one thing."""
+        rest = tuple(one for one in best.candidates if one is not gone)
+
+        def with_another(candidates: Candidates) -> list[Candidates]:
+            found = self.proposals(self.at_noise_of(best, candidates), REPLACEMENTS + 1)
+            return [more for more in found if all(
+                one.effect is not gone.effect for one in more if isinstance(one, EffectCandidate))]
+        for first in with_another(rest):
+            for second in with_another(first)[:REPLACEMENTS]:
+                yield second, best
 
     def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate in the shapes that its own is easily taken for."""
