@@ -125,7 +125,7 @@ def test_a_vibration_is_no_noise() -> None:
 def test_a_constant_takes_no_part_in_the_fit() -> None:
     rng = np.random.default_rng(6)
     noise = ar1(0.9, 4000, rng)[:, None]
-    regression, without = fitted(noise)
+    _, without = fitted(noise)
     _, beside = fitted(noise + 5.0)
     spectra = [fit.spectra[0, 1:] for fit in (without, beside)]
     np.testing.assert_allclose(spectra[1], spectra[0], rtol=0.05)
@@ -204,6 +204,6 @@ def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: f
     beyond = []
     for seed in range(8):
         noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
-        regression, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
+        _, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
         beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
     assert np.mean(beyond) <= most

@@ -25,7 +25,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
 
-
 # By how much real viscous friction differs by direction, as a share, and its exponent of the speed
 # from 1: grease and oil of gears thin with speed.
 DIRECTIONS, EXPONENTS = 0.1, 1 / 3

@@ -19,8 +19,8 @@ r"""Power spectrum of the noise of each drive: smooth, falling, bounded at zero 
 with corners f_j one octave apart, from 1 / (4 T) to half the Nyquist frequency: wide enough for
 white noise, AR(1) noise of any correlation and nearly 1/f noise. No resonance is possible, so a
 vibration stands out. The noise of a constant (k = 0) is what the slope of the lowest frequencies
-leads to below them: a constant force stands out of white and of AR(1) noise, and of 1/f noise, which
-goes on rising, where it is larger than that. The slope is one for all drives: each alone has
+leads to below them: a constant force stands out of white and of AR(1) noise, and of 1/f noise,
+which goes on rising, where it is larger than that. The slope is one for all drives: each alone has
 only a dozen coefficients to tell it from.
 
 The amplitudes maximise the restricted likelihood: with squares r^2 and leverage h of a regression,

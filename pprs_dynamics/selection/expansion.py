@@ -185,7 +185,8 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions,
                ) -> tuple[Design | None, CandidateSet]:
     """Return the design around the fitted model of a set, and the set in it.
 
-    None where it would change nothing. Gauss-Newton steps with the set as it is, each halved until the exact error falls.
+    None where it would change nothing. Gauss-Newton steps with the set as it is, each halved until
+    the exact error falls.
 
     Raises
     ------
@@ -263,8 +264,7 @@ def expanded(search: Search, found: CandidateSet, decisions: Decisions,
     around, _ = linearised(search, found, decisions)
     if around is None:
         return search, found
-    scale = search.regression.error_scale
-    search = Search(around, decisions, scale, with_unknown=False)
+    search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
     search.evaluate(())
     return search, search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
 

@@ -80,7 +80,8 @@ class DriveLibrary:
     def _scan(self) -> Scan[tuple[Term, tuple[str, ...]]]:
         """Terms in all variants that the rows of a scan suffice for."""
         stacked = np.concatenate([term.rows[self.d][:, self.series.index] for term in self.terms])
-        entries, first = [], 0
+        entries: list[Entry[tuple[Term, tuple[str, ...]]]] = []
+        first = 0
         for term in self.terms:
             if term.is_fixed:
                 entries.append(Entry((term, ()), (first,), True))

@@ -134,10 +134,10 @@ class Scan(Generic[Label]):
         weights = {d: self.regression.weights(fit, d) for d in self._rows}
         for d in self._rows:
             index, felt = self.regression.local(fit, d)
-            narrow = weights[d].astype(np.float32)
 
-            def weighted(block: Block | None, d: int = d, narrow: Array = narrow) -> Array:
+            def weighted(block: Block | None, d: int = d) -> Array:
                 cross = self._cross(d, block)
+                narrow = weights[d].astype(np.float32)
                 return (narrow @ cross.reshape(len(narrow), -1)).reshape(
                     cross.shape[1:]).astype(float)
 
