@@ -262,10 +262,9 @@ def expanded(search: Search, found: CandidateSet, decisions: Decisions,
         For values that no model may have.
     """
     around, _ = linearised(search, found, decisions)
-    if around is None:
-        return search, found
-    search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
-    search.evaluate(())
+    if around is not None:
+        search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
+        search.evaluate(())
     return search, search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
 
 
