@@ -100,7 +100,7 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
     best = first.run()
     found = _around_fitted(first, best, decisions, report, _bending_alone)
-    if _stands_out(*found):
+    if _stands_out(*found) and not all(map(_bends, best.candidates)):
         found = min(found, _around_fitted(first, best, decisions, report, _as_it_is,
                                           found[1].total),
                     key=lambda one: beyond_lack_of_fit(*one)[0].total)
