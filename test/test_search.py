@@ -194,6 +194,17 @@ def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
         assert names(found) == ['external_wrench'], follows
 
 
+def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
+    hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
+              'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
+    found = select(MODEL, [recording_of(hidden)], DECISIONS)
+    assert names(found.best) == ['coulomb_friction', 'viscous_friction']
+    # One that is both is told with its cost.
+    assert found.ranked[0] is found.best
+    both = next(one for one in found.ranked if names(one) == ['asymmetric_friction'])
+    assert both.cost > found.best.cost
+
+
 def test_one_cause_wins_over_several_that_imitate_it() -> None:
     found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).best
     assert names(found) == ['rod_mass']

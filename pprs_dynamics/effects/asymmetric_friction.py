@@ -25,9 +25,12 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.viscous_friction import thinning
 
 FORCES = ('force_forward', 'force_backward')
 VISCOUS = ('viscous_forward', 'viscous_backward')
@@ -69,3 +72,10 @@ class AsymmetricFriction(DriveEffect):
         """Return which parts there are: dry and viscous friction are two things."""
         parts = {'dry': FORCES, 'viscous': VISCOUS}
         return frozenset(part for part, those in parts.items() if set(names) & set(those))
+
+    @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return what another exponent of the speed adds to viscous friction, to first order."""
+        forward = (1 + drive.direction) / 2
+        added, none = thinning(drive), np.zeros_like(drive.velocity)
+        return ((none, none, forward * added, (1 - forward) * added),)

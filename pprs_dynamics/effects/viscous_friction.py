@@ -57,7 +57,12 @@ class ViscousFriction(DriveEffect):
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
         """Return what a difference by direction adds, and another exponent, to first order."""
-        speed = np.abs(drive.velocity)
-        usual = np.sqrt(np.mean(speed ** 2)) or 1.0
-        logarithm = np.log(np.maximum(speed / usual, LEAST_SPEED))
-        return ((DIRECTIONS * speed,), (EXPONENTS * logarithm * drive.velocity,))
+        return (DIRECTIONS * np.abs(drive.velocity),), (thinning(drive),)
+
+
+def thinning(drive: DriveSamples) -> Array:
+    """Return what an exponent of the speed by `EXPONENTS` above 1 adds to q_dot, to first order."""
+    speed = np.abs(drive.velocity)
+    usual = np.sqrt(np.mean(speed ** 2)) or 1.0
+    added: Array = EXPONENTS * np.log(np.maximum(speed / usual, LEAST_SPEED)) * drive.velocity
+    return added
