@@ -22,6 +22,7 @@ import pytest
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.mechanism.paths import Excitation
+from pprs_dynamics.mechanism.robot import DRIVES
 from pprs_dynamics.model.model_file import build_model
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
@@ -181,6 +182,15 @@ def test_a_delay_of_whole_samples_shifts_the_effort(motion: DrivenMotion) -> Non
     for name in ('position', 'velocity', 'acceleration'):
         values, before = getattr(found, name), getattr(plain, name)
         np.testing.assert_allclose(values[2:], before[:-2], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize('name', MEMORY)
+def test_what_has_a_memory_is_delayed_as_it_is(name: str, motion: DrivenMotion) -> None:
+    plant = PrescribedPlant(MODEL.values, motion)
+    effect = draw_effect(name, np.random.default_rng(5))
+    late = TimeDelay({drive: {'delay': 4 / RATE} for drive in DRIVES})
+    found, plain = (plant.readings(effects).effort for effects in ([effect, late], [effect]))
+    np.testing.assert_allclose(found[4:], plain[:-4], rtol=0, atol=1e-6)
 
 
 def test_friction_that_turns_over_between_samples_is_delayed_without_rounding_it_off() -> None:

@@ -54,6 +54,8 @@ class OptionalPlacement:
         Columns and the bounds below which their coefficients are unphysical.
     price : float
         Of its shape, less ln det of its prior's precision.
+    hypotheses : tuple of str
+        That it claims: over all placements of an effect each is priced as a name.
     """
 
     drive: str | None
@@ -63,6 +65,7 @@ class OptionalPlacement:
     fixed: tuple[int, ...]
     signs: tuple[tuple[int, float], ...]
     price: float
+    hypotheses: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -253,7 +256,8 @@ class _System:
             tuple(column for block in own if block.is_fixed for column in self.columns[block]),
             tuple((column, bounds[name]) for name, column in zip(
                 placement.names, self.columns[placement.block], strict=False) if name in bounds),
-            placement.price - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free))
+            placement.price - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
+            tuple(sorted(map(str, effect.hypotheses(placement.names)))))
 
     def _forces(self, d: int, drive: DriveEquations, index: np.typing.NDArray[np.int_],
                 ) -> OptionalForces:

@@ -66,7 +66,7 @@
     }
     for (const effect of data.effects) {
       const used = effect.placements.filter((one) => placements.includes(one));
-      if (used.length) cost += data.namePrice;
+      cost += data.namePrice * new Set(used.flatMap((one) => one.hypotheses)).size;
       if (used.length && used[0].drive) cost += data.drivePrices[used.length - 1];
     }
     return {c, cost};

@@ -78,7 +78,8 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
 
 def _placement(one: OptionalPlacement) -> dict[str, Any]:
     return {'drive': one.drive, 'isFound': one.is_found, 'isFirstChoice': one.is_first_choice,
-            'columns': one.columns, 'fixed': one.fixed, 'signs': one.signs, 'price': one.price}
+            'columns': one.columns, 'fixed': one.fixed, 'signs': one.signs, 'price': one.price,
+            'hypotheses': one.hypotheses}
 
 
 def _drive(one: OptionalForces, residuals: Residuals) -> dict[str, Any]:

@@ -272,7 +272,9 @@ def _hidden_force(effect: DriveForce, moment: DriveMoment) -> Array:
     q, y, loads = moment.position, moment.velocity, moment.guide_load
     time = np.broadcast_to(moment.time, q.shape)
     force = np.empty_like(q)
-    steps = np.diff(time[:, 0])
+    steps = np.diff(time, axis=0).max(axis=1)
+    # What is late shows the beginning first, where the robot stands, for as long as it is late.
+    steps = np.where(steps > 0, steps, steps.max())
     for k in range(len(q)):
         force[k] = effect.force(DriveMoment(time[k], q[k], y[k], loads[k]))
         if k < len(steps):
