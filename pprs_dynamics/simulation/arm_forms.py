@@ -120,11 +120,11 @@ FORMS: dict[str, JointForm] = {
         lambda rng, m: {'coefficient': 2 * SIZE(rng), 'reference': m.effort},
         lambda p, m: p['coefficient'] * np.cbrt(m.load ** 2 * p['reference']) * m.sign),
     'hysteresis': JointForm(
-        'three springs that slip one after the other, F / 3 each',
+        'three springs that slip one after the other, F / 3 each, in the place of F sgn(v)',
         lambda rng, m: {'force': SIZE(rng) * m.effort, 'stroke': 0.02 * float(
             np.ptp(m.position))},
         lambda p, m: sum((_slipping(m.position, p['force'] / 3, share * p['stroke'])
-                          for share in (0.2, 0.6, 1.0)), np.zeros_like(m.position))),
+                          for share in (0.2, 0.6, 1.0)), -p['force'] * m.sign)),
     'friction_drift': JointForm(
         'F exp(-t / T) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'time': 0.3 * float(m.time[-1])},
