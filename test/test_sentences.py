@@ -311,6 +311,18 @@ def test_the_runner_up_is_told_by_what_it_has_instead(second: tuple[str, ...], s
     assert runner_up(one_effect()) == ''
 
 
+def test_effects_that_are_only_on_other_drives_in_the_runner_up_are_told_once() -> None:
+    every = tuple(DRIVES)
+    best = RankedSet((('hysteresis', every), ('coulomb_friction', ('lift_2',))), 0.0)
+    second = RankedSet((('hysteresis', every[:4]), ('load_friction', ('lift_2',))), 12.0)
+    assert runner_up(one_effect(sets=(best, second))) == (
+        'load_friction on lift_2 instead of coulomb_friction on lift_2, '
+        'hysteresis on other drives, cost +12')
+    alone = RankedSet((('hysteresis', every[:1]), ('coulomb_friction', ('lift_2',))), 12.0)
+    assert runner_up(one_effect(sets=(best, alone))) == (
+        'hysteresis on slide_1 instead of hysteresis on all six drives, cost +12')
+
+
 def test_one_pattern_on_all_drives_is_one_finding() -> None:
     line = tuple(statement(drive, 'frequency', 'line', (7.0, 7.1)) for drive in DRIVES)
     words = word_diagnosis(made_up_diagnosis('unknown', depends_on=line))

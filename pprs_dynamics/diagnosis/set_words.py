@@ -34,14 +34,19 @@ def runner_up(diagnosis: Diagnosis) -> str:
     """Return how the second best set differs from the best, with its cost; '' for none."""
     if len(diagnosis.sets) < 2:
         return ''
-    every = diagnosis.residuals.drives
-    best, second = ([with_drives(_plain_name(name), drives, every) for name, drives in one.names]
-                    for one in diagnosis.sets[:2])
-    missing = listed([one for one in best if one not in second])
-    instead = listed([one for one in second if one not in best])
-    words = (f'{instead} instead of {missing}' if missing and instead
-             else f'{instead} as well' if instead else f'without {missing}')
-    return f'{words}, cost +{plain(diagnosis.sets[1].cost, 2)}'
+    best, second = (set(one.names) for one in diagnosis.sets[:2])
+    missing, instead = best - second, second - best
+    moved = {name for name, _ in missing} & {name for name, _ in instead}
+    if len(missing | instead) <= 2:
+        moved = set()  # one on other drives: both are told
+    left, put = (listed([with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
+                         for name, drives in one.names
+                         if (name, drives) in apart and name not in moved])
+                 for one, apart in zip(diagnosis.sets[:2], (missing, instead), strict=True))
+    words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
+             else f'without {left}' if left else '',
+             f'{listed(sorted(moved))} on other drives' if moved else '']
+    return ', '.join([*filter(None, words), f'cost +{plain(diagnosis.sets[1].cost, 2)}'])
 
 
 def _plain_name(name: str) -> str:
