@@ -37,8 +37,7 @@ from pprs_dynamics.experiments.next_experiment import (
     check_purpose,
     next_experiment,
 )
-from pprs_dynamics.measurement.joint_motion_files import write_joint_motion
-from pprs_dynamics.measurement.pose_files import write_poses
+from pprs_dynamics.measurement.motion_files import write_motion
 from pprs_dynamics.model.arm_model import ArmModel
 from pprs_dynamics.model.drive_model import DriveModel
 from pprs_dynamics.model.keys import is_arm
@@ -117,11 +116,9 @@ def run(options: argparse.Namespace) -> int:
     count = int(options.duration * options.rate + 1e-9) + 1
     motion = experiment.motion(np.arange(count) / options.rate)
     screen.print(experiment_view(experiment))
-    if isinstance(model, ArmModel):
-        write_joint_motion(options.output, model.drives, motion)
-        command = ''
-    else:
-        write_poses(options.output, motion)
+    write_motion(options.output, model.drives, motion)
+    command = ''
+    if not isinstance(model, ArmModel):
         command = shlex.join([
             'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
             '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
@@ -147,8 +144,7 @@ def _excite_arm(options: argparse.Namespace, model: ArmModel, limits: ArmLimits,
         found = excite_arm(model, limits, options.duration, options.seed,
                            lambda share: progress(share, 1.0))
     count = int(options.duration * options.rate + 1e-9) + 1
-    write_joint_motion(options.output, model.drives,
-                       found.motion(np.arange(count) / options.rate))
+    write_motion(options.output, model.drives, found.motion(np.arange(count) / options.rate))
     screen.print(escape(found.text))
     screen.print('limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share:.0%}' for name, share in found.limits.items()))

@@ -36,9 +36,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.measurement.joint_motion_files import write_joint_motion
-from pprs_dynamics.measurement.pose_files import write_poses
-from pprs_dynamics.model.arm_model import ArmModel
+from pprs_dynamics.measurement.motion_files import write_motion
 from pprs_dynamics.server.bodies import (
     BadRequestError,
     number_of,
@@ -243,14 +241,8 @@ class Api:
         found = session.experiment
         if found is None:
             raise SessionError('no experiment is designed yet')
-        motion: Any = found.motion
-
-        def write(path: Path) -> None:
-            if isinstance(session.model, ArmModel):
-                write_joint_motion(path, session.drives, motion)
-            else:
-                write_poses(path, motion)
-        return self._download('next.csv', 'text/csv', write)
+        return self._download('next.csv', 'text/csv', lambda path: write_motion(
+            path, session.drives, found.motion))
 
     def model(self, query: Any) -> Response:
         """Answer the model file, with what is ticked where that is asked for."""
