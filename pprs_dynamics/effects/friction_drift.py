@@ -25,8 +25,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
 
-REMAINING = 1 / 3  # share by which friction may be off that it has faded to, of what fades
-
 
 class FrictionDrift(DriveEffect):
     """Friction that changes while the robot works: cold grease, seals that warm up."""
@@ -58,11 +56,6 @@ class FrictionDrift(DriveEffect):
         if memory['start'] is None:
             memory['start'] = float(drive.time[0])
         return (np.exp(-(drive.time - memory['start']) / shape['time']) * drive.direction,)
-
-    @classmethod
-    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what friction adds that does not fade: it ends where the drive is warm."""
-        return (REMAINING * drive.direction,),
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
