@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-r"""Power spectrum of the noise of each drive: smooth, falling, bounded at zero frequency.
+r"""Power spectrum of the noise of each drive: smooth and falling.
 
 .. math:: S(f) = a_0 + \sum_j \frac{a_j}{1 + (f / f_j)^2}, \qquad a_j \ge 0,
 
