@@ -30,7 +30,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
-from pprs_dynamics.effects.viscous_friction import thinning
+from pprs_dynamics.effects.open_exponent import other_exponent
 
 FORCES = ('force_forward', 'force_backward')
 VISCOUS = ('viscous_forward', 'viscous_backward')
@@ -75,7 +75,8 @@ class AsymmetricFriction(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what another exponent of the speed adds to viscous friction, to first order."""
-        forward = (1 + drive.direction) / 2
-        added, none = thinning(drive), np.zeros_like(drive.velocity)
-        return ((none, none, forward * added, (1 - forward) * added),)
+        """Return what thinning with speed adds to viscous friction."""
+        none = np.zeros_like(drive.velocity)
+        *_, forward, backward = cls.columns(drive)
+        return ((none, none, other_exponent(drive.velocity, forward),
+                 other_exponent(drive.velocity, backward)),)

@@ -19,16 +19,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-import numpy as np
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.effects.open_exponent import other_exponent
 
 # Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
 # power 2/3 of the load (Johnson, Contact Mechanics, 1985), that of rolling with up to 4/3.
-EXPONENTS = 1 / 3
-LEAST_LOAD = 1e-3  # of the usual one, below which the logarithm goes no further
 
 
 class LoadFriction(DriveEffect):
@@ -69,8 +66,5 @@ class LoadFriction(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what an exponent of the load by `EXPONENTS` above 1 adds, to first order."""
-        load = np.abs(drive.guide_load)
-        usual = np.sqrt(np.mean(load ** 2)) or 1.0
-        logarithm = np.log(np.maximum(load / usual, LEAST_LOAD))
-        return ((EXPONENTS * logarithm * drive.guide_load * drive.direction,),)
+        """Return what another exponent of the load adds: 2/3 in Hertzian contacts."""
+        return (tuple(other_exponent(drive.guide_load, one) for one in cls.columns(drive)),)

@@ -24,11 +24,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.effects.open_exponent import other_exponent
 
-# By how much real viscous friction differs by direction, as a share, and its exponent of the speed
-# from 1: grease and oil of gears thin with speed.
-DIRECTIONS, EXPONENTS = 0.1, 1 / 3
-LEAST_SPEED = 1e-3  # of the usual one, below which the logarithm goes no further
+DIRECTIONS = 0.1  # share by which real viscous friction differs by direction
 
 
 class ViscousFriction(DriveEffect):
@@ -56,13 +54,6 @@ class ViscousFriction(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what a difference by direction adds, and another exponent, to first order."""
-        return (DIRECTIONS * np.abs(drive.velocity),), (thinning(drive),)
-
-
-def thinning(drive: DriveSamples) -> Array:
-    """Return what an exponent of the speed by `EXPONENTS` above 1 adds to q_dot, to first order."""
-    speed = np.abs(drive.velocity)
-    usual = np.sqrt(np.mean(speed ** 2)) or 1.0
-    added: Array = EXPONENTS * np.log(np.maximum(speed / usual, LEAST_SPEED)) * drive.velocity
-    return added
+        """Return what a difference by direction adds, and thinning with speed."""
+        return ((DIRECTIONS * np.abs(drive.velocity),),
+                (other_exponent(drive.velocity, drive.velocity),))

@@ -205,17 +205,17 @@ class Regression:
         shapes = self.noise_shapes
         if start is None:
             start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
-        amplitudes, before = start, np.inf
-        for number in range(MOST_ROUNDS):
-            spectra = shapes.spectra(amplitudes)
-            solution = system.solve(spectra, self.counts)
-            above = solution.deviance - rival
-            if (abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above)
-                    or number == MOST_ROUNDS - 1):
-                break
+        amplitudes, spectra = start, shapes.spectra(start)
+        solution = system.solve(spectra, self.counts)
+        for _ in range(MOST_ROUNDS - 1):
             before = solution.deviance
             amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,
                                          solution.leverage, NOISE_STEPS)
+            spectra = shapes.spectra(amplitudes)
+            solution = system.solve(spectra, self.counts)
+            above = solution.deviance - rival
+            if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
+                break
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
 

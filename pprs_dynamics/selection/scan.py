@@ -43,7 +43,7 @@ class Entry(Generic[Label]):
     is_fixed : bool
         True where the only row has the coefficient 1.
     precision : (k, k) array, optional
-        Of the prior; by default the g-prior on the scan's only drive.
+        Of the prior; by default the g-prior.
     """
 
     label: Label

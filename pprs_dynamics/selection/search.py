@@ -75,7 +75,7 @@ class Search(ScannedSets):
         self._report = progress or (lambda share: None)
 
     def run(self, *starts: Candidates) -> CandidateSet:
-        """Return the best set that the search reaches, by effects alone before each further start.
+        """Return the best set that the search reaches from all starts, by effects alone at first.
 
         A pattern of no catalogue stands only beside what effects explain. Where an effect joins
         that bends the columns, the search ends: what would come next might only make good that
@@ -83,8 +83,8 @@ class Search(ScannedSets):
         """
         self.evaluate(())
         for number, start in enumerate(starts):
-            found = self.evaluate(start)
-            self.refined(found) if number else self.rescanned(found)
+            improve = self.refined if number else self.rescanned
+            improve(self.evaluate(start))
         if len(starts) != 1:
             self._descend(False, 0.0)
         if self.patterns and not self.is_beyond_point:
