@@ -129,14 +129,14 @@ def _around_fitted(
         if search.is_beyond_point:
             kept = first_step(search, best)
         try:
-            around, moved = linearised(search, kept, decisions)
+            last, moved = linearised(search, kept, decisions)
         except PprsError:
             break  # values that no model may have: the linear form is all there is
-        if around is None or (not search.is_beyond_point
+        if last is search or (not search.is_beyond_point
                               and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
         starts = [kept] if kept is best else [kept, best]
-        search = Search(around, decisions, scale, _share_of(
+        search = Search(last.design, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
         best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
         if best.total > rival:
@@ -182,27 +182,26 @@ def _share_of(report: Callable[[float], None], start: float, width: float,
 
 
 def linearised(search: Search, found: CandidateSet, decisions: Decisions,
-               ) -> tuple[Design | None, CandidateSet]:
-    """Return the design around the fitted model of a set, and the set in it.
+               ) -> tuple[Search, CandidateSet]:
+    """Return a set around its own fitted model, and the search that holds it.
 
-    None where it would change nothing. Gauss-Newton steps with the set as it is, each halved until
-    the exact error falls.
+    The search given where nothing would change. Gauss-Newton steps with the set as it is, each
+    halved until the exact error falls.
 
     Raises
     ------
     ModelError
         For values that no model may have.
     """
-    around: Design | None = None
     for _ in range(MOST_STEPS):
         point = next_point(search, found)
         if point is None:
             break
-        around = search.design.around(point)
-        search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
+        search = Search(search.design.around(point), decisions, search.regression.error_scale,
+                        with_unknown=False)
         search.evaluate(())
         found = search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
-    return around, found
+    return search, found
 
 
 def next_point(search: Search, found: CandidateSet) -> Point | None:
@@ -254,18 +253,15 @@ def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
 
 def expanded(search: Search, found: CandidateSet, decisions: Decisions,
              ) -> tuple[Search, CandidateSet]:
-    """Return the same set around its own fitted model, and the search that holds it.
+    """Return what `linearised` does, shapes refined until they stand still.
 
     Raises
     ------
     ModelError
         For values that no model may have.
     """
-    around, _ = linearised(search, found, decisions)
-    if around is not None:
-        search = Search(around, decisions, search.regression.error_scale, with_unknown=False)
-        search.evaluate(())
-    return search, search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
+    search, found = linearised(search, found, decisions)
+    return search, search.refined(found)
 
 
 def parts_of(search: Search, found: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
