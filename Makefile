@@ -88,7 +88,7 @@ $(VENV)/.demo: setup.py | $(VENV)/bin/python
 	@echo 'Installing the package with ROS 2 wheels and compiling its equations (about a minute) ...'
 	@$(BIN)/pip install -qq --upgrade pip
 	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench]'
-	@$(BIN)/python -m pprs_dynamics.model.preparation
+	@$(BIN)/python -m pprs_dynamics.physics.model.preparation
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.demo

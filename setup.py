@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 from glob import glob
 
@@ -26,9 +15,9 @@ setup(
     maintainer='The pprs_dynamics founders',
     maintainer_email='pprs-dynamics@example.org',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed', 'report/*.css', 'report/*.js',
-                                 'report/plotly-basic.*', 'report/uplot.*',
-                                 'server/static/*']},
+    package_data={package_name: ['py.typed', 'app/report/*.css', 'app/report/*.js',
+                                 'app/report/plotly-basic.*', 'app/report/uplot.*',
+                                 'app/workbench/server/static/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -59,11 +48,11 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'feedforward = pprs_dynamics.nodes.executables:feedforward',
-            'monitor = pprs_dynamics.nodes.executables:monitor',
-            'play_trajectory = pprs_dynamics.nodes.executables:play_trajectory',
-            'simulated_robot = pprs_dynamics.nodes.executables:simulated_robot',
-            'pprs = pprs_dynamics.commands.pprs:main',
+            'feedforward = pprs_dynamics.ros.executables:feedforward',
+            'monitor = pprs_dynamics.ros.executables:monitor',
+            'play_trajectory = pprs_dynamics.ros.executables:play_trajectory',
+            'simulated_robot = pprs_dynamics.ros.executables:simulated_robot',
+            'pprs = pprs_dynamics.app.commands.pprs:main',
         ],
     },
 )

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """How good a model gets when what `pprs` finds is added to it, from files to files.
 
@@ -47,12 +36,12 @@ from hidden_recordings import LEAD, Case, Scene, noise_settings
 from hidden_strength import Whitening
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.effects.catalogue import catalogue
-from pprs_dynamics.measurement.reconstruction import reconstruct
-from pprs_dynamics.measurement.recording import Recording, write_recording
-from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.model.model_writer import write_model
-from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.motion.reconstruction import reconstruct
+from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.prescribed import PrescribedPlant

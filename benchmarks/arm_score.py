@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """How often `diagnose` is right about physics hidden in recordings of a simulated arm.
 
@@ -41,7 +30,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 from cases_on_dask import Each, Outcome, add_options, engine, read_outcomes, run_missing
 
-from pprs_dynamics.commands.pprs import main as pprs
+from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.simulation.arm_forms import NAMES
 
 OUTPUT = Path(__file__).resolve().parents[1] / 'output'

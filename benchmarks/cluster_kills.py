@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """A scheduler, workers and a client as processes over TCP, each killed in the midst of a survey.
 
@@ -40,7 +29,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
 
-from pprs_dynamics.fleet.store import DONE, FAILED, Store
+from pprs_dynamics.app.fleet.store import DONE, FAILED, Store
 
 ROOT = Path(__file__).resolve().parents[1]
 MODEL, EFFECTS = str(ROOT / 'config' / 'single_axis.yaml'), 'coulomb_friction'
@@ -148,7 +137,8 @@ def survey(recordings: Path | str, store: Path | str, *arguments: str,
            settings: dict[str, str] | None = None, **options: Any) -> subprocess.Popen[str]:
     """Start the command; options are Popen's."""
     return subprocess.Popen(
-        [sys.executable, '-m', 'pprs_dynamics.commands.pprs', 'survey', str(recordings), '--model',
+        [sys.executable, '-m', 'pprs_dynamics.app.commands.pprs', 'survey', str(recordings),
+         '--model',
          MODEL, '--effects', EFFECTS, '--output', str(store), *arguments], cwd=ROOT,
         env={**os.environ, 'PYTHONPATH': str(ROOT), **(settings or {})},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)

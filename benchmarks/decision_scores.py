@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """What the score of `diagnose` owes to each number that was chosen: halved, and doubled.
 
@@ -34,8 +23,8 @@ from cases_on_dask import Outcome, add_options, engine, read_outcomes, run_missi
 from hidden_recordings import Case
 from score import OUTPUT, cases, diagnose_case, one_line
 
-from pprs_dynamics.diagnosis.diagnose import diagnose
-from pprs_dynamics.selection.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 
 FACTORS = (0.5, 2.0)
 AS_IT_IS = ('', 1.0)

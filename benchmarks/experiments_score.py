@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Does the designed motion settle what a recording leaves open? Beside a random one and a repeat.
 
@@ -44,15 +33,15 @@ from hidden_recordings import noise_settings, tolerant_model
 from hidden_strength import changed_values, tolerated_numbers
 
 from pprs_dynamics import PlatformMotion
-from pprs_dynamics.diagnosis.diagnose import diagnose
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.experiments.fourier_path import FourierFamily
-from pprs_dynamics.experiments.motion_limits import MotionLimits
-from pprs_dynamics.experiments.next_experiment import experiment_of
-from pprs_dynamics.experiments.question import Question, question_of
-from pprs_dynamics.experiments.trajectory_search import TrajectorySearch
-from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.paths import HOME, Excitation
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.experiments.fourier_path import FourierFamily
+from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.next_experiment import experiment_of
+from pprs_dynamics.inference.experiments.question import Question, question_of
+from pprs_dynamics.inference.experiments.trajectory_search import TrajectorySearch
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """How well a survey and its trends find what changes in a fleet of the physics engine.
 
@@ -42,15 +31,15 @@ from hidden_motions import draw_motion
 from hidden_recordings import tolerant_model
 from hidden_strength import tolerated_numbers
 
-from pprs_dynamics.fleet.engine import cluster, run_survey
-from pprs_dynamics.fleet.manifest import read_manifest
-from pprs_dynamics.fleet.store import Store
-from pprs_dynamics.fleet.survey import Job
-from pprs_dynamics.fleet.trend import FleetTrends, fleet_trends, main_change
-from pprs_dynamics.fleet.words import sentences
-from pprs_dynamics.measurement.recording import Recording, write_recording
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.model_fingerprint import fingerprint
+from pprs_dynamics.app.fleet.engine import cluster, run_survey
+from pprs_dynamics.app.fleet.manifest import read_manifest
+from pprs_dynamics.app.fleet.store import Store
+from pprs_dynamics.app.fleet.survey import Job
+from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends, main_change
+from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.model.model_fingerprint import fingerprint
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_bodies import PayloadMass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """A running feedforward node under messages of every kind of damage.
 
@@ -40,7 +29,7 @@ from trajectory_damage import VALID, damaged, valid_motion
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.nodes.conversions import write_trajectory
+from pprs_dynamics.ros.conversions import write_trajectory
 
 BATCH = 20  # messages between two looks at the node: fewer than its queue holds
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')

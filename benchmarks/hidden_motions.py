@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Random motions of the platform: sums of sines within the robot's limits."""
 
@@ -24,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.mechanism.jacobians import condition_number
-from pprs_dynamics.mechanism.paths import HOME
+from pprs_dynamics.physics.mechanism.paths import HOME
+from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 
 PERIODS = (5.0, 8.0, 10.0, 20.0)  # [s]
 SINES = 8  # per degree of freedom

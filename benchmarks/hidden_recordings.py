@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Recordings of the simulated robot with physics hidden in it, and what the truth is.
 
@@ -35,11 +24,11 @@ from hidden_motions import draw_motion
 from hidden_strength import Refit, Whitening, sensitivities, tolerated_numbers
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.measurement.treatment import Treatment, block_length
-from pprs_dynamics.mechanism.forward_motion import solve_forward_motion
-from pprs_dynamics.model.model_file import build_model
-from pprs_dynamics.model.parameter_file import default_parameters
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """How strong a hidden effect is: what it adds beyond the refitted model, over the noise.
 
@@ -31,8 +20,8 @@ from scipy.optimize import brentq, lsq_linear
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.measurement.treatment import Treatment
-from pprs_dynamics.model.model_file import build_model
+from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 WHITENING_ORDER = 64

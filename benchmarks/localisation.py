@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """How often `localise` says something about noise, and how often it finds a planted error.
 
@@ -42,10 +31,10 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.diagnosis.localisation import localise
-from pprs_dynamics.mechanism.paths import Excitation
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.residuals.residuals import Residuals
+from pprs_dynamics.inference.diagnosis.localisation import localise
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 DURATION, RATE = 40.0, 100.0  # [s, Hz]

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """What somebody could say who knows which effect is hidden, and on which drives.
 
@@ -24,10 +13,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from pprs_dynamics.effects.catalogue import catalogue
-from pprs_dynamics.selection.decisions import DECISIONS
-from pprs_dynamics.selection.expansion import Selection, linear_error
-from pprs_dynamics.selection.search import Search
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.expansion import Selection, linear_error
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.physics.effects.catalogue import catalogue
 
 RIVALS = 6  # proposals that are fitted
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Random parameters, valid or not, set on a feedforward node that is streaming.
 
@@ -38,9 +27,9 @@ from stream import feedforward, served
 from trajectory_damage import valid_motion
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.model.model_file import build_model
-from pprs_dynamics.model.parameter_file import default_parameters
-from pprs_dynamics.nodes.conversions import write_trajectory
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters
+from pprs_dynamics.ros.conversions import write_trajectory
 
 EQUAL = 1e-9
 KEPT_EVERY = 500  # sets

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Words of docs/reliability.md, which `reliability.py` writes."""
 
@@ -46,8 +35,8 @@ else: `rclpy_implementation.WaitSet` with what it waits for and takes, and
 `Node._parameter_overrides`. Both releases have them, and so has the source of rclpy 8.0.0. Where
 one is missing, or takes other arguments, rclpy's own executor serves the node, which says so in
 the log and answers more slowly; and parameters are asked for one by one, by the names in the
-model's table, the parameter files and the command line. `test/test_rclpy_internals.py` and
-`test/test_executor.py` take the names away and talk to the node.
+model's table, the parameter files and the command line. `test/ros/test_rclpy_internals.py` and
+`test/ros/test_executor.py` take the names away and talk to the node.
 """
 
 

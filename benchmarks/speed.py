@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """How fast the model is beside Pinocchio and MuJoCo: ratios from one run, with their spread.
 
@@ -37,19 +26,19 @@ from typing import Any, ClassVar
 for library in ('OPENBLAS', 'OMP', 'MKL'):
     os.environ.setdefault(f'{library}_NUM_THREADS', '1')
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / 'test')]
+sys.path[:0] = [str(ROOT / 'test'), str(ROOT / 'test/support')]
 
 import numpy as np  # noqa: E402
 from random_states import random_motion  # noqa: E402
 from speed_peers import MujocoPeer, PinocchioPeer  # noqa: E402
 
 from pprs_dynamics import DriveModel, PlatformMotion  # noqa: E402
-from pprs_dynamics.effects.catalogue import CATALOGUE  # noqa: E402
-from pprs_dynamics.effects.structure_effect import BodyEffect, PassiveJointEffect  # noqa: E402
-from pprs_dynamics.mechanism.evaluation import PLAIN, is_compiled  # noqa: E402
-from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics  # noqa: E402
-from pprs_dynamics.mechanism.state import MechanismState  # noqa: E402
-from pprs_dynamics.model.one_pass import forces_kernel  # noqa: E402
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE  # noqa: E402
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect  # noqa: E402
+from pprs_dynamics.physics.model.one_pass import forces_kernel  # noqa: E402
+from pprs_dynamics.physics.three_pprs.evaluation import PLAIN, is_compiled  # noqa: E402
+from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics  # noqa: E402
+from pprs_dynamics.physics.three_pprs.state import MechanismState  # noqa: E402
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """A client of one thread that streams serialised trajectories to a node and takes its answers.
 
@@ -38,10 +27,10 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ('test', 'demo')]
+sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ('test/support', 'demo')]
 from ros_processes import environment, executable, node_process, reserve_domain  # noqa: E402
 
-from pprs_dynamics.nodes.rclpy_internals import WaitSet, take  # noqa: E402
+from pprs_dynamics.ros.rclpy_internals import WaitSet, take  # noqa: E402
 
 RELIABLE = QoSProfile(depth=1000)
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """What a survey costs: a recording, two workers against one, and the client's memory.
 
@@ -37,12 +26,12 @@ import fleet
 import numpy as np
 from cluster_kills import EFFECTS, MODEL, write_axis
 
-from pprs_dynamics.fleet.engine import cluster, run_survey
-from pprs_dynamics.fleet.manifest import Entry
-from pprs_dynamics.fleet.store import Store
-from pprs_dynamics.fleet.survey import Job, examine, identify
-from pprs_dynamics.model.model_file import load_model
-from pprs_dynamics.model.model_fingerprint import fingerprint
+from pprs_dynamics.app.fleet.engine import cluster, run_survey
+from pprs_dynamics.app.fleet.manifest import Entry
+from pprs_dynamics.app.fleet.store import Store
+from pprs_dynamics.app.fleet.survey import Job, examine, identify
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 
 SEED = 700  # of no fleet in the table
 WARM = 6  # recordings that load libraries and compile

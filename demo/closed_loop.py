@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """The robot in closed loop over topics: three processes, and what its platform makes of the path.
 
@@ -34,13 +23,13 @@ from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.mechanism.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.mechanism.paths import Excitation, HelicalPath, with_lead_in
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.model.parameter_file import find_file
-from pprs_dynamics.nodes.setpoints import SetpointQueue
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.parameter_file import find_file
+from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.robot import SimulatedRobot
@@ -228,7 +217,7 @@ class _Listener:
         from sensor_msgs.msg import JointState
         from std_msgs.msg import String
 
-        from pprs_dynamics.nodes.qos import LATCHED
+        from pprs_dynamics.ros.qos import LATCHED
 
         self.context = Context()
         rclpy.init(context=self.context)

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """What the package is for, told with a robot that has a secret: python demo/diagnosis_demo.py.
 
@@ -41,10 +30,10 @@ from rich.markup import escape
 from rich.table import Table
 from ros_processes import executable
 
-from pprs_dynamics.effects.catalogue import CATALOGUE
-from pprs_dynamics.measurement.recording import read_recording
-from pprs_dynamics.model.drive_model import DriveModel
-from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 REFUSED = 1  # exit status of pprs
 SEEDS = 10_000

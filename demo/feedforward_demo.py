@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """The main job, shown: two nodes over DDS, the paper's path in, six drive forces out.
 
@@ -31,8 +20,8 @@ from rich.progress import Progress
 from rich.table import Table
 from ros_processes import executable, node_process, reserve_domain
 
-from pprs_dynamics.mechanism.robot import DRIVES
-from pprs_dynamics.report.figures import draw_forces
+from pprs_dynamics.app.report.figures import draw_forces
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')
 RATE = 200.0

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Makes docs/arms.md and its pictures: python docs/arms.py [FOLDER] [--as-far].
 
@@ -37,13 +26,13 @@ import matplotlib
 import numpy as np
 
 from pprs_dynamics import ArmModel
-from pprs_dynamics.commands.pprs import main
-from pprs_dynamics.measurement.recording import read_recording
-from pprs_dynamics.mechanism.urdf import pinocchio
-from pprs_dynamics.model.arm_sample import ArmSample
-from pprs_dynamics.model.model_file import load_model
-from pprs_dynamics.model.model_writer import write_model
-from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.mechanism.urdf import pinocchio
+from pprs_dynamics.physics.model.arm_sample import ArmSample
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.model_writer import write_model
 
 matplotlib.use('Agg')
 from matplotlib import pyplot

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Reads the MAT files of EMPS as recordings: python docs/emps.py [FOLDER] [OUTPUT FOLDER].
 
@@ -27,8 +16,8 @@ from pathlib import Path
 
 from scipy.io import loadmat
 
-from pprs_dynamics.measurement.recording import Recording, write_recording
-from pprs_dynamics.mechanism.robot import AXIS
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.three_pprs.robot import AXIS
 
 IDENTIFICATION, PULSES = 'DATA_EMPS.mat', 'DATA_EMPS_PULSES.mat'
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Makes the tables and the picture of docs/feedforward.md: python docs/feedforward.py.
 
@@ -37,8 +26,8 @@ import numpy as np  # noqa: E402
 from closed_loop import CASES, Case, Tracking, commands_for, execute, run_case  # noqa: E402
 from ros_processes import executable, reserve_domain  # noqa: E402
 
-from pprs_dynamics.measurement.recording import Recording, write_recording  # noqa: E402
-from pprs_dynamics.mechanism.paths import Excitation, HelicalPath  # noqa: E402
+from pprs_dynamics.measurement.files.recording import Recording, write_recording  # noqa: E402
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath  # noqa: E402
 
 matplotlib.use('Agg')
 from matplotlib import pyplot  # noqa: E402

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Makes docs/real_drive.md and its pictures: python docs/real_drive.py (minutes; needs the data).
 
@@ -31,13 +20,13 @@ from emps import IDENTIFICATION, PULSES, find_data, read_emps
 from scipy.signal import butter, decimate, filtfilt
 
 from pprs_dynamics import AxisModel, AxisMotion, PprsError
-from pprs_dynamics.adoption.adopt import Adoption, adopt
-from pprs_dynamics.adoption.loop import AdoptionRun, adopt_all
-from pprs_dynamics.adoption.request import EffectRequest
-from pprs_dynamics.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.measurement.recording import Recording
-from pprs_dynamics.model.force_model import ForceModel
-from pprs_dynamics.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.adoption.adopt import Adoption, adopt
+from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.model.force_model import ForceModel
 
 matplotlib.use('Agg')
 from matplotlib import pyplot

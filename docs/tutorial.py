@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Makes docs/tutorial.md and its pictures: python docs/tutorial.py [FOLDER].
 
@@ -39,10 +28,10 @@ from rich.progress import track  # noqa: E402
 from ros_processes import executable  # noqa: E402
 
 from pprs_dynamics import DriveModel  # noqa: E402
-from pprs_dynamics.measurement.recording import read_recording  # noqa: E402
-from pprs_dynamics.report.figures import BLUE, GREY, RED, pyplot_module, save  # noqa: E402
-from pprs_dynamics.residuals.measuring import measure_residuals  # noqa: E402
-from pprs_dynamics.residuals.residuals import Residuals  # noqa: E402
+from pprs_dynamics.app.report.figures import BLUE, GREY, RED, pyplot_module, save  # noqa: E402
+from pprs_dynamics.measurement.files.recording import read_recording  # noqa: E402
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals  # noqa: E402
+from pprs_dynamics.measurement.residuals.residuals import Residuals  # noqa: E402
 
 HIDDEN, ON = 'stribeck_friction', 'slide_1'
 BINS = 40  # of equal numbers of samples

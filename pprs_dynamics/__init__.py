@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Dynamics of the 3-PPRS parallel robot with friction in every joint."""
 
@@ -21,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pprs_dynamics.errors import PprsError
-    from pprs_dynamics.mechanism.joint_motion import JointMotion
-    from pprs_dynamics.mechanism.motion import PlatformMotion
-    from pprs_dynamics.model.arm_model import ArmModel
-    from pprs_dynamics.model.axis_model import AxisModel, AxisMotion
-    from pprs_dynamics.model.drive_model import DriveForces, DriveModel, ModelState
-    from pprs_dynamics.model.model_file import load_model
+    from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+    from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+    from pprs_dynamics.physics.model.arm_model import ArmModel
+    from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
+    from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
+    from pprs_dynamics.physics.model.model_file import load_model
 
 __all__ = ['ArmModel', 'AxisModel', 'AxisMotion', 'DriveForces', 'DriveModel', 'JointMotion',
            'ModelState', 'PlatformMotion', 'PprsError', 'load_model']
@@ -34,16 +23,16 @@ __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
-    'ArmModel': 'pprs_dynamics.model.arm_model',
-    'AxisModel': 'pprs_dynamics.model.axis_model',
-    'AxisMotion': 'pprs_dynamics.model.axis_model',
-    'JointMotion': 'pprs_dynamics.mechanism.joint_motion',
-    'DriveForces': 'pprs_dynamics.model.drive_model',
-    'DriveModel': 'pprs_dynamics.model.drive_model',
-    'ModelState': 'pprs_dynamics.model.drive_model',
-    'PlatformMotion': 'pprs_dynamics.mechanism.motion',
+    'ArmModel': 'pprs_dynamics.physics.model.arm_model',
+    'AxisModel': 'pprs_dynamics.physics.model.axis_model',
+    'AxisMotion': 'pprs_dynamics.physics.model.axis_model',
+    'JointMotion': 'pprs_dynamics.physics.mechanism.joint_motion',
+    'DriveForces': 'pprs_dynamics.physics.model.drive_model',
+    'DriveModel': 'pprs_dynamics.physics.model.drive_model',
+    'ModelState': 'pprs_dynamics.physics.model.drive_model',
+    'PlatformMotion': 'pprs_dynamics.physics.mechanism.motion',
     'PprsError': 'pprs_dynamics.errors',
-    'load_model': 'pprs_dynamics.model.model_file',
+    'load_model': 'pprs_dynamics.physics.model.model_file',
 }
 
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """The house rules: who may import whom, and every equation of the paper in one place."""
 
@@ -24,63 +13,41 @@ from pathlib import Path
 
 import pytest
 
-from pprs_dynamics.effects.catalogue import CATALOGUE
-from pprs_dynamics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 PACKAGE = Path(__file__).parents[1] / 'pprs_dynamics'
 ROS = {'rclpy', 'std_msgs', 'sensor_msgs', 'trajectory_msgs', 'geometry_msgs', 'rcl_interfaces',
        'builtin_interfaces', 'diagnostic_msgs'}
 PLOTTING = {'matplotlib', 'plotly', 'rich'}
 WEB = {'starlette', 'uvicorn'}
-# Each folder uses itself and those named; arrows point from what stands on to what it stands on.
+# Each room uses itself and those named; arrows point from what stands on to what it stands on.
 MAY_USE = {
-    'mechanism': set(),
-    'effects': {'mechanism'},
-    'model': {'mechanism', 'effects'},
-    'measurement': {'mechanism', 'effects', 'model'},
-    'residuals': {'mechanism', 'effects', 'model', 'measurement'},
-    'regression': {'mechanism', 'effects', 'model', 'measurement', 'residuals'},
-    'selection': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression'},
-    'identification': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                       'selection'},
-    'diagnosis': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                  'selection'},
-    'adoption': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                 'selection', 'diagnosis'},
-    'fleet': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-              'selection', 'diagnosis', 'adoption'},
-    'simulation': {'mechanism', 'model', 'measurement'},
-    'experiments': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                    'selection', 'identification'},
-    'report': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-               'selection', 'identification', 'diagnosis', 'adoption', 'experiments', 'fleet'},
-    'workbench': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                  'selection', 'diagnosis', 'adoption', 'experiments'},
-    'server': {'model', 'measurement', 'workbench', 'fleet'},
-    'nodes': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'simulation'},
-    'commands': {'mechanism', 'effects', 'model', 'measurement', 'residuals', 'regression',
-                 'selection', 'identification', 'diagnosis', 'adoption', 'simulation',
-                 'experiments', 'report', 'fleet', 'workbench', 'server', 'nodes'},
+    'system': set(),
+    'physics': {'system'},
+    'measurement': {'system', 'physics'},
+    'simulation': {'system', 'physics', 'measurement'},
+    'inference': {'system', 'physics', 'measurement'},
+    'ros': {'system', 'physics', 'measurement', 'simulation'},
+    'app': {'system', 'physics', 'measurement', 'simulation', 'inference', 'ros'},
 }
+# Inside a room, a folder uses itself and those before it.
+FLOORS = {
+    'physics': ['mechanism', 'three_pprs', 'effects', 'model'],
+    'measurement': ['files', 'motion', 'residuals'],
+    'inference': ['regression', 'search', 'fit', 'diagnosis', 'adoption', 'experiments'],
+    'app': ['fleet', 'report', 'workbench', 'commands'],
+}
+# The 3-PPRS' compiled motion stands behind the motion of any platform, and its spatial algebra
+# behind an arm's.
+LIFTS = {('mechanism', 'three_pprs')}
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))
 
-# The header that ament_copyright asks of every file.
+# The header of every file; LICENSE has the text.
 LICENCE = """\
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 """
 
 
@@ -121,17 +88,22 @@ def files() -> list[Path]:
 
 @pytest.mark.parametrize('file', files(), ids=lambda file: str(file.relative_to(PACKAGE)))
 def test_arrows_point_one_way(file: Path) -> None:
-    folder = file.relative_to(PACKAGE).parts[0]
+    room = file.relative_to(PACKAGE).parts[0]
     used = imports(file)
     own = {name.split('.')[1] for name in used if name.startswith('pprs_dynamics.')}
-    shared = {'arrays', 'errors', 'parallel', 'plain_text', 'threads', folder}
-    assert own - shared <= MAY_USE[folder]
+    assert own - {'arrays', 'errors', room} <= MAY_USE[room]
+    floors = FLOORS.get(room, [])
+    if floors and (folder := file.relative_to(PACKAGE).parts[1]) in floors:
+        below = {name.split('.')[2] for name in used
+                 if name.startswith(f'pprs_dynamics.{room}.') and name.count('.') > 2}
+        above = set(floors[floors.index(folder) + 1:])
+        assert {name for name in below & above if (folder, name) not in LIFTS} == set()
     libraries = {name.split('.')[0] for name in used}
-    if folder != 'nodes':
+    if room != 'ros':
         assert not libraries & ROS
-    if folder not in ('report', 'commands'):
+    if room != 'app':
         assert not libraries & PLOTTING
-    if folder != 'server':
+    if 'server' not in file.parts:
         assert not libraries & WEB
 
 
@@ -144,13 +116,13 @@ def test_a_circle_that_a_local_import_hides_is_found(tmp_path: Path) -> None:
     a, b, c, d = (tmp_path / name for name in 'abcd')
     assert circles({a: {b}, b: {c}, c: set()}) == set()
     assert circles({a: {b}, b: {c}, c: {b, d}, d: set()}) == {b, c}
-    line = PACKAGE / 'mechanism' / 'motion.py'
+    line = PACKAGE / 'physics' / 'mechanism' / 'motion.py'
     hidden = tmp_path / 'hidden.py'
-    hidden.write_text('def f():\n    from pprs_dynamics.mechanism import motion\n')
+    hidden.write_text('def f():\n    from pprs_dynamics.physics.mechanism import motion\n')
     assert imported_files(hidden) == {line}
 
 
-@pytest.mark.parametrize('file', sorted((PACKAGE / 'nodes').glob('*.py')), ids=lambda f: f.name)
+@pytest.mark.parametrize('file', sorted((PACKAGE / 'ros').glob('*.py')), ids=lambda f: f.name)
 def test_nodes_hold_no_mathematics(file: Path) -> None:
     text = file.read_text()
     assert 'Eq. (' not in text
@@ -192,13 +164,6 @@ def test_each_catalogue_effect_has_a_file_of_its_name_and_the_list_is_sorted() -
 def test_every_file_begins_with_the_licence(folder: str) -> None:
     assert [str(file) for file in sorted((PACKAGE.parent / folder).rglob('*.py'))
             if not file.read_text(encoding='utf-8').startswith(LICENCE)] == []
-
-
-def test_modules_are_short() -> None:
-    # The licence's text is not counted.
-    lengths = {str(file.relative_to(PACKAGE)):
-               len(file.read_text().removeprefix(LICENCE).splitlines()) for file in files()}
-    assert {name: length for name, length in lengths.items() if length > 350} == {}
 
 
 def test_no_page_is_left_with_a_gap_where_a_figure_belongs() -> None:

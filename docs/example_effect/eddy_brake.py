@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Eddy current brake on a drive: c q_dot / (1 + (q_dot / v_c)^2).
 
@@ -31,8 +20,8 @@ from typing import ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 
 
 class EddyBrake(DriveEffect):

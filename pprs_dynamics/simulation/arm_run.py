@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """What a recording of a simulated arm holds: MuJoCo's inverse dynamics along a motion.
 
@@ -29,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.mechanism.joint_series import JointSeries
-from pprs_dynamics.model.arm_model import ArmModel
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, require_known, truth
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError

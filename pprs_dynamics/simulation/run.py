@@ -1,16 +1,5 @@
-# Copyright 2026 The pprs_dynamics founders
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
 
 """Runs of the simulated robot along a reference, without ROS."""
 
@@ -34,7 +23,7 @@ from pprs_dynamics.simulation.sensors import SensorSettings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from pprs_dynamics.mechanism.motion import PlatformMotion
+    from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 
 
 class HasValues(Protocol):
@@ -121,7 +110,7 @@ class SimulatedRun:
 
     def platform_motion(self) -> PlatformMotion:
         """Return the true motion in the form that a model takes."""
-        from pprs_dynamics.mechanism.motion import PlatformMotion
+        from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 
         if self.truth is None:
             raise MotionError('true motion', 'the run was made without it', 'be recorded', 'shape')

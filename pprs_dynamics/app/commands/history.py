@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs history: the ledger of a model file, and how the error fell with each effect."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from pprs_dynamics.app.commands.arguments import MODEL, PAGE, output_file
+from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.report.history_figures import draw_history
+from pprs_dynamics.app.report.history_page import history_page
+from pprs_dynamics.app.report.history_tables import history_view
+from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.adoption.ledger_entry import check_output
+from pprs_dynamics.physics.mechanism.units import common_effort
+from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.model_writer import write_model
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('file', metavar='FILE', help='model file')
+    parser.add_argument('--undo', action='store_true', help='take the last step back')
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
+                        help='model file that --undo writes')
+    parser.add_argument('--report', metavar='FILE', type=output_file(*PAGE, '.png'),
+                        help='draw the falling error: a page (.html) or a picture (.png)')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    if options.undo != bool(options.output):
+        raise ModelError('--output', options.output, 'be given with --undo, and only then')
+    screen = console()
+    base = check_output(options.output, options.file) if options.undo else options.file
+    model = load_model(base)
+    steps, unit = read_steps(model.values), common_effort(model.units)
+    if options.undo and not steps:
+        print(f'pprs history: {options.file} holds no step that could be taken back',
+              file=sys.stderr)
+        return 1
+    screen.print(history_view(steps, unit))
+    if options.json:
+        write_json(options.json, {'steps': [step.to_json() for step in steps]})
+    if options.report and options.report.endswith('.png'):
+        screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')
+    elif options.report:
+        page = history_page(Path(options.file).name, steps, unit)
+        screen.print(f'page: {shown(page.write(options.report))}')
+    if options.undo:
+        values, step = without_last_step(model.values)
+        write_model(options.output, values, base)
+        screen.print(f'{step.effect} taken back: {shown(options.output)}')
+    return 0

@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs next-experiment: the motion that would tell most about what recordings leave open."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from typing import Any
+
+import numpy as np
+from rich.markup import escape
+
+from pprs_dynamics.app.commands.arguments import PAGE, POSES, number, output_file, seed
+from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.recordings import add_recordings, read_recordings, refuse_inputs
+from pprs_dynamics.app.report.experiment_page import experiment_page
+from pprs_dynamics.app.report.experiment_tables import experiment_view
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.progress import progress_bar
+from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.inference.adoption.ledger_entry import check_output
+from pprs_dynamics.inference.experiments.arm_excitation import excite_arm
+from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
+from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.next_experiment import (
+    LONGEST,
+    PURPOSES,
+    SHORTEST,
+    check_purpose,
+    next_experiment,
+)
+from pprs_dynamics.measurement.files.motion_files import write_motion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.keys import is_arm
+from pprs_dynamics.physics.model.parameter_file import read_parameters
+
+RATE = 100.0  # [Hz], the default of play_trajectory
+FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
+LIMITS = MotionLimits()
+PLAYED = 'positions, velocities and accelerations of its joints'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    add_recordings(parser, required=False)
+    parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
+                        required=True, help='poses for play_trajectory; of an arm, positions, '
+                        'velocities and accelerations of its joints')
+    parser.add_argument('--purpose', choices=PURPOSES, default='separate',
+                        help='separate: what the recordings leave open (default); commission: '
+                        'the first motion of a new robot')
+    parser.add_argument('--seed', type=seed, default=0, help='of the search (default 0)')
+    parser.add_argument('--duration', type=number(SHORTEST, LONGEST, 's'), default=20.0,
+                        help='[s] (default 20)')
+    parser.add_argument('--rate', type=number(1.0, FASTEST, 'Hz'), default=RATE,
+                        help='of the poses, as play_trajectory is to play them [Hz] (default 100)')
+    parser.add_argument('--velocity', type=number(0.0, 100.0, 'm/s', above=True),
+                        help=f'limit of every drive [m/s] (default {LIMITS.velocity:g}), of an '
+                        "arm's joints [rad/s, m/s] (default that of the URDF)")
+    parser.add_argument('--acceleration', type=number(0.0, 1e4, 'm/s^2', above=True),
+                        default=LIMITS.acceleration,
+                        help=f'limit of every drive [m/s^2] (default {LIMITS.acceleration:g})')
+    parser.add_argument('--tilt', type=number(0.0, np.pi, 'rad', above=True), default=LIMITS.tilt,
+                        help=f'limit of the platform [rad] (default {LIMITS.tilt:g})')
+    parser.add_argument('--condition', type=number(1.0, 1e6), default=LIMITS.condition_number,
+                        help='limit of the condition number, where the model file allows more '
+                        f'(default {LIMITS.condition_number:g})')
+    parser.add_argument('--margin', type=number(0.0, 0.9), default=LIMITS.margin,
+                        help='share of every limit, those of the model file included, that stays '
+                        f'unused (default {LIMITS.margin:g})')
+    parser.add_argument('--noise', type=number(0.0, 1e3, 'N', above=True), default=0.05,
+                        help='of the efforts over 0.01 s, for --purpose commission without '
+                        'recordings [N] (default 0.05)')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='write a page with all figures')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    check_purpose(options.purpose, options.recordings)
+    base = check_output(options.output, options.model)
+    model: DriveModel | ArmModel
+    limits: MotionLimits | ArmLimits
+    if is_arm(read_parameters(base)):
+        model = ArmModel.load(base)
+        limits = ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
+                           options.margin)
+    else:
+        model = DriveModel.load(base)
+        limits = MotionLimits(options.velocity or LIMITS.velocity, options.acceleration,
+                              options.tilt, options.condition, options.margin)
+    refuse_inputs(options.output, options.recordings)
+    if isinstance(limits, ArmLimits) and options.purpose == 'commission':
+        assert isinstance(model, ArmModel)
+        return _excite_arm(options, model, limits, screen)
+    recordings = read_recordings(options, screen, model)
+    with progress_bar(screen, 'designing') as progress:
+        experiment = next_experiment(
+            model, recordings, options.purpose, limits, options.duration, options.seed,
+            options.noise, lambda share: progress(share, 1.0))
+    count = int(options.duration * options.rate + 1e-9) + 1
+    motion = experiment.motion(np.arange(count) / options.rate)
+    screen.print(experiment_view(experiment))
+    write_motion(options.output, model.drives, motion)
+    command = ''
+    if not isinstance(model, ArmModel):
+        command = shlex.join([
+            'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
+            '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
+    if options.json:
+        write_json(options.json, {**experiment.to_json(), 'purpose': options.purpose,
+                                  'seed': options.seed, 'rate': options.rate,
+                                  'output': options.output})
+    if options.report:
+        page = experiment_page(experiment, motion, command)
+        screen.print(f'page: {shown(page.write(options.report))}')
+    if command:
+        screen.print(f'[bold]play it[/]: {escape(command)}')
+    else:
+        screen.print(f'[bold]play it[/] with a controller of joint trajectories: {escape(PLAYED)} '
+                     f'stand in {escape(options.output)}')
+    return 0
+
+
+def _excite_arm(options: argparse.Namespace, model: ArmModel, limits: ArmLimits,
+                screen: Any) -> int:
+    """Design the first motion of an arm."""
+    with progress_bar(screen, 'designing') as progress:
+        found = excite_arm(model, limits, options.duration, options.seed,
+                           lambda share: progress(share, 1.0))
+    count = int(options.duration * options.rate + 1e-9) + 1
+    write_motion(options.output, model.drives, found.motion(np.arange(count) / options.rate))
+    screen.print(escape(found.text))
+    screen.print('limits, of what their margin leaves: ' + ', '.join(
+        f'{name} {share:.0%}' for name, share in found.limits.items()))
+    if options.json:
+        write_json(options.json, {**found.to_json(), 'purpose': options.purpose,
+                                  'seed': options.seed, 'rate': options.rate,
+                                  'output': options.output})
+    if options.report:
+        page = Page('The next experiment')
+        page.text(found.text, 'lead')
+        page.table(('limit', 'use'), [(name, f'{share:.0%}')
+                                      for name, share in found.limits.items()])
+        screen.print(f'page: {shown(page.write(options.report))}')
+    return 0

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Files that commands write: whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.system.atomic_file import write_text as write_text
+from pprs_dynamics.system.plain_text import displayed
+
+
+def make_folder(path: str | PathLike[str]) -> Path:
+    """Return the folder, made where it does not exist."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UnreadableFileError(folder, f'cannot be a folder for output: {error.strerror}'
+                                  ) from None
+    return folder
+
+
+def write_json(path: str | PathLike[str], content: Any) -> None:
+    """Write JSON atomically; numbers that are not finite become null, as JSON has none.
+
+    Names of files that are not UTF-8 become what `displayed` makes of them.
+    """
+    write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + '\n')
+
+
+def _plain(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {displayed(key): _plain(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_plain(value) for value in content]
+    if isinstance(content, str):
+        return displayed(content)
+    if isinstance(content, float) and content - content != 0.0:
+        return None
+    return content

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""`pprs`: reads the arguments, calls the subcommand, and turns errors into one line.
+
+Exit status: 0 done; 1 refused or a check failed; 2 bad usage or unreadable input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import NoReturn
+
+from pprs_dynamics import __version__
+from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, output_file
+from pprs_dynamics.app.commands.streams import lasting_output
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.threads import use_one_thread
+
+# Each a module of this folder with a docstring, add_arguments and run.
+COMMANDS = ('adopt', 'compare', 'diagnose', 'fit', 'history', 'info', 'next-experiment',
+            'reproduce', 'simulate', 'survey', 'trend', 'workbench')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `pprs` and return its exit status."""
+    use_one_thread()
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    with lasting_output() as output:
+        try:
+            options = _parser(given).parse_args(given)
+        except KeyboardInterrupt:
+            # Importing a command takes long enough to be interrupted.
+            print('pprs: interrupted', file=sys.stderr)
+            return 130
+        status = _run(options)
+    if output.error is None or isinstance(output.error, BrokenPipeError):
+        # A reader of our output that went away, e.g. `head`, had enough of it.
+        return status
+    print(f'pprs {options.command}: output: {output.error.strerror}', file=sys.stderr)
+    return 2
+
+
+def _run(options: argparse.Namespace) -> int:
+    try:
+        status: int = _module(options.command).run(options)
+    except PprsError as error:
+        print(f'pprs {options.command}: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f'pprs {options.command}: interrupted', file=sys.stderr)
+        return 130
+    except OSError as error:
+        # A full disk, a folder without permission: the name and the system's own reason.
+        print(f'pprs {options.command}: {displayed(error.filename or "output")}: '
+              f'{error.strerror}', file=sys.stderr)
+        return 2
+    return status
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line, without all that would be right; --help has that."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        self.exit(2, f'{self.prog}: {message}\n')
+
+
+def _module(command: str) -> ModuleType:
+    return import_module(f'{__package__}.{command.replace("-", "_")}')
+
+
+def _summary(command: str) -> str:
+    """Return what a command does, from the first line of its module, which is not imported."""
+    file = Path(__file__).with_name(f'{command.replace("-", "_")}.py')
+    first = (ast.get_docstring(ast.parse(file.read_text(encoding='utf-8'))) or '').splitlines()[0]
+    return first.split(': ', 1)[1]
+
+
+def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
+    """Return the parser, with the arguments of the command that is called."""
+    parser = OneLineParser(
+        prog='pprs', description='Dynamics of the 3-PPRS parallel robot: what the model says, '
+        'what was measured, and which physical effect is missing.')
+    parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
+    for name in COMMANDS:
+        summary = _summary(name)
+        command = commands.add_parser(name, help=summary, description=summary)
+        command.add_argument('--model', metavar='FILE', default=DEFAULT_MODEL,
+                             help=f'model file (default: the paper\'s robot, {DEFAULT_MODEL})')
+        command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
+                             help='write the result as JSON too')
+        if name in given:
+            # Only this one: importing all would take longer than most of them run.
+            _module(name).add_arguments(command)
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs reproduce: the paper's simulation, figures 8 and 9, and its claims against what comes out.
+
+Writes figure_8.png, figure_9.png, forces.csv and claims.json into the output folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from pprs_dynamics.app.commands.output import make_folder, write_json
+from pprs_dynamics.app.report.figures import draw_figure_8, draw_figure_9
+from pprs_dynamics.app.report.tables import claims_table
+from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.reproduction import Reproduction, reproduce
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('--output', metavar='DIR', required=True,
+                        help='folder for figures, curves and claims')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    model = DriveModel.load(options.model)
+    with screen.status('running the paper\'s simulation'):
+        try:
+            result = reproduce(model)
+        except WorkspaceError as error:
+            print(f'pprs reproduce: this robot cannot follow the paper\'s path: {error}',
+                  file=sys.stderr)
+            return 1
+        folder = make_folder(options.output)
+        written = [draw_figure_8(folder / 'figure_8.png', result),
+                   draw_figure_9(folder / 'figure_9.png', result),
+                   _write_curves(folder / 'forces.csv', result)]
+    content = {'equations': model.equations, 'claims': [asdict(claim) for claim in result.claims]}
+    for file in filter(None, (folder / 'claims.json', options.json)):
+        write_json(file, content)
+    screen.print(claims_table(result.claims))
+    screen.print('written: ' + ', '.join(map(shown, (*written, folder / 'claims.json'))))
+    return 0
+
+
+def _write_curves(path: Path, result: Reproduction) -> Path:
+    columns = {'time': result.time[:, None], 'Q': result.rigid_body, 'active': result.active,
+               **result.passive}
+    header = ['time'] + [f'{drive}/{name}' for name in columns if name != 'time'
+                         for drive in DRIVES]
+    np.savetxt(path, np.column_stack(list(columns.values())), fmt='%.9g', delimiter=',',
+               header=','.join(header), comments='')
+    return path

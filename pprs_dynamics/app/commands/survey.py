@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs survey: many recordings into a store of results, on all cores or on a cluster."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.app.commands.arguments import PAGE, output_file
+from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.fleet.engine import cluster, run_survey
+from pprs_dynamics.app.fleet.manifest import entries, is_remote
+from pprs_dynamics.app.fleet.store import Store, arrow
+from pprs_dynamics.app.fleet.survey import AUTO, Job, requests_of
+from pprs_dynamics.app.fleet.trend import fleet_trends
+from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.app.report.fleet_page import fleet_page
+from pprs_dynamics.app.report.progress import counting_bar
+from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.model_fingerprint import fingerprint
+from pprs_dynamics.system.plain_text import displayed
+
+MOST_SHOWN = 10  # errors
+MOST_WORKERS = 1024
+
+
+class SurveyError(PprsError, ValueError):
+    """Arguments that do not go together."""
+
+
+def _workers(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 6
+            and 1 <= int(text) <= MOST_WORKERS):
+        raise argparse.ArgumentTypeError(
+            f'{text[:30]!r} must be a whole number from 1 to {MOST_WORKERS}')
+    return int(text)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('recordings', metavar='RECORDING', nargs='*',
+                        help='recordings, folders of them, globs, or addresses such as s3://…')
+    parser.add_argument('--manifest', metavar='FILE.csv', help='columns path, robot, time and '
+                        'optionally model; further columns are conditions')
+    parser.add_argument('--output', metavar='STORE', required=True,
+                        help='folder of Parquet files; what is in it already is not done again')
+    parser.add_argument('--effects', metavar='auto|NAME,…', default=AUTO,
+                        help='auto: diagnose each recording; else these effects are fitted, many '
+                        'times faster; EFFECT or EFFECT:drive+drive')
+    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
+                        'holds several')
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument('--workers', metavar='N', type=_workers,
+                       help='processes on this machine (default: one for every core)')
+    where.add_argument('--scheduler', metavar='tcp://HOST:PORT',
+                       help='use a running Dask cluster')
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help="write the fleet's page, as pprs trend does")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    _check(options)
+    arrow()
+    model_of = lru_cache(maxsize=None)(_model)
+    base, _ = model_of(options.model)
+    if options.effects != AUTO and not requests_of(options.effects, base):
+        raise SurveyError(f'--effects {options.effects!r}: must be auto or names of effects')
+
+    def jobs() -> Iterator[Job]:
+        for entry in entries(options.recordings, options.manifest):
+            model, name = model_of(entry.model or options.model)
+            yield Job(entry, model.values, name, options.effects, options.topic)
+
+    total = sum(1 for _ in entries(options.recordings, options.manifest))
+    if not total:
+        raise SurveyError(f'{options.manifest}: no recording is listed')
+    store = Store(options.output)
+    store.begin()
+    done, failures = _run(options, screen, jobs(), total, store)
+    for recording, error in failures[:MOST_SHOWN]:
+        screen.print(f'[yellow]![/] {shown(recording)}: {shown(error)}')
+    if len(failures) > MOST_SHOWN:
+        screen.print(f'… and {len(failures) - MOST_SHOWN} more, in the store')
+    earlier = total - done - len(failures)
+    screen.print(f'{total} recording{"s" * (total != 1)}: {done} done, {earlier} done before, '
+                 f'{len(failures)} without a result; store: {shown(options.output)}')
+    if options.json:
+        write_json(options.json, {
+            'recordings': total, 'done': done, 'done_before': earlier,
+            'errors': [{'recording': name, 'error': error} for name, error in failures]})
+    if options.report:
+        fleet = fleet_trends(store)
+        for text in sentences(fleet):
+            screen.print(shown(text))
+        screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}')
+    return 0
+
+
+def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[Job], total: int, store: Store,
+         ) -> tuple[int, list[tuple[str, str]]]:
+    done, failures = 0, []
+    with (cluster(options.workers, options.scheduler) as client,
+          counting_bar(screen, 'recordings', total) as advance):
+        for result in run_survey(client, jobs, store):
+            if result is not None and result.error is None:
+                done += 1
+            elif result is not None:
+                failures.append((displayed(result.rows[0]['recording']), result.error or ''))
+            advance()
+    return done, failures
+
+
+def _check(options: argparse.Namespace) -> None:
+    if not options.recordings and not options.manifest:
+        raise SurveyError('no recording is given, must be RECORDING… or --manifest')
+    path = Path(options.output)
+    if not is_remote(options.output) and path.exists() and not path.is_dir():
+        raise SurveyError(f'--output {options.output}: is a file, must be a folder')
+
+
+def _model(path: str) -> tuple[ForceModel, str]:
+    model = load_model(path)
+    return model, fingerprint(model)

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs workbench: effects to tick on recordings, in the browser.
+
+Serves one page on this machine; its first line on stdout is the address with a token.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from pprs_dynamics.app.commands.arguments import number
+from pprs_dynamics.app.workbench.reading import Files
+from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
+from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
+from pprs_dynamics.app.workbench.server.serve import serve
+from pprs_dynamics.app.workbench.server.surveys import Surveys
+from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.physics.model.drive_model import DriveModel
+
+HOST = '127.0.0.1'
+ANY = ('', '0.0.0.0', '::', '*')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('recordings', metavar='RECORDING', nargs='*',
+                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
+                        'store of pprs survey, to choose from in the browser')
+    parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
+                        help='a recording that is never fitted: adoptions are judged on it; may '
+                        'be repeated')
+    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
+                        'holds several, and to listen to with --live')
+    parser.add_argument('--live', action='store_true',
+                        help='listen to joint_states, and set effects on running nodes')
+    parser.add_argument('--port', type=number(0, 65535), default=0.0,
+                        help='to listen on (default: any that is free)')
+    parser.add_argument('--host', type=_one_address, default=HOST,
+                        help=f'to listen on (default {HOST}: nobody else on the network sees it)')
+    parser.add_argument('--no-browser', action='store_true', help='open no browser')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    given = [path for path in options.recordings if not is_folder(path)]
+    # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
+    files = Files.read(given, options.model, options.validate, options.topic)
+
+    def begin() -> Session | None:
+        return Session.of(files) if files.recordings else None
+    live = _live(options) if options.live else None
+    hub = Hub(begin, options.model, Folders.of(options.recordings),
+              Surveys.of(options.recordings), live)
+    serve(hub, options.host, int(options.port), not options.no_browser)
+    return 0
+
+
+def _one_address(text: str) -> str:
+    """Read an address that browsers can call: requests must name it."""
+    if text in ANY:
+        raise argparse.ArgumentTypeError(f'{text!r} must be the one address or name by which '
+                                         'browsers will call this machine')
+    return text
+
+
+def _live(options: argparse.Namespace) -> LiveSource:
+    model = DriveModel.load(options.model)
+    try:
+        from pprs_dynamics.ros.live_joint_states import LiveSource as JointStates
+    except ImportError:
+        raise MissingLibraryError('rclpy', 'live data', 'ros') from None
+    source: LiveSource = JointStates(model, options.topic or 'joint_states')
+    return source

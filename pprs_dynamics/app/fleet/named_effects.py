@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""One joint fit of the model's numbers, within tolerances, and of effects that are named.
+
+No search: every named effect is fitted on every drive that is asked for, whether it pays or not, so
+that its values can be followed from recording to recording. Rows hold the coefficients that the
+forces are linear in, whose errors are Gaussian even where the effect is not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+OWN = 'model'  # stands for an effect's name in rows of the model's own numbers
+
+
+@dataclass(frozen=True)
+class NamedFit:
+    """Rows of values, and the noise that the fit leaves.
+
+    Parameters
+    ----------
+    rows : list of dict
+        drive, effect, parameter, value, std, unit, evidence.
+    design : Design
+    noise : dict of int to float
+        By drive [N].
+    """
+
+    rows: list[dict[str, Any]]
+    design: Design
+    noise: dict[int, float]
+
+
+def fit_named_effects(model: ForceModel, recording: Recording,
+                      requests: Sequence[EffectRequest]) -> NamedFit:
+    """Return the values of named effects and of the model's numbers.
+
+    An effect that the model has already, or that cannot act on a drive, gives no row there.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    design = Design.of(model, [recording])
+    regression = Regression(design.residuals, design.base)
+    terms = [term for request in requests
+             for term in _terms(design, regression, request)]
+    blocks = [_block(regression, term) for term in terms]
+    fit = regression.fit(blocks)
+    rows = [row for term, block in zip(terms, blocks, strict=True)
+            for row in _rows(design, regression, fit, term, block)]
+    rows += _own_numbers(design, fit)
+    return NamedFit(rows, design, {d: regression.noise_floor(fit, d) for d in regression.drives})
+
+
+def _terms(design: Design, regression: Regression, request: EffectRequest) -> Iterator[Term]:
+    effect = request.effect
+    if not issubclass(effect, DriveEffect):
+        yield from (term for term in design.structure if term.effect is effect
+                    and any(np.any(rows) for rows in term.rows.values()))
+        return
+    for d in regression.drives:
+        if request.drives is not None and design.drives[d] not in request.drives:
+            continue
+        if not design.acts_on(effect, d):
+            continue
+        shapes = list(effect.trials(design.covered[d])) if effect.shape else [{}]
+        terms = [design.term(effect, d, shape) for shape in shapes]
+        if len(terms) == 1:
+            yield terms[0]
+        else:
+            # The best of the shapes tried, beside the model alone.
+            alone = regression.fit(())
+            yield max(terms, key=lambda one: regression.gain(alone, _block(regression, one)))
+
+
+def _block(regression: Regression, term: Term) -> Block:
+    return regression.block(term.rows, term.is_fixed,
+                            np.zeros((0, 0)) if term.is_fixed else None)
+
+
+def _rows(design: Design, regression: Regression, fit: JointFit, term: Term, block: Block,
+          ) -> Iterator[dict[str, Any]]:
+    drive = None if term.drive is None else design.drives[term.drive]
+    place = {'drive': drive, 'effect': term.effect.name}
+    if not term.is_fixed:
+        at = fit.places[block]
+        values, covariance = fit.coefficients[at], fit.covariance[at, at]
+        # What the deviance rises by without the effect, at the noise of the fit.
+        evidence = float(values @ np.linalg.solve(covariance, values))
+        for k, coefficient in enumerate(term.effect.coefficients):
+            yield {**place, 'parameter': coefficient.name, 'value': float(values[k]),
+                   'std': float(np.sqrt(covariance[k, k])), 'unit': coefficient.unit,
+                   'evidence': evidence}
+    for parameter in term.effect.shape:
+        yield {**place, 'parameter': parameter.name, 'value': float(term.shape[parameter.name]),
+               'unit': parameter.unit}
+
+
+def _own_numbers(design: Design, fit: JointFit) -> Iterator[dict[str, Any]]:
+    for k, column in enumerate(design.base):
+        if isinstance(column, KnownNumber):
+            number = column.number
+            label = number.key if number.element is None else f'{number.key}[{number.element + 1}]'
+            yield {'effect': OWN, 'parameter': label,
+                   'value': column.value(float(fit.coefficients[k])),
+                   'std': float(np.sqrt(fit.covariance[k, k])) * number.deviation,
+                   'unit': number.unit}

@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""One recording to its rows: read, checked, compared, and diagnosed or fitted.
+
+`examine` is what workers run. It never raises for what is wrong with a recording: that becomes a
+row with the reason.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path, PurePosixPath
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics import __version__
+from pprs_dynamics.app.fleet.manifest import Entry, filesystem, is_remote
+from pprs_dynamics.app.fleet.named_effects import OWN, fit_named_effects
+from pprs_dynamics.app.fleet.store import key_of
+from pprs_dynamics.errors import PprsError, UnreadableFileError
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.measurement.files.fingerprint import fingerprint
+from pprs_dynamics.measurement.files.recording import Recording, describe, read_for
+from pprs_dynamics.measurement.residuals.conventions import find_mistakes
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.threads import use_one_thread
+
+AUTO = 'auto'
+FITTED = 'fitted'  # the verdict where only named effects were fitted
+# Of the model's error over the changing effort on a drive, beyond which units, signs and order of
+# drives are looked at: wrong ones leave as much as the effort or more.
+SUSPECT = 1.0
+MODELS_KEPT = 8  # built models that a worker remembers
+
+
+@dataclass(frozen=True)
+class Job:
+    """A recording, the model to judge it by, and how.
+
+    Parameters
+    ----------
+    entry : Entry
+    values : mapping
+        Flat keys and values of the model.
+    model : str
+        Its fingerprint.
+    options : str
+        'auto', or effects as EFFECT or EFFECT:drive+drive, divided by commas.
+    topic : str, optional
+    """
+
+    entry: Entry
+    values: Mapping[str, Any]
+    model: str
+    options: str = AUTO
+    topic: str | None = None
+
+    def key(self, content: str) -> str:
+        """Return the key of its rows; `content` is the recording's SHA-256."""
+        return key_of(content, self.model, self.options, __version__)
+
+
+@dataclass(frozen=True)
+class Result:
+    """Rows of a recording.
+
+    Parameters
+    ----------
+    key : str
+    rows : list of dict
+    failed : bool
+        True where another attempt may succeed.
+    """
+
+    key: str
+    rows: list[dict[str, Any]]
+    failed: bool = False
+
+    @property
+    def error(self) -> str | None:
+        """Why there is no result, if there is none."""
+        found: str | None = self.rows[0].get('error')
+        return found
+
+
+def requests_of(options: str, model: ForceModel) -> tuple[EffectRequest, ...]:
+    """Return the effects that options name; errors as `EffectRequest`."""
+    requests = tuple(EffectRequest.of(text.strip().replace('+', ','), tuple(model.drives))
+                     for text in options.split(',') if text.strip())
+    for request in requests:
+        request.require_place(model)
+    return requests
+
+
+def identify(path: str) -> str | None:
+    """Return the SHA-256 of a recording's content; None where it cannot be read."""
+    try:
+        if not is_remote(path):
+            return fingerprint(path)
+        system, within = filesystem(path)
+        if system.isdir(within):
+            with local_copy(path) as copy:
+                return fingerprint(copy)
+        whole = hashlib.sha256()
+        with system.open(within, 'rb') as file:
+            while block := file.read(1 << 20):
+                whole.update(block)
+        return whole.hexdigest()
+    except Exception:  # libraries of file systems raise what they like; examine tells the reason
+        return None
+
+
+@contextmanager
+def local_copy(path: str) -> Iterator[str]:
+    """Give a local path of a recording; of a remote one a copy that lasts as long as the block.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be fetched.
+    """
+    if not is_remote(path):
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix='pprs-survey-') as folder:
+        system, within = filesystem(path)
+        target = Path(folder) / PurePosixPath(within).name
+        try:
+            system.get(within, str(target), recursive=bool(system.isdir(within)))
+        except Exception as error:
+            raise UnreadableFileError(path, f'cannot be fetched: {error}') from None
+        yield str(target)
+
+
+def examine(job: Job, content: str | None) -> Result:
+    """Return the rows of a recording.
+
+    Parameters
+    ----------
+    job : Job
+    content : str or None
+        The recording's SHA-256, of `identify`.
+    """
+    use_one_thread()
+    began = perf_counter()
+    common = _common(job, content)
+    key, path = job.key(content or job.entry.path), job.entry.path
+    try:
+        with local_copy(job.entry.path) as path:
+            rows = _examined(job, path, common)
+    except PprsError as error:
+        # A copy's name says nothing to anybody.
+        text = str(error).replace(path, job.entry.path)
+        # What could not even be read may be there the next time.
+        return Result(key, [{**common, 'error': displayed(text),
+                             'seconds': perf_counter() - began}], failed=content is None)
+    except Exception as error:  # of the package itself, but no end of a survey
+        return Result(key, [{**common, 'seconds': perf_counter() - began,
+                             'error': f'unexpected {type(error).__name__}: {error}'}], failed=True)
+    seconds = perf_counter() - began
+    return Result(key, [{**row, 'seconds': seconds} for row in rows])
+
+
+def lost(job: Job, content: str | None, reason: str) -> Result:
+    """Return the row of a recording whose worker did not come back."""
+    return Result(job.key(content or job.entry.path),
+                  [{**_common(job, content), 'error': reason}], failed=True)
+
+
+def _common(job: Job, content: str | None) -> dict[str, Any]:
+    entry = job.entry
+    return {'recording': displayed(PurePosixPath(entry.path.rstrip('/')).name),
+            'path': displayed(entry.path), 'sha256': content,
+            'time': None if entry.time is None else datetime.fromtimestamp(entry.time, UTC),
+            'model': job.model, 'options': job.options, 'version': __version__,
+            'conditions': list(entry.conditions.items())}
+
+
+@lru_cache(MODELS_KEPT)
+def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
+    return build_model(dict(values))
+
+
+def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
+    model = _model(job.model, tuple(job.values.items()))
+    recording = read_for(model, path, job.topic)
+    summary = describe(recording)
+    if common['time'] is None:
+        common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}
+    common = {**common, 'duration': summary.duration}
+    found = _judged(model, recording, job)
+    rows, residuals, noise, verdict = found
+    common = {**common, 'verdict': verdict}
+    drives = _drives(residuals, noise)
+    quantities = [{'drive': drive, **numbers} for drive, numbers in drives.items()]
+    return [{**common, **row} for row in quantities] + [
+        {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
+
+
+Examined = tuple[list[dict[str, Any]], Residuals, Mapping[str, float], str]
+
+
+def _judged(model: ForceModel, recording: Recording, job: Job) -> Examined:
+    """Return what is found; a recording of other units, signs or drives is refused.
+
+    The search for these takes longer than a fit, so that there only what fits badly is searched.
+    """
+    if job.options == AUTO:
+        _refuse_mistakes(model, recording, job)
+        return _diagnosed(model, recording)
+    try:
+        found = _fitted(model, recording, job)
+    except PprsError:
+        _refuse_mistakes(model, recording, job)
+        raise
+    if any(one['relative'] > SUSPECT for one in _drives(found[1], found[2]).values()):
+        _refuse_mistakes(model, recording, job)
+    return found
+
+
+def _refuse_mistakes(model: ForceModel, recording: Recording, job: Job) -> None:
+    for finding in find_mistakes(model, recording):
+        raise UnreadableFileError(displayed(job.entry.path), finding.text)
+
+
+def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """Return rms, relative and noise of every drive that was measured."""
+    found = {}
+    for d, drive in enumerate(residuals.drives):
+        known = np.isfinite(residuals.measured[:, d])
+        if known.any():
+            rms = float(np.sqrt(np.mean(residuals.error[known, d] ** 2)))
+            swing = float(np.std(residuals.measured[known, d]))
+            found[drive] = {'rms': rms, 'relative': rms / swing if swing else float('nan'),
+                            'noise': float(noise.get(drive, np.nan))}
+    return found
+
+
+def _fitted(model: ForceModel, recording: Recording, job: Job) -> Examined:
+    fit = fit_named_effects(model, recording, requests_of(job.options, model))
+    drives = fit.design.drives
+    return (fit.rows, fit.design.residuals, {drives[d]: one for d, one in fit.noise.items()},
+            FITTED)
+
+
+def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
+    diagnosis = diagnose(model, [recording])
+    rows: list[dict[str, Any]] = []
+    for effect in diagnosis.effects:
+        for key, one in effect.parameters.items():
+            drive, _, parameter = key.rpartition('.')
+            rows.append({'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
+                         'value': one.value, 'std': one.std, 'unit': one.unit,
+                         'evidence': effect.evidence})
+    rows += [{'effect': OWN, 'parameter': one.label, 'value': one.after, 'std': one.std,
+              'unit': one.unit} for one in diagnosis.calibrated]
+    return rows, diagnosis.residuals, diagnosis.noise_floors, diagnosis.verdict

@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A diagnosis in the terminal, drawn with rich; readable from 80 columns on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from typing import Any
+
+from rich import box
+from rich.console import Group
+from rich.markup import escape
+from rich.padding import Padding
+from rich.panel import Panel
+from rich.table import Table
+
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.found_effects import RankedEffect
+from pprs_dynamics.inference.diagnosis.quantities import name_drives, plain
+from pprs_dynamics.inference.diagnosis.sentences import (
+    Finding,
+    FittedValue,
+    Sentences,
+    fitted_values,
+)
+from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
+
+COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
+MOST_LISTED = 2  # places of effects whose parameters the sentences give
+WIDTH = 80
+LONGEST = 160  # characters of values that are shown without --details: two lines
+MOST_EFFECTS = 4  # that are shown without --details
+EVERYWHERE = 'structure'  # where effects sit that are not on drives
+
+
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False) -> Group:
+    """Return what the terminal shows, most important first; all there is with `details`."""
+    return Group(*(_parts if details else _brief)(diagnosis, words))
+
+
+def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
+    yield _verdict(diagnosis, words)
+    if diagnosis.effects:
+        yield _plain_table(_headings(diagnosis),
+                           _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
+        lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
+                 for effect, drive, text in _joined(fitted_values(diagnosis))]
+        taken = accumulate(-(-len(line) // WIDTH) * WIDTH for line in lines)
+        shown = [line for line, total in zip(lines, taken, strict=True) if total <= LONGEST]
+        yield from map(escape, shown)
+        if len(lines) > len(shown):
+            yield f'  … values of {len(lines) - len(shown)} more: --details'
+    if second := runner_up(diagnosis):
+        yield f'[bold]Runner-up[/] {escape(second)}'
+    if words.within_model_error:
+        yield f'Within the model error of what was found: {len(words.within_model_error)} more'
+    if words.warnings:
+        yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
+    yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
+    if words.command:
+        yield f'  [bold cyan]{escape(words.command)}[/]'
+    yield '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
+
+
+def _verdict(diagnosis: Diagnosis, words: Sentences) -> Panel:
+    colour = COLOURS[diagnosis.verdict]
+    return Panel(escape(words.headline), title=f'[bold {colour}]{diagnosis.verdict}[/]',
+                 border_style=colour, title_align='left')
+
+
+def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    yield _verdict(diagnosis, words)
+    if diagnosis.effects:
+        held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
+                else 'blocks of the same recordings')
+        yield _table(f'Those that lower the error most first; held out: {held}',
+                     _headings(diagnosis),
+                     _effect_rows(diagnosis), right=(2, 3, 4))
+    for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
+        yield _finding(number, finding)
+    values = fitted_values(diagnosis)
+    if len({(one.effect, one.drive) for one in values}) > MOST_LISTED:
+        yield _table('Values, ± two standard deviations', ('effect', 'drive', 'values'),
+                     [tuple(map(escape, row)) for row in _joined(values)])
+    if diagnosis.sets:
+        yield _table('The best sets of effects, and their costs above the best', ('cost', 'set'),
+                     [(cost, escape(text)) for text, cost in set_rows(diagnosis)])
+    if diagnosis.candidates:
+        yield _table('Each effect alone', (
+            'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'),
+                     [_ranked(one, diagnosis) for one in diagnosis.candidates], right=(2, 3))
+    yield from _list('Within their tolerance', words.calibrated, 'blue')
+    yield from _list('Suspects', words.suspects, 'yellow')
+    yield from _list('Within model error', words.within_model_error, 'blue')
+    yield from _list('Warnings', words.warnings, 'yellow')
+    yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
+    if words.command:
+        yield f'  [bold cyan]{escape(words.command)}[/]'
+
+
+def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    unit = diagnosis.residuals.unit
+    return ('effect', 'on', f'error [{unit}]', f'held out [{unit}]', 'evidence')
+
+
+def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    return [(one.name, sites(one.drives, diagnosis), _fall(one.error_before, one.error_after),
+             _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
+            for one in diagnosis.effects]
+
+
+def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
+    """Return one row per effect and drive."""
+    rows: dict[tuple[str, str], list[str]] = {}
+    for one in values:
+        rows.setdefault((one.effect, one.drive), []).append(f'{one.parameter.symbol} {one.text}')
+    return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
+
+
+def _finding(number: int, finding: Finding) -> Padding:
+    grid = Table.grid(padding=(0, 1))
+    grid.add_column(style='bold', width=8)
+    grid.add_column(ratio=1)
+    for label, text in finding_lines(finding):
+        grid.add_row(label, escape(text))
+    title = f'[bold]{number}. {escape(finding.title)}[/]'
+    return Padding(Group(title, Padding(grid, (0, 0, 0, 3))), (0, 0, 1, 0))
+
+
+def finding_lines(finding: Finding) -> list[tuple[str, str]]:
+    """Return what a finding says, line by line, with labels."""
+    return [('missing', finding.what), ('why', finding.why), ('cause', finding.cause),
+            ('confirm', finding.confirm), *(('note', remark) for remark in finding.remarks)]
+
+
+def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis) -> str:
+    """Return where an effect sits, for a table."""
+    return EVERYWHERE if drives is None else name_drives(drives, diagnosis.residuals.drives)
+
+
+def _ranked(one: RankedEffect, diagnosis: Diagnosis) -> tuple[str, ...]:
+    return (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
+            f'{one.error_after:.3f}')
+
+
+def _fall(before: float, after: float) -> str:
+    colour = 'green' if after < before else 'red'
+    return f'{plain(before)} → [{colour}]{plain(after)}[/]'
+
+
+def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
+    if lines:
+        yield f'[bold {colour}]{title}[/]'
+        for line in lines:
+            grid = Table.grid(padding=(0, 1))
+            grid.add_row('-', escape(line))
+            yield grid
+        yield ''
+
+
+def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
+           right: Sequence[int] = ()) -> Table:
+    table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
+    for number, heading in enumerate(headings):
+        table.add_column(escape(heading), justify='right' if number in right else 'left',
+                         no_wrap=number in right or number == 0)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]],
+                 right: Sequence[int] = ()) -> Table:
+    """Return a table without lines and title."""
+    table = Table(box=None, padding=(0, 1))
+    for number, heading in enumerate(headings):
+        table.add_column(escape(heading), justify='right' if number in right else 'left',
+                         no_wrap=number in right or number == 0)
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page of a fleet: a map of robots and quantities; a click shows a trend, another a recording.
+
+Trends are drawn by the browser from numbers in the page, so that thousands of them fit into it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.app.fleet.trend import FleetTrends, Quantity, Trend
+from pprs_dynamics.app.fleet.words import change_text, reach_text, sentences
+from pprs_dynamics.app.report.figures import BLUE, GREY, RED
+from pprs_dynamics.app.report.page import Page, plotly_objects
+from pprs_dynamics.arrays import Array
+
+# Numbers of trends that a page holds: beyond, the quietest are not drawn but stay in the map.
+MOST_VALUES = 300_000
+SATURATED = 10.0  # standard deviations at which the map's colour is full
+MOST_ERRORS = 50
+ROW, HEAD = 26, 260  # heights of the map [px]
+LEAST_ROWS = 4  # so that its colour scale has room
+
+_SCRIPT = '''
+const data = JSON.parse(document.getElementById('fleet-data').textContent);
+const place = document.getElementById('trend'), card = document.getElementById('recording');
+let shown = data.first;
+function showTrend(robot, quantity) {
+  shown = [robot, quantity];
+  const trend = data.trends[robot + '\\u0000' + quantity];
+  card.hidden = true;
+  if (!trend) { document.getElementById('trend-title').textContent =
+    robot + ', ' + quantity + ': not drawn, too many recordings for one page'; return; }
+  document.getElementById('trend-title').textContent =
+    robot + ', ' + quantity + (trend.text ? ' ' + trend.text : ': no change');
+  const stamps = trend.t.map(day => new Date(day * 864e5).toISOString());
+  const traces = [{x: stamps, y: trend.y, mode: 'markers', name: quantity, customdata: trend.r,
+    marker: {color: data.colours[0]}, hovertemplate: '%{x}<br>%{y:.4g} ' + trend.unit +
+    '<extra>click: the recording</extra>',
+    error_y: {type: 'data', array: trend.s, thickness: 1, width: 2}},
+    {x: stamps, y: trend.f, mode: 'lines', name: trend.text ? 'change' : 'median',
+     line: {color: data.colours[1]}}];
+  const layout = {height: 420, margin: {l: 70, r: data.beside ? 70 : 15, t: 20, b: 50},
+    yaxis: {title: {text: quantity + (trend.unit ? ' [' + trend.unit + ']' : '')}},
+    legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}};
+  if (trend.limit !== null) traces.push({x: [stamps[0], stamps[stamps.length - 1]],
+    y: [trend.limit, trend.limit], mode: 'lines', name: 'limit',
+    line: {dash: 'dash', color: data.colours[2]}});
+  if (data.beside) {
+    traces.push({x: stamps, y: trend.r.map(k => data.recordings[k][3]), mode: 'lines+markers',
+      name: data.beside, yaxis: 'y2', opacity: 0.5, line: {color: data.colours[2]}});
+    layout.yaxis2 = {overlaying: 'y', side: 'right', title: {text: data.beside}, tickmode: 'auto',
+      showgrid: false};
+  }
+  place.setAttribute('aria-label', quantity + ' of ' + robot + ' over time');
+  const drawn = window.themed(JSON.stringify({data: traces, layout}));
+  Plotly.react(place, drawn.data, drawn.layout, {displayModeBar: false, responsive: true});
+  place.removeAllListeners('plotly_click');
+  place.on('plotly_click', event => {
+    const k = event.points[0].customdata;
+    if (k !== undefined) showRecording(k);
+  });
+}
+function showRecording(k) {
+  const [name, path, day] = data.recordings[k];
+  card.replaceChildren();
+  const title = document.createElement('h3'), line = document.createElement('p');
+  title.textContent = name + ', ' + new Date(day * 864e5).toISOString().slice(0, 19) + ' UTC';
+  line.textContent = 'Its own page: ';
+  const code = document.createElement('code');
+  const quoted = "'" + path.replaceAll("'", "'\\\\''") + "'";
+  code.textContent = 'pprs diagnose ' + quoted + ' --report recording.html';
+  line.append(code);
+  const table = document.createElement('table');
+  for (const [key, trend] of Object.entries(data.trends)) {
+    const at = trend.r.indexOf(k);
+    if (at < 0) continue;
+    const row = table.insertRow();
+    for (const text of [key.split('\\u0000')[1], trend.y[at].toPrecision(4), trend.unit])
+      row.insertCell().textContent = text;
+  }
+  card.append(title, line, table);
+  card.hidden = false;
+}
+function begin() {
+  // The page unpacks its library, and draws a figure once it is in view.
+  const map = document.querySelector('.plot');
+  if (!window.Plotly || !map.on) { setTimeout(begin, 100); return; }
+  map.on('plotly_click', event => showTrend(event.points[0].y, event.points[0].x));
+  if (shown) showTrend(...shown);
+}
+begin();
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+  if (shown) showTrend(...shown);
+});
+'''
+
+
+def fleet_page(fleet: FleetTrends, beside: str | None = None) -> Page:
+    """Return the page, most important first.
+
+    Parameters
+    ----------
+    fleet : FleetTrends
+    beside : str, optional
+        Column of the manifest to be drawn beside every trend.
+    """
+    changed = [robot for robot in fleet.robots if fleet.flagged(robot)]
+    page = Page(f'Fleet: {len(changed)} of {len(fleet.robots)} robots changed')
+    lines = sentences(fleet)
+    page.text(lines[0], 'lead')
+    if lines[1:]:
+        page.bullets(lines[1:])
+    if fleet.trends:
+        page.heading('Robots and quantities')
+        page.figure(fleet_map(fleet), 'Colour: standard deviations from the robot\'s own first '
+                    'recordings, or, by the button, from the fleet\'s median. Framed: a change '
+                    'that chance does not explain. Click a field for its trend, and a point there '
+                    'for the recording.')
+        page.interactive('<h2 id="trend-title">Trend</h2><div id="trend" role="img"></div>'
+                         '<section id="recording" class="card" hidden></section>',
+                         'fleet-data', json.dumps(_data(fleet, changed, beside), allow_nan=False),
+                         _SCRIPT)
+    if fleet.errors:
+        page.heading('Recordings without a result')
+        page.table(('recording', 'robot', 'reason'),
+                   [(one['recording'], one['robot'], one['error'])
+                    for one in fleet.errors[:MOST_ERRORS]])
+    return page
+
+
+def fleet_map(fleet: FleetTrends) -> Any:
+    """Return the map of robots and quantities."""
+    go = plotly_objects()
+    robots, quantities = list(fleet.robots), _columns(fleet)
+    labels = [quantity.label for quantity in quantities]
+    shape = (len(robots), len(quantities))
+    first, others = np.full(shape, np.nan), np.full(shape, np.nan)
+    at = {robot: k for k, robot in enumerate(robots)}
+    place = {quantity: k for k, quantity in enumerate(quantities)}
+    marks: list[tuple[str, str]] = []
+    for trend in fleet.trends:
+        if trend.quantity in place:
+            i, j = at[trend.robot], place[trend.quantity]
+            first[i, j], others[i, j] = trend.from_first, trend.from_fleet
+            if trend.flagged:
+                marks.append((labels[j], trend.robot))
+    figure = go.Figure([_field(go, robots, labels, first, True),
+                        _field(go, robots, labels, others, False)])
+    figure.add_trace(go.Scatter(
+        x=[x for x, _ in marks], y=[y for _, y in marks], mode='markers', hoverinfo='skip',
+        marker={'symbol': 'square-open', 'size': 15, 'color': 'black', 'line': {'width': 2}},
+        showlegend=False))
+    button = {'type': 'buttons', 'direction': 'right', 'x': 1.0, 'y': 1.02, 'xanchor': 'right',
+              'yanchor': 'bottom', 'buttons': [
+                  {'label': label, 'method': 'update',
+                   'args': [{'visible': [k == 0, k == 1, True]}]}
+                  for k, label in enumerate(('from its start', 'from the fleet'))]}
+    figure.update_layout(
+        height=HEAD + ROW * max(len(robots), LEAST_ROWS), updatemenus=[button],
+        xaxis={'tickangle': -60, 'type': 'category', 'automargin': True},
+        yaxis={'autorange': 'reversed', 'type': 'category', 'automargin': True},
+        margin={'l': 60, 'r': 20, 't': 50, 'b': 140})
+    return figure
+
+
+def _field(go: Any, robots: Sequence[str], labels: Sequence[str], values: Array,
+           visible: bool) -> Any:
+    return go.Heatmap(
+        x=labels, y=list(robots), z=[[None if np.isnan(v) else round(float(v), 2) for v in row]
+                                     for row in values],
+        zmin=-SATURATED, zmax=SATURATED, colorscale='RdBu_r', zmid=0, visible=visible, xgap=1,
+        ygap=1, colorbar={'title': {'text': 'standard<br>deviations', 'font': {'size': 12}},
+                          'thickness': 14, 'tickvals': [-SATURATED, 0.0, SATURATED]},
+        hovertemplate='%{y}<br>%{x}<br>%{z:.1f} standard deviations<extra></extra>')
+
+
+def _columns(fleet: FleetTrends) -> list[Quantity]:
+    """Return the map's quantities: effects and errors, and the model's numbers that changed."""
+    changed = {trend.quantity for trend in fleet.trends if trend.flagged}
+    return [quantity for quantity in fleet.quantities
+            if quantity.rank != 1 or quantity in changed]
+
+
+def _data(fleet: FleetTrends, changed: Sequence[str], beside: str | None) -> dict[str, Any]:
+    shown = set(_columns(fleet))
+    trends = sorted((trend for trend in fleet.trends if trend.quantity in shown),
+                    key=lambda trend: -trend.changes.statistic)
+    number = {sha256: k for k, sha256 in enumerate(fleet.recordings)}
+    drawn, values = {}, 0
+    for trend in trends:
+        values += len(trend.value)
+        if values > MOST_VALUES:
+            break
+        drawn[f'{trend.robot}\0{trend.quantity.label}'] = _trend(trend, number)
+    first = fleet.flagged(changed[0])[0] if changed else None
+    return {
+        'trends': drawn, 'beside': beside, 'colours': [BLUE, RED, GREY],
+        'first': None if first is None else [first.robot, first.quantity.label],
+        'recordings': [[one['recording'], one['path'], one['time'],
+                        one['conditions'].get(beside) if beside else None]
+                       for one in fleet.recordings.values()]}
+
+
+def _trend(trend: Trend, number: dict[str, int]) -> dict[str, Any]:
+    text = f'{change_text(trend)}{reach_text(trend)}' if trend.flagged else ''
+    return {'t': [round(float(day), 4) for day in trend.time],
+            'y': _plain(trend.value), 's': _plain(2 * trend.std),
+            'f': _plain(trend.changes.fitted), 'unit': trend.quantity.unit, 'text': text,
+            'limit': None if trend.reach is None else trend.reach.limit,
+            'r': [number[sha256] for sha256 in trend.recordings]}
+
+
+def _plain(values: Array) -> list[float | None]:
+    return [float(f'{value:.6g}') if np.isfinite(value) else None for value in values]

@@ -1,0 +1,293 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""One self-contained HTML page: text, tables and Plotly figures that need no network."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from importlib.resources import files
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.system.atomic_file import write_text
+from pprs_dynamics.system.plain_text import PLAIN
+
+HEIGHT = 320  # [px], of figures that say none
+# Of plotly.js 4.1.1: lines, bars and markers. It starts four times as fast as the whole library,
+# which is in the page only where something is drawn in three dimensions.
+BASIC = 'plotly-basic.min.js.gz'
+BASIC_TYPES = ('scatter', 'bar')
+# Of uPlot 1.6.32, for curves that change at once.
+CURVES, CURVES_STYLE = 'uplot.iife.min.js.gz', 'uplot.min.css'
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """One row of a table of errors with bars.
+
+    Parameters
+    ----------
+    label : str
+    before : float
+        Root of the mean square [N].
+    after : float, optional
+        [N]
+    noise : float, optional
+        [N]
+    """
+
+    label: str
+    before: float
+    after: float | None = None
+    noise: float | None = None
+
+
+def plotly_objects() -> Any:
+    """Return plotly.graph_objects, or raise MissingLibraryError."""
+    try:
+        from plotly import graph_objects
+    except ImportError:
+        raise MissingLibraryError('plotly', 'the report', 'report') from None
+    return graph_objects
+
+
+class Page:
+    """Collects sections from top to bottom. Text from files is escaped here, and only here.
+
+    Figures are drawn by the browser when they are scrolled to.
+
+    Parameters
+    ----------
+    title : str
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._body: list[str] = []
+        self._figures = 0
+        self._menus = 0
+        self._types: set[str] = set()
+        self._has_curves = False
+
+    def heading(self, text: str) -> None:
+        """Start a section."""
+        self._body.append(f'<h2>{escape(text)}</h2>')
+
+    @contextmanager
+    def fold(self, title: str, is_open: bool = False) -> Iterator[None]:
+        """Put what is added within the block behind a title that opens it."""
+        self._body.append(f'<details{" open" * is_open}><summary>{escape(title)}</summary>')
+        yield
+        self._body.append('</details>')
+
+    @contextmanager
+    def columns(self) -> Iterator[None]:
+        """Put what is added within the block side by side, where the screen is wide enough."""
+        self._body.append('<div class="columns">')
+        yield
+        self._body.append('</div>')
+
+    @contextmanager
+    def block(self) -> Iterator[None]:
+        """Keep what is added within the block together, in one column."""
+        self._body.append('<div>')
+        yield
+        self._body.append('</div>')
+
+    def text(self, text: str, kind: str = '') -> None:
+        """Add a paragraph; `kind` is '', 'lead' or 'note'."""
+        self._body.append(f'<p class="{kind}">{escape(text)}</p>')
+
+    def command(self, text: str, command: str) -> None:
+        """Add what to do next, with a command that can be copied."""
+        code = (f'<div class="command"><code>{escape(command)}</code>'
+                '<button type="button">Copy</button></div>') if command else ''
+        self._body.append(f'<section class="next" aria-label="Next step"><p><b>Next:</b> '
+                          f'{escape(text)}{":" if command else "."}</p>{code}</section>')
+
+    def bullets(self, lines: Iterable[str], numbered: bool = False) -> None:
+        """Add a list."""
+        tag = 'ol' if numbered else 'ul'
+        items = ''.join(f'<li>{escape(line)}</li>' for line in lines)
+        self._body.append(f'<{tag}>{items}</{tag}>')
+
+    def table(
+        self, headings: Sequence[str], rows: Iterable[Sequence[str]],
+        grades: Sequence[str] = (), caption: str = '',
+    ) -> None:
+        """Add a table; `grades` colour the rows' first cells, the last column is text."""
+        head = ''.join(f'<th scope="col">{escape(heading)}</th>' for heading in headings)
+        body = []
+        for number, row in enumerate(rows):
+            grade = escape(grades[number]) if grades else ''
+            cells = [f'<th scope="row" class="{grade}">{escape(row[0])}</th>',
+                     *(f'<td>{escape(cell)}</td>' for cell in row[1:-1]),
+                     f'<td class="text">{escape(row[-1])}</td>']
+            body.append(f'<tr>{"".join(cells)}</tr>')
+        self._body.append(f'<div class="scroll"><table>{_caption(caption)}<thead><tr>{head}</tr>'
+                          f'</thead><tbody>{"".join(body)}</tbody></table></div>')
+
+    def errors(self, rows: Sequence[ErrorRow], caption: str,
+               headings: tuple[str, str] = ('before', 'after')) -> None:
+        """Add a table of errors [N], each with a bar to one scale."""
+        largest = max((value for row in rows for value in (row.before, row.after, row.noise)
+                       if value is not None and value == value), default=0.0) or 1.0
+        names = ['error'] if all(row.after is None for row in rows) else [*headings]
+        noisy = any(row.noise is not None for row in rows)
+        head = ''.join(f'<th scope="col">{name}</th>' for name in (
+            '', *names, *['noise'] * noisy, ''))
+        body = []
+        for row in rows:
+            values = [row.before, *([row.after] if len(names) > 1 else []),
+                      *([row.noise] if noisy else [])]
+            cells = ''.join(f'<td>{_force(value)}</td>' for value in values)
+            shown = (('before', row.before), ('after', row.after), ('noise', row.noise))
+            bar = ''.join(_bar(kind, value / largest) for kind, value in shown
+                          if value is not None and value == value)
+            body.append(f'<tr><th scope="row">{escape(row.label)}</th>{cells}'
+                        f'<td><span class="bar" aria-hidden="true">{bar}</span></td></tr>')
+        self._body.append(
+            f'<div class="scroll"><table class="errors">{_caption(caption)}<thead><tr>{head}</tr>'
+            f'</thead><tbody>{"".join(body)}</tbody></table></div>')
+
+    def menu(self, label: str, names: Sequence[str], chosen: str) -> None:
+        """Add a choice of the drive that figures show; all menus of a page go together.
+
+        It rules traces whose `meta` is {'drive': NAME}.
+        """
+        self._menus += 1
+        options = ''.join(f'<option{" selected" * (name == chosen)}>{escape(name)}</option>'
+                          for name in names)
+        self._body.append(f'<p><label for="menu-{self._menus}">{escape(label)}</label> '
+                          f'<select data-menu id="menu-{self._menus}">{options}</select></p>')
+
+    def figure(self, figure: Any, caption: str = '', over_time: bool = False) -> None:
+        """Add a Plotly figure; those over time share the span shown and the cursor."""
+        self._body.append(self._drawn(figure, caption, over_time))
+
+    def card(self, title: str, lines: Iterable[tuple[str, str]],
+             figures: Iterable[tuple[Any, str]] = ()) -> None:
+        """Add a framed finding: labelled lines, and figures with captions below them."""
+        terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
+                        for label, text in lines)
+        drawn = ''.join(self._drawn(figure, caption, False) for figure, caption in figures)
+        self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
+                          f'<div class="columns">{drawn}</div></section>')
+
+    def interactive(self, elements: str, name: str, data: str, script: str,
+                    with_curves: bool = False) -> None:
+        """Add a part that a script of the package fills.
+
+        Parameters
+        ----------
+        elements : str
+            HTML of the package, without text from files.
+        name : str
+            Id of the element that holds the data.
+        data : str
+            JSON; it may hold text from files.
+        script : str
+        with_curves : bool
+            It draws with uPlot, after `await library('uplot')`.
+        """
+        self._has_curves |= with_curves
+        # Within a script an end tag would end it, wherever it stands.
+        safe = data.replace('<', '\\u003c')
+        self._body.append(f'{elements}<script type="application/json" id="{name}">{safe}</script>'
+                          f'<script>{script}</script>')
+
+    def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:
+        from plotly.utils import PlotlyJSONEncoder
+
+        self._figures += 1
+        name = f'figure-{self._figures}'
+        content = figure.to_plotly_json()
+        self._types |= {trace.get('type', 'scatter') for trace in content['data']}
+        layout = content['layout']
+        layout.pop('template', None)  # the page's own colours are set in the browser
+        height = layout.get('height') or HEIGHT
+        title = layout.get('title')
+        label = caption or str(title.get('text', '') if isinstance(title, dict) else title or '')
+        data = json.dumps({'data': content['data'], 'layout': layout,
+                           'frames': content.get('frames', [])}, cls=PlotlyJSONEncoder,
+                          separators=(',', ':'))
+        # Within a script an end tag would end it, wherever it stands.
+        data = data.replace('<', '\\u003c')
+        return (f'<figure><div class="plot" id="{name}" role="img" tabindex="0" '
+                f'aria-label="{escape(label or "Figure", quote=True)}" '
+                f'style="height:{height}px"{" data-time" * over_time}></div>'
+                + (f'<figcaption>{escape(caption)}</figcaption>' if caption else '')
+                + f'<script type="application/json" id="{name}-data">{data}</script></figure>')
+
+    def html(self) -> str:
+        """Return the page."""
+        libraries = {}
+        if self._figures:
+            libraries['plotly'] = (_packed(BASIC) if self._types <= set(BASIC_TYPES)
+                                   else _whole_plotly())
+        if self._has_curves:
+            libraries['uplot'] = _packed(CURVES)
+        library = ''.join(f'<script type="text/plain" id="{name}">{packed}</script>'
+                          for name, packed in libraries.items())
+        style = asset('page.css') + (asset(CURVES_STYLE) if self._has_curves else '')
+        return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+                '<meta name="viewport" content="width=device-width, initial-scale=1">'
+                f'<title>{escape(self._title)}</title><style>{style}</style>'
+                f'</head><body><header><h1>{escape(self._title)}</h1></header>'
+                f'<main>{"".join(self._body)}</main>'
+                f'{library}<script>{asset("page.js")}</script></body></html>\n')
+
+    def write(self, path: str | PathLike[str]) -> Path:
+        """Write the page to a file, whole or not at all.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where it cannot be written.
+        """
+        # Names of files may hold bytes that are no text.
+        write_text(path, self.html().encode(errors=PLAIN).decode())
+        return Path(path)
+
+
+def _caption(text: str) -> str:
+    return f'<caption><span>{escape(text)}</span></caption>' if text else ''
+
+
+def _bar(kind: str, share: float) -> str:
+    place = 'left' if kind == 'noise' else 'width'
+    return f'<i class="{kind}" style="{place}:{100 * share:.1f}%"></i>'
+
+
+def _force(value: float | None) -> str:
+    return '' if value is None or value != value else f'{value:.3f}'
+
+
+@cache
+def _packed(name: str) -> str:
+    """Return a compressed library of the package, in letters."""
+    return base64.b64encode(files('pprs_dynamics.app.report').joinpath(name).read_bytes()).decode()
+
+
+@cache
+def _whole_plotly() -> str:
+    """Return plotly.js as it comes with plotly, compressed, in letters."""
+    from plotly.offline import get_plotlyjs
+
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+
+
+@cache
+def asset(name: str) -> str:
+    """Return a text that is shipped beside this module."""
+    return files('pprs_dynamics.app.report').joinpath(name).read_text(encoding='utf-8')

@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables in the terminal, drawn with rich."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+from typing import Any
+
+from pprs_dynamics.inference.diagnosis.comparison import Comparison
+from pprs_dynamics.inference.diagnosis.quantities import percent
+from pprs_dynamics.measurement.files.recording import Summary
+from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.physics.model.reproduction import Claim
+
+# Lines that places take without --details, and characters of a line of 80 columns, which words
+# seldom fill.
+MOST_LINES, LINE = 9, 70
+
+def claims_table(claims: Iterable[Claim]) -> Any:
+    """Return the paper's claims against what comes out."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title='The paper\'s claims, and what comes out', show_lines=True)
+    for heading, width in (('claim', 34), ('paper', 16), ('found', 42)):
+        table.add_column(heading, max_width=width)
+    table.add_column('reproduced')
+    for claim in claims:
+        table.add_row(escape(claim.claim), escape(claim.paper), escape(claim.found),
+                      '[green]yes[/]' if claim.reproduced else '[red]no[/]')
+    return table
+
+
+def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
+    """Return what is in a recording, drive by drive; drives of one kind in one table."""
+    return [_recording_table(summary, kind, [name for name, one in zip(
+        summary.drives, units, strict=True) if one == kind]) for kind in dict.fromkeys(units)]
+
+
+def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(
+        f'{summary.name}: {summary.used} of {summary.samples} samples in {len(summary.segments)} '
+        f'segment{"s" * (len(summary.segments) != 1)}, {summary.duration:.2f} s at '
+        f'{summary.rate:.6g} Hz'), caption=escape(summary.source))
+    position = units.of('m')
+    for heading in ('drive', f'position [{position}]', f'velocity [{position}/s]',
+                    f'effort [{units.effort}]', 'measured'):
+        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
+    for drive in drives:
+        found = summary.drives[drive]
+        table.add_row(escape(drive), _span(found.position), _span(found.velocity),
+                      _span(found.effort), f'{found.measured:.1%}')
+    return table
+
+
+def _span(bounds: tuple[float, float] | None) -> str:
+    return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
+
+
+EFFORTS = ('rms', 'bias', 'peak', 'noise')
+
+
+def comparison_headings(comparison: Comparison) -> tuple[str, ...]:
+    """Return the headings of `comparison_rows`."""
+    unit = comparison.unit
+    return ('drive', *(f'{name} [{unit}]' if name in EFFORTS else name for name in (
+        'rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')))
+
+
+def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
+    """Return one row of text per drive; the page and the terminal show them."""
+    return [(name, f'{drive.rms:.3f}', percent(drive.relative), f'{drive.bias:+.3f}',
+             f'{drive.peak:.3f}', percent(drive.explained_variance), f'{drive.noise_floor:.3f}',
+             f'{drive.effective_samples:.0f} of {drive.samples}')
+            for name, drive in comparison.drives.items()]
+
+
+def comparison_view(comparison: Comparison, command: str, details: bool = False) -> Any:
+    """Return how wrong the model is, where, and what to do next.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    command : str
+        That finds out why.
+    details : bool
+        Everything, instead of at most 25 lines of 80 columns.
+    """
+    from rich.console import Group
+    from rich.markup import escape
+
+    lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
+    taken = accumulate(-(-len(line) // LINE) for line in lines)
+    told = [line for line, total in zip(lines, taken, strict=True)
+            if details or total <= MOST_LINES]
+    parts = [_comparison_table(comparison), escape(comparison.verdict), *map(escape, told)]
+    if not lines:
+        parts.append('Nowhere in particular: nothing stands out against noise.')
+    if len(lines) > len(told):
+        parts.append(f'… and {len(lines) - len(told)} more, with --details, --json or --report')
+    if details:
+        parts += [escape(drive.verdict) for drive in comparison.drives.values()]
+    if comparison.is_beyond_noise:
+        parts += ['[bold]Next[/] Find out which physical effect is missing:',
+                  f'  [bold cyan]{escape(command)}[/]']
+    return Group(*parts)
+
+
+def _comparison_table(comparison: Comparison) -> Any:
+    from rich.markup import escape
+    from rich.table import Table
+
+    colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
+    table = Table(box=None, padding=(0, 1))
+    # One unit for all: names of joints need the room.
+    short = len(comparison.unit) > 1
+    for heading in comparison_headings(comparison)[:7]:
+        if short and not heading.startswith('rms'):
+            heading = heading.partition(' [')[0]
+        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
+    for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
+        table.add_row(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
+    return table

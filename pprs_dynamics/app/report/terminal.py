@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The terminal as rich sees it, in characters that the terminal has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.system.plain_text import PLAIN, displayed
+
+
+def console() -> Any:
+    """Return rich's console, or raise MissingLibraryError."""
+    try:
+        from rich.console import Console
+    except ImportError:
+        raise MissingLibraryError('rich', 'showing tables', 'report') from None
+
+    class PlainConsole(Console):
+        """Puts plain characters in place before widths are counted, so that tables stay even."""
+
+        def render_str(self, text: str, *args: Any, **options: Any) -> Any:
+            plain = text.encode(self.encoding, PLAIN).decode(self.encoding)
+            return super().render_str(plain, *args, **options)
+
+    # A name such as a:bug:.csv is no picture.
+    return PlainConsole(emoji=False)
+
+
+def shown(name: object) -> str:
+    """Return a name, or other text from data, for a line that may hold rich's markup."""
+    from rich.markup import escape
+
+    return escape(displayed(name))

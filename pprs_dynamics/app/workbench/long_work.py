@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What takes seconds to minutes, as functions that another process can find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.inference.adoption.adopt import Adoption, adopt
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.experiments.next_experiment import next_experiment
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+RATE = 100.0  # of the poses of a designed motion [Hz], the default of play_trajectory
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class DesignedMotion:
+    """A motion that was designed, sampled.
+
+    Parameters
+    ----------
+    promise : dict
+        What `pprs next-experiment --json` says of it.
+    motion : PlatformMotion or JointMotion
+    """
+
+    promise: dict[str, Any]
+    motion: PlatformMotion | JointMotion
+
+
+def diagnosed(model: ForceModel, recordings: Sequence[Recording], progress: Progress) -> Diagnosis:
+    """Return a diagnosis without its searches, which are large."""
+    return replace(diagnose(model, recordings, (), progress), selection=None, chosen=None)
+
+
+def judged(model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
+           validation: Sequence[Recording], force: bool, diagnosis: Diagnosis | None,
+           progress: Progress) -> Adoption:
+    """Return the answer of `pprs adopt`."""
+    return adopt(model, request, recordings, validation, force, progress, diagnosis)
+
+
+def designed(model: DriveModel | ArmModel, recordings: Sequence[Recording], duration: float,
+             seed: int, progress: Progress) -> DesignedMotion:
+    """Return the motion of `pprs next-experiment`."""
+    found = next_experiment(model, recordings, duration=duration, seed=seed, progress=progress)
+    count = int(found.duration * RATE + 1e-9) + 1
+    return DesignedMotion(found.to_json(), found.motion(np.arange(count) / RATE))

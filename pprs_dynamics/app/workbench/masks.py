@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parts of the data that somebody points at: a span of time, a region of a scatter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pprs_dynamics.app.workbench.shown import Share, Shown, names_of
+from pprs_dynamics.app.workbench.what_if import WhatIf
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+
+Mask = NDArray[np.bool_]
+"""Samples and drives that are meant, (M, D)."""
+
+EFFORTS = ('measured', 'error before', 'error now')
+MOST_SPANS = 200  # of time, in which samples of a mask lie
+SHORT = 5  # samples between two spans that count as one
+
+
+def span_mask(data: Residuals, start: float, end: float, drives: Sequence[int]) -> Mask:
+    """Return the samples between two times [s] on some drives."""
+    inside = (data.time >= start) & (data.time <= end)
+    return inside[:, None] & _on(data, drives)
+
+
+def region_mask(x: Array, y: Array, x_range: tuple[float, float], y_range: tuple[float, float],
+                data: Residuals, drive: int) -> Mask:
+    """Return the samples of a drive whose two quantities (M,) lie in ranges."""
+    inside = ((x >= min(x_range)) & (x <= max(x_range)) & (y >= min(y_range))
+              & (y <= max(y_range)))
+    return inside[:, None] & _on(data, [drive])
+
+
+def spans_of(data: Residuals, mask: Mask) -> list[tuple[float, float]]:
+    """Return the times [s] in which a mask's samples lie, the longest first."""
+    at = np.flatnonzero(mask.any(axis=1))
+    if not len(at):
+        return []
+    cuts = np.flatnonzero(np.diff(at) > SHORT) + 1
+    parts = [part for part in np.split(at, cuts) if len(part)]
+    parts.sort(key=len, reverse=True)
+    return [(float(data.time[part[0]]), float(data.time[part[-1]])) for part in parts[:MOST_SPANS]]
+
+
+def quantity(what_if: WhatIf, shown: Shown, name: str, drive: int) -> Array:
+    """Return anything that may be drawn over anything, as a drive sees it, (M,).
+
+    Raises
+    ------
+    ResidualsError
+        For a name that stands for nothing.
+    """
+    data = what_if.design.residuals
+    table = {'measured': what_if.measured, 'error before': what_if.before,
+             'error now': shown.residual}
+    found = table[name][:, drive] if name in table else data.variable(name, drive)
+    if found is None:
+        raise ResidualsError('variable', f'{name!r} is not known',
+                             f'be one of {", ".join(quantities(data))}')
+    return found
+
+
+def quantities(data: Residuals) -> list[str]:
+    """Return the names of what may be drawn."""
+    return ['time', *(name for name in data.variables), *EFFORTS]
+
+
+def shares_in(mask: Mask, what_if: WhatIf, shown: Shown) -> list[Share]:
+    """Return what every unticked effect explains of the squared error in a mask, the best first.
+
+    Raises
+    ------
+    ResidualsError
+        For a mask of another shape.
+    """
+    if mask.shape != what_if.measured.shape:
+        raise ResidualsError('mask', f'its shape is {mask.shape}',
+                             f'be {what_if.measured.shape}, samples by drives')
+    chosen = mask & np.isfinite(what_if.measured)
+    left = float(np.sum(what_if.residual(shown.free)[chosen] ** 2))
+    shares = []
+    for offer in shown.offers:
+        after = float(np.sum(offer.residual[chosen] ** 2, dtype=float))
+        explained = 1 - after / left if left > 0 else 0.0
+        paid = max(offer.evidence, 0.0) / offer.gain if offer.gain > 0 else 0.0
+        shares.append(Share(offer.candidate.name, names_of(offer.candidate, what_if.drives),
+                            explained, explained * paid))
+    return sorted(shares, key=lambda one: (-one.net, -one.explained))
+
+
+def _on(data: Residuals, drives: Sequence[int]) -> Mask:
+    on = np.zeros(len(data.drives), dtype=bool)
+    on[list(drives)] = True
+    return on[None, :]

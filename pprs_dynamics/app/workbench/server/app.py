@@ -1,0 +1,335 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Addresses of the workbench and what each answers: one call of the session, and its result."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from pprs_dynamics.app.workbench.errors import SessionError, StaleError
+from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
+from pprs_dynamics.app.workbench.robot_motion import robot_motion
+from pprs_dynamics.app.workbench.server.bodies import (
+    BadRequestError,
+    number_of,
+    range_of,
+    revision_of,
+    text_of,
+)
+from pprs_dynamics.app.workbench.server.guard import Guard, Keys, TooLongError
+from pprs_dynamics.app.workbench.server.hub import Hub
+from pprs_dynamics.app.workbench.server.packing import attached, binary
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.files.motion_files import write_motion
+
+UPLOAD = '/api/upload'
+MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
+MOST_POINTS = 20_000  # of a scatter
+HEARTBEAT = 15.0  # [s] between signs of life
+STATIC = {'workbench.js': 'text/javascript', 'curves.js': 'text/javascript',
+          'robot.js': 'text/javascript', 'scatter.js': 'text/javascript',
+          'workbench.css': 'text/css'}
+VENDORED = {'uplot.js': ('uplot.iife.min.js.gz', 'text/javascript'),
+            'uplot.css': ('uplot.min.css', 'text/css')}
+
+
+def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -> Any:
+    """Return the application, guarded."""
+    @asynccontextmanager
+    async def lifespan(app: Any) -> AsyncIterator[None]:
+        hub.start(asyncio.get_running_loop())
+        yield
+        await run_in_threadpool(hub.stop)
+
+    api = Api(hub, keys)
+    post = {'tick': api.tick, 'choose': api.choose, 'release': api.release, 'shares': api.shares,
+            'adopt': api.adopt, 'cancel': api.cancel, 'undo': api.undo, 'open': api.open,
+            'experiment': api.experiment, 'invite': api.invite, 'live/set': api.live_set,
+            'live/take': api.live_take}
+    get = {'screen': api.screen, 'curves': api.curves, 'scatter': api.scatter,
+           'robot': api.robot, 'files': api.files, 'live': api.live, 'model.yaml': api.model,
+           'ledger.json': api.ledger, 'experiment.csv': api.experiment_file}
+    routes = [Route('/', page), Route('/static/{name}', asset), Route('/api/events', api.events),
+              Route(UPLOAD, api.upload, methods=['POST']),
+              *(Route(f'/api/{name}', in_thread(work)) for name, work in get.items()),
+              *(Route(f'/api/{name}', with_body(work), methods=['POST'])
+                for name, work in post.items())]
+    app = Starlette(routes=routes, lifespan=lifespan, exception_handlers={
+        StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413)})
+    return Guard(app, keys, {UPLOAD: MOST_UPLOADED}, used)
+
+
+def _status(status: int) -> Callable[[Request, Exception], Response]:
+    def answer(request: Request, error: Exception) -> Response:
+        return JSONResponse({'error': str(error) or 'the body is too long'}, status)
+    return answer
+
+
+def in_thread(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[Response]]:
+    """Return an endpoint that works beside the loop."""
+    async def endpoint(request: Request) -> Response:
+        return await run_in_threadpool(work, request.query_params)
+    return endpoint
+
+
+def with_body(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[Response]]:
+    """Return an endpoint that takes a JSON object."""
+    async def endpoint(request: Request) -> Response:
+        if request.headers.get('content-type') != 'application/json':
+            raise BadRequestError('the body must be application/json')
+        try:
+            body = json.loads(await request.body())
+        except (ValueError, RecursionError):
+            raise BadRequestError('the body is no JSON') from None
+        if not isinstance(body, dict):
+            raise BadRequestError('the body must be an object')
+        return await run_in_threadpool(work, body)
+    return endpoint
+
+
+async def page(request: Request) -> Response:
+    """Answer the page."""
+    return Response(_file('workbench.html'), media_type='text/html')
+
+
+async def asset(request: Request) -> Response:
+    """Answer a file of the page; only those that are listed are files."""
+    name = request.path_params['name']
+    if name in STATIC:
+        return Response(_file(name), media_type=STATIC[name])
+    if name in VENDORED:
+        return Response(_vendored(VENDORED[name][0]), media_type=VENDORED[name][1])
+    raise HTTPException(404)
+
+
+def _file(name: str) -> bytes:
+    return (files('pprs_dynamics.app.workbench.server') / 'static' / name).read_bytes()
+
+
+@cache
+def _vendored(name: str) -> bytes:
+    content = (files('pprs_dynamics.app.report') / name).read_bytes()
+    return gzip.decompress(content) if name.endswith('.gz') else content
+
+
+class Api:
+    """What the page asks for.
+
+    Parameters
+    ----------
+    hub : Hub
+    keys : Keys
+    """
+
+    def __init__(self, hub: Hub, keys: Keys) -> None:
+        self.hub, self.keys = hub, keys
+
+    def screen(self, query: Any) -> Response:
+        """Answer all that one screen shows, and the errors now."""
+        hub = self.hub
+        common = {'count': hub.count, 'generation': hub.generation, 'failure': hub.failure,
+                  'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
+                  'has_folders': bool(hub.folders.roots or hub.surveys.recordings)}
+        session = hub.session
+        if session is None:
+            return binary({**common, 'is_empty': True}, {})
+        with session.steady():
+            return binary({**common, **session.to_json()}, {'now': session.now.T})
+
+    def curves(self, query: Any) -> Response:
+        """Answer times and the error before."""
+        session = self.hub.the_session
+        with session.steady():
+            data = session.data
+            # Times of a long recording have more digits than float32: seconds and the rest.
+            whole = np.floor(data.time)
+            return binary(
+                {'generation': self.hub.generation, 'drives': list(session.drives),
+                 'quantities': quantities(data)},
+                {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
+                 'before': session.before.T, 'measured': data.measured.T})
+
+    def tick(self, body: Any) -> Response:
+        """Tick or untick an effect."""
+        effect, revision = text_of(body, 'effect'), revision_of(body)
+        if body.get('is_ticked', True):
+            drives = body.get('drives')
+            if drives is not None and not (isinstance(drives, list) and drives and all(
+                    isinstance(name, str) for name in drives)):
+                raise BadRequestError('drives must be a list of names')
+            self.hub.the_session.tick(effect, drives, revision)
+        else:
+            self.hub.the_session.untick(effect, revision)
+        return self.screen(body)
+
+    def choose(self, body: Any) -> Response:
+        """Set a parameter."""
+        self.hub.the_session.choose(text_of(body, 'effect'), text_of(body, 'key'),
+                                    number_of(body, 'value'), revision_of(body))
+        return self.screen(body)
+
+    def release(self, body: Any) -> Response:
+        """Let the fit decide again."""
+        self.hub.the_session.release(text_of(body, 'effect'), revision_of(body))
+        return self.screen(body)
+
+    def shares(self, body: Any) -> Response:
+        """Say what unticked effects explain in a brush, and when that was."""
+        session = self.hub.the_session
+        if 'x' in body:
+            mask = session.region(text_of(body, 'x'), text_of(body, 'y'), range_of(body, 'x_range'),
+                                  range_of(body, 'y_range'), text_of(body, 'drive'))
+        else:
+            drive = body.get('drive')
+            mask = session.span(*range_of(body, 'time'), None if drive is None else [str(drive)])
+        return JSONResponse({'shares': [one.to_json() for one in session.shares(mask)],
+                             'spans': spans_of(session.data, mask),
+                             'samples': int(mask.sum()), 'revision': session.revision})
+
+    def adopt(self, body: Any) -> Response:
+        """Begin the held-out check."""
+        self.hub.the_session.adopt(text_of(body, 'effect'), revision=revision_of(body))
+        return self.screen(body)
+
+    def cancel(self, body: Any) -> Response:
+        """Call work off."""
+        self.hub.the_session.cancel(text_of(body, 'kind'))
+        return self.screen(body)
+
+    def undo(self, body: Any) -> Response:
+        """Take the last step back."""
+        self.hub.the_session.undo(revision_of(body))
+        return self.screen(body)
+
+    def experiment(self, body: Any) -> Response:
+        """Begin to design the next experiment."""
+        self.hub.the_session.next_experiment(number_of(body, 'duration'))
+        return self.screen(body)
+
+    def experiment_file(self, query: Any) -> Response:
+        """Answer the poses, or the joints' positions, of the designed motion."""
+        session = self.hub.the_session
+        found = session.experiment
+        if found is None:
+            raise SessionError('no experiment is designed yet')
+        return self._download('next.csv', 'text/csv', lambda path: write_motion(
+            path, session.drives, found.motion))
+
+    def model(self, query: Any) -> Response:
+        """Answer the model file, with what is ticked where that is asked for."""
+        session, with_ticked = self.hub.the_session, query.get('ticked') == '1'
+        return self._download('ticked.yaml' if with_ticked else 'model.yaml', 'application/yaml',
+                              lambda path: session.export(path, with_ticked))
+
+    def ledger(self, query: Any) -> Response:
+        """Answer the ledger alone."""
+        steps = [step.to_json() for step in self.hub.the_session.steps]
+        return attached('ledger.json', 'application/json',
+                         json.dumps({'steps': steps}, indent=2).encode())
+
+    @staticmethod
+    def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
+        with TemporaryDirectory(prefix='pprs_workbench_') as folder:
+            write(Path(folder) / name)
+            return attached(name, kind, (Path(folder) / name).read_bytes())
+
+    def scatter(self, query: Any) -> Response:
+        """Answer two quantities of a drive."""
+        session = self.hub.the_session
+        if query.get('drive') not in session.drives:
+            raise BadRequestError(f'drive must be one of {", ".join(session.drives)}')
+        d = session.drives.index(query['drive'])
+        with session.steady():
+            x, y = (quantity(session.what_if, session.shown, query.get(axis, ''), d)
+                    for axis in ('x', 'y'))
+        step = max(1, -(-len(x) // MOST_POINTS))
+        return binary({}, {'x': x[::step], 'y': y[::step]})
+
+    def robot(self, query: Any) -> Response:
+        """Answer the robot's joints along the recordings, and the errors there."""
+        found = robot_motion(self.hub.the_session)
+        return binary({'angles': found.angles}, {
+            'time': found.time, 'joints': found.joints, 'before': found.before,
+            'now': found.now})
+
+    def files(self, query: Any) -> Response:
+        """Answer what may be opened."""
+        return JSONResponse({'files': self.hub.folders.listed(),
+                             'surveyed': self.hub.surveys.listed()})
+
+    def open(self, body: Any) -> Response:
+        """Open a recording of the folders and surveys that were given."""
+        self.hub.open([str(self.hub.offered(text_of(body, 'name')))],
+                      body.get('is_held_out') is True)
+        return self.screen(body)
+
+    async def upload(self, request: Request) -> Response:
+        """Take a recording from the browser."""
+        path = self.hub.save_upload(request.query_params.get('name', ''))
+        try:
+            with path.open('xb') as file:
+                async for part in request.stream():
+                    await run_in_threadpool(file.write, part)
+            held_out = request.query_params.get('held_out') == '1'
+            await run_in_threadpool(self.hub.open, [str(path)], held_out)
+        except (PprsError, TooLongError, ClientDisconnect, OSError):
+            path.unlink(missing_ok=True)
+            raise
+        return await run_in_threadpool(self.screen, None)
+
+    def invite(self, body: Any) -> Response:
+        """Answer an address for one more browser."""
+        return JSONResponse({'address': self.keys.address})
+
+    def live(self, query: Any) -> Response:
+        """Answer how live data stand."""
+        return JSONResponse(self._live.to_json())
+
+    def live_set(self, body: Any) -> Response:
+        """Set the model with the ticked effects on the running nodes."""
+        return JSONResponse({'nodes': self._live.set_model(self.hub.the_session.ticked_model())})
+
+    def live_take(self, body: Any) -> Response:
+        """Make what came in last a recording of the session."""
+        path = self.hub.save_upload('live.csv')
+        self._live.take(path)
+        self.hub.open([str(path)])
+        return self.screen(body)
+
+    @property
+    def _live(self) -> Any:
+        if self.hub.live is None:
+            raise SessionError('no live data: pprs workbench was started without --live')
+        return self.hub.live
+
+    async def events(self, request: Request) -> Response:
+        """Tell the page, whenever something changed, how often so far."""
+        async def lines() -> AsyncIterator[bytes]:
+            queue = self.hub.listen()
+            try:
+                yield b'data: 0\n\n'
+                while True:
+                    with suppress(TimeoutError):
+                        await asyncio.wait_for(queue.get(), HEARTBEAT)
+                    yield b'data: %d\n\n' % self.hub.count
+            finally:
+                self.hub.leave(queue)
+        return StreamingResponse(lines(), media_type='text/event-stream')

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings in the folders that were given on the command line, and in nothing beside them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.plain_text import displayed
+
+ENDINGS = ('.csv', '.mcap', '.db3')
+METADATA = 'metadata.yaml'  # makes a folder a rosbag2 recording
+MOST_LISTED, DEEPEST = 2000, 6
+
+
+class NotOfferedError(PprsError, ValueError):
+    """A recording that is not in a folder of the command line."""
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Folders in which the browser may choose.
+
+    Parameters
+    ----------
+    roots : tuple of Path
+    """
+
+    roots: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, paths: Sequence[str]) -> Folders:
+        """Return those of the paths that are folders and no recordings themselves."""
+        return cls(tuple(Path(path) for path in paths if is_folder(path)))
+
+    def listed(self) -> list[str]:
+        """Return what may be opened, each as `number/path within its folder`."""
+        found: list[str] = []
+        for number, root in enumerate(self.roots):
+            for place, folders, files in os.walk(root):
+                inside = Path(place).relative_to(root)
+                if METADATA in files:
+                    found.append(f'{number}/{inside.as_posix()}')
+                    folders.clear()
+                    continue
+                found += [f'{number}/{(inside / name).as_posix()}' for name in sorted(files)
+                          if name.lower().endswith(ENDINGS)]
+                folders[:] = sorted(name for name in folders if not name.startswith('.'))
+                if len(inside.parts) >= DEEPEST:
+                    folders.clear()
+                if len(found) >= MOST_LISTED:
+                    return found[:MOST_LISTED]
+        return found
+
+    def path(self, name: str) -> Path:
+        """Return the path of a name from `listed`.
+
+        Raises
+        ------
+        NotOfferedError
+            For any other, by whatever way it leads outside: `..`, an absolute path, a link.
+        """
+        number, _, inside = name.partition('/')
+        if number.isascii() and number.isdecimal() and int(number) < len(self.roots) and inside:
+            root = self.roots[int(number)].resolve()
+            path = (root / inside).resolve() if '\0' not in inside else root
+            if path != root and path.is_relative_to(root) and path.exists():
+                return path
+        raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the folders '
+                              'that were given')
+
+
+def is_folder(path: str) -> bool:
+    """Return whether a path is a folder that holds recordings, and none itself."""
+    return Path(path).is_dir() and not (Path(path) / METADATA).exists() and not any(
+        Path(path).glob('*.db3'))

@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What all browsers of a workbench share: the session, and what goes on behind it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event, Lock, Thread
+from typing import Any, Protocol
+
+from pprs_dynamics.app.workbench.errors import SessionError
+from pprs_dynamics.app.workbench.server.folders import ENDINGS, Folders
+from pprs_dynamics.app.workbench.server.surveys import PREFIX, Surveys
+from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+MOST_UPLOADS, LONGEST_NAME = 20, 80
+NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
+BREATH = 0.02  # [s] that the answer to a tick has to go out, before more is computed
+LAST_WORDS = 2.0  # [s] that work in the background gets to end
+IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
+
+
+class LiveSource(Protocol):
+    """Joint states as they come in."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return state and running errors."""
+
+    def take(self, path: Path) -> None:
+        """Write what the ring buffer holds as a recording."""
+
+    def set_model(self, model: ForceModel) -> dict[str, str]:
+        """Set a model on the running nodes; return what each said, '' where it took it."""
+
+    def close(self) -> None:
+        """End it."""
+
+
+class Hub:
+    """The session, its worker, and those who listen.
+
+    Parameters
+    ----------
+    begin : callable
+        Makes the session, or returns None where no recording was given; may take seconds.
+    model : str
+        The model file, for recordings that are opened later.
+    folders : Folders
+        In which browsers may choose recordings.
+    surveys : Surveys
+        In which it may choose, too.
+    live : LiveSource, optional
+    """
+
+    def __init__(self, begin: Callable[[], Session | None], model: str, folders: Folders,
+                 surveys: Surveys, live: LiveSource | None = None) -> None:
+        self.model, self.folders, self.surveys, self.live = model, folders, surveys, live
+        self.session: Session | None = None
+        self.failure = ''
+        self.is_beginning = True
+        self.generation = self.count = 0
+        self._begin, self._is_unjudged = begin, False
+        self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
+        self._count, self._lock, self._opening = 0, Lock(), Lock()
+        self._work = Event()
+        self._ends = False
+        self._waiting: set[asyncio.Queue[None]] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._what_if: object = None
+        self._diagnosed: object = None  # once for each model, also where it fails
+        self._worker = Thread(target=self._run, name='workbench', daemon=True)
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to work; changes are told in this loop."""
+        self._loop = loop
+        self._worker.start()
+
+    def stop(self) -> None:
+        """Call all work off."""
+        self._ends = True
+        self._work.set()
+        if self.session is not None:
+            for job in self.session.jobs.values():
+                job.cancel()
+                with suppress(Exception):  # whatever it ended with
+                    job.result(LAST_WORDS)
+        if self.live is not None:
+            self.live.close()
+        self._worker.join(10)
+        self._uploads.cleanup()
+
+    # Those who listen
+
+    def listen(self) -> asyncio.Queue[None]:
+        """Return a queue that gets an entry after changes; to be called in the loop."""
+        queue: asyncio.Queue[None] = asyncio.Queue(1)
+        self._waiting.add(queue)
+        return queue
+
+    def leave(self, queue: asyncio.Queue[None]) -> None:
+        """Listen no more."""
+        self._waiting.discard(queue)
+
+    def tell(self) -> None:
+        """Tell all browsers that something changed."""
+        self.count += 1
+        if self._loop is not None and not self._loop.is_closed():
+            with suppress(RuntimeError):  # it closes just now
+                self._loop.call_soon_threadsafe(self._put)
+
+    def _put(self) -> None:
+        for queue in self._waiting:
+            if not queue.full():
+                queue.put_nowait(None)
+
+    # The session
+
+    @property
+    def the_session(self) -> Session:
+        """The session, or a SessionError where there is none yet."""
+        if self.session is None:
+            raise SessionError('no recording is open, must be one')
+        return self.session
+
+    def open(self, paths: Sequence[str], is_held_out: bool = False) -> None:
+        """Add recordings to the session, or begin one with them.
+
+        Raises
+        ------
+        PprsError
+            As `Session.open` and `Session.add`.
+        """
+        with self._opening:
+            if self.session is None:
+                self._use(Session.open(paths, self.model))
+            else:
+                for path in paths:
+                    self.session.add(path, is_held_out)
+        self._changed()
+
+    def offered(self, name: str) -> Path:
+        """Return the path of a recording that is offered to browsers, by its name there.
+
+        Raises
+        ------
+        NotOfferedError
+            For any other.
+        """
+        chosen = self.surveys if name.startswith(f'{PREFIX}/') else self.folders
+        return chosen.path(name)
+
+    def save_upload(self, name: str) -> Path:
+        """Return the path for an upload, in a folder of its own, with what is plain of its name.
+
+        Raises
+        ------
+        SessionError
+            For an ending that no reader has, or after too many uploads.
+        """
+        ending = next((one for one in ENDINGS if name.lower().endswith(one)), None)
+        if ending is None:
+            raise SessionError(f'a recording must end in {", ".join(ENDINGS)}')
+        with self._lock:
+            if self._count >= MOST_UPLOADS:
+                raise SessionError(f'{MOST_UPLOADS} recordings were uploaded already, must be no '
+                                   'more')
+            self._count += 1
+            folder = Path(self._uploads.name) / str(self._count)
+        folder.mkdir()
+        stem = NOT_PLAIN.sub('_', name.replace('\\', '/').rpartition('/')[2][:-len(ending)])
+        return folder / f'{stem.strip(".")[:LONGEST_NAME] or "recording"}{ending}'
+
+    def _use(self, session: Session) -> None:
+        self.session, self.failure = session, ''
+        session.subscribe(self._changed)
+
+    def _changed(self) -> None:
+        what_if = self.session.what_if if self.session is not None else None
+        if what_if is not self._what_if:
+            # Times and the error before are others: browsers fetch them again.
+            self._what_if = what_if
+            self.generation += 1
+        self._work.set()
+        self.tell()
+
+    def _run(self) -> None:
+        """Settle after every change; look for what is missing once nothing happens."""
+        try:
+            session = self._begin()
+            self._is_unjudged = session is not None
+            if session is not None:
+                self._use(session)
+        except Exception as error:
+            self._fail(error)
+        self.is_beginning = False
+        self._changed()
+        while not self._ends:
+            if not self._work.wait(IDLE):
+                self._find_mistakes()
+                self._diagnose()
+                self._work.wait()
+            self._work.clear()
+            time.sleep(BREATH)
+            session = self.session
+            if session is None or self._ends:
+                continue
+            if not session.shown.is_settled:
+                try:
+                    session.settle()
+                    self.failure = ''
+                except Exception as error:
+                    self._fail(error)
+                    self.tell()
+
+    def _find_mistakes(self) -> None:
+        """Look at units and signs of what the command line gave, once the page stands."""
+        if self.session is not None and self._is_unjudged:
+            self._is_unjudged = False
+            try:
+                self.session.find_mistakes()
+            except PprsError as error:
+                self.failure = str(error)
+                self.tell()
+
+    def _fail(self, error: Exception) -> None:
+        """Say on the page what went wrong; a defect of ours stands in the terminal as well."""
+        self.failure = str(error)
+        if not isinstance(error, PprsError):
+            self.failure = f'{type(error).__name__}: {error}'
+            logging.getLogger(__name__).exception('the workbench goes on')
+
+    def _diagnose(self) -> None:
+        session = self.session
+        if session is not None and session.what_if is not self._diagnosed and not any(
+                job.is_running for job in session.jobs.values()):
+            self._diagnosed = session.what_if
+            session.diagnose()

@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a session shows at one moment: all of it belongs to one set of ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.app.workbench.what_if import Exact, Offer, Tick, WhatIf
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.mechanism.units import DriveUnits, common_effort
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+# How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
+# cost is lowest; and the fitted model evaluated.
+LINEAR, FITTED, REFINED, EXACT = 'linear', 'fitted', 'refined', 'exact'
+NOT_KNOWN = float('nan')
+
+
+@dataclass(frozen=True)
+class DriveError:
+    """Root of the mean squared error of a drive, or of all [N]; NaN where it is not known."""
+
+    before: float
+    now: float
+    noise: float
+
+    def to_json(self) -> dict[str, float | None]:
+        """Return it for JSON."""
+        return {'before': finite(self.before), 'now': finite(self.now),
+                'noise': finite(self.noise)}
+
+
+@dataclass(frozen=True)
+class Share:
+    """What an unticked effect explains of the squared error in a mask.
+
+    Parameters
+    ----------
+    effect : str
+    drives : tuple of str or None
+        On which it would sit.
+    explained : float
+        Of the squared error there, that would go.
+    net : float
+        The same less the price of its freedom: what it explains of the whole recording counts
+        only in as far as it pays. 0 where it does not pay at all.
+    """
+
+    effect: str
+    drives: tuple[str, ...] | None
+    explained: float
+    net: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'effect': self.effect, 'drives': self.drives and list(self.drives),
+                'explained': self.explained, 'net': self.net}
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A moment.
+
+    Parameters
+    ----------
+    revision : int
+        Of the ticks.
+    ticks : mapping of str to Tick
+    free, found : CandidateSet
+        The best fit of the ticked effects; and with what somebody chose, at the same noise.
+    residual : (M, D) array
+        What is left [N].
+    estimates : mapping of str to mapping of str to Estimate
+        By effect, of the values that are shown; NaN where the deviation is not known yet.
+    stage : {'linear', 'fitted', 'refined', 'exact'}
+    evidence : mapping of str to float
+        Of the ticked effects: by how much the cost rises without each.
+    offers : sequence of Offer
+        The unticked effects, the best first; of the set before until `has_offers`.
+    has_offers : bool
+    exact : Exact, optional
+    notice : str
+        Why there is no exact model, where there is none.
+    """
+
+    revision: int
+    ticks: Mapping[str, Tick]
+    free: CandidateSet
+    found: CandidateSet
+    residual: Array = field(repr=False)
+    estimates: Mapping[str, Mapping[str, Estimate]]
+    stage: str = LINEAR
+    evidence: Mapping[str, float] = field(default_factory=dict)
+    offers: Sequence[Offer] = ()
+    has_offers: bool = False
+    exact: Exact | None = None
+    notice: str = ''
+
+    @property
+    def is_free(self) -> bool:
+        """True where nothing was chosen by hand."""
+        return not any(tick.chosen for tick in self.ticks.values())
+
+    @property
+    def is_settled(self) -> bool:
+        """True where nothing more would follow from these ticks."""
+        return self.has_offers and (self.stage == EXACT or not self.ticks)
+
+    @property
+    def departure(self) -> float:
+        """By how much the cost is above that of the best values."""
+        return max(self.found.total - self.free.total, 0.0)
+
+    @property
+    def is_approximate(self) -> bool:
+        """True where an effect bends the columns of others and nothing exact is known yet."""
+        return self.stage != EXACT and any(
+            tick.effect.bends_columns for tick in self.ticks.values())
+
+
+def effect_to_json(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
+                   is_called_for: bool) -> dict[str, Any]:
+    """Return all that is shown of one effect."""
+    card, drives = effect.card_in(model.kind), model.drives
+    tick = shown.ticks.get(effect.name)
+    offer = next((one for one in shown.offers if one.candidate.effect is effect), None)
+    candidate = tick.best if tick else offer.candidate if offer else None
+    evidence = shown.evidence.get(effect.name) if tick else offer.evidence if offer else None
+    return {
+        'name': effect.name, 'is_ticked': tick is not None,
+        'drives': None if candidate is None else names_of(candidate, drives),
+        'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
+        'evidence_is_pending': (shown.stage == LINEAR if tick else not shown.has_offers),
+        'bends_columns': effect.bends_columns, 'is_called_for': is_called_for,
+        'equation': card.equation, 'looks_like': card.looks_like,
+        'causes': card.causes, 'confirm': card.confirm,
+        'parameters': _parameters(shown, effect, model) if tick else []}
+
+
+def units_to_json(model: ForceModel) -> dict[str, Any]:
+    """Return the units of all drives together, and drive by drive."""
+    return {'unit': common_effort(model.units), 'units': {
+        drive: {'effort': unit.effort, 'position': unit.position, 'velocity': unit.of('m/s'),
+                'acceleration': unit.of('m/s^2').replace('^2', '²')}
+        for drive, unit in zip(model.drives, model.units, strict=True)}}
+
+
+def _parameters(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
+                ) -> list[dict[str, Any]]:
+    drives = model.drives
+    units = dict(zip(drives, model.units, strict=True))
+    tick = shown.ticks[effect.name]
+    chosen = {name if d is None else f'{drives[d]}.{name}' for d, name in tick.chosen}
+    known = {parameter.name: parameter for parameter in effect.parameters}
+    shapes = {parameter.name for parameter in effect.shape}
+    rows = []
+    for key, one in shown.estimates.get(effect.name, {}).items():
+        parameter = known[key.rpartition('.')[2]]
+        rows.append({
+            'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
+            'std': finite(one.std), 'description': parameter.description,
+            'unit': units.get(key.partition('.')[0], DriveUnits()).of(parameter.unit),
+            'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
+            'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
+            'is_chosen': key in chosen})
+    return rows
+
+
+def recordings_to_json(recordings: Sequence[Recording], what_if: WhatIf, now: Array,
+                       ) -> list[dict[str, Any]]:
+    """Return every recording with its times and its error before and now."""
+    found, first = [], 0
+    time = what_if.design.residuals.time
+    for recording, one in zip(recordings, what_if.design.reconstructions, strict=True):
+        part = slice(first, first + len(one.treat.starts))
+        first = part.stop
+        found.append({
+            'name': recording.name, 'start': float(time[part][0]), 'end': float(time[part][-1]),
+            'before': finite(rms(what_if.before[part])), 'now': finite(rms(now[part])),
+            'findings': [finding.text for finding in recording.findings]})
+    return found
+
+
+def names_of(candidate: EffectCandidate, drives: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Return the names of the drives that a candidate sits on; None for the structure."""
+    on = candidate.drives
+    return None if on is None else tuple(drives[d] for d in on)
+
+
+def errors_of(before: Array, now: Array, noise: Mapping[str, float], drives: tuple[str, ...],
+              ) -> dict[str, DriveError]:
+    """Return the errors of the drives that were measured."""
+    return {name: DriveError(rms(before[:, d]), rms(now[:, d]), noise.get(name, NOT_KNOWN))
+            for d, name in enumerate(drives) if np.isfinite(before[:, d]).any()}
+
+
+def rms(values: Array) -> float:
+    """Return the root of the mean square of what is known."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known ** 2))) if known.size else NOT_KNOWN
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number that JSON has, or None."""
+    return float(value) if value is not None and np.isfinite(value) else None

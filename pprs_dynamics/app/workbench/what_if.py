@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Sets of effects around one model: fitted at the noise as it is, and with their own noise.
+
+At given noise a fit is linear and takes milliseconds, as all products of columns are summed up
+before. Noise, shapes and the exact forces of the fitted model follow after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.estimates import Estimate, estimate
+from pprs_dynamics.inference.search.expansion import (
+    exact_forces,
+    expanded,
+    fitted_model,
+    linear_residual,
+)
+from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+Place = tuple[int | None, str]
+"""Drive, None in the structure, and name of a parameter."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """An effect that takes part.
+
+    Parameters
+    ----------
+    best : EffectCandidate
+        As the fit would have it.
+    chosen : mapping of Place to float
+        Parameters that somebody set to values of their own.
+    """
+
+    best: EffectCandidate
+    chosen: Mapping[Place, float] = field(default_factory=dict)
+
+    @property
+    def effect(self) -> type[CatalogueEffect]:
+        """What it is a tick of."""
+        return self.best.effect
+
+
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """An effect that takes no part, where it would pay best beside those that do.
+
+    Parameters
+    ----------
+    candidate : EffectCandidate
+    gain, price : float
+        By which the penalised deviance would fall at the noise as it is, and what it costs.
+    residual : (M, D) array
+        What would be left [N].
+    """
+
+    candidate: EffectCandidate
+    gain: float
+    price: float
+    residual: Array = field(repr=False)
+
+    @property
+    def evidence(self) -> float:
+        """Gain less price."""
+        return self.gain - self.price
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """A fitted model, evaluated.
+
+    Parameters
+    ----------
+    model : ForceModel
+    residual : (M, D) array
+        Measured minus model [N].
+    parameters : dict of str to dict of str to Estimate, optional
+        By effect, where they were found around the fitted model.
+    """
+
+    model: ForceModel
+    residual: Array = field(repr=False)
+    parameters: dict[str, dict[str, Estimate]] | None = None
+
+
+class WhatIf:
+    """Everything that ticks are answered from, for one model.
+
+    Parameters
+    ----------
+    model : ForceModel
+        As it is; its numbers count from where its ledger says they began.
+    recordings : sequence of Recording
+    decisions : Decisions, optional
+
+    Attributes
+    ----------
+    before : (M, D) array
+        What the model as it is leaves [N].
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals` and `Regression`.
+    """
+
+    def __init__(self, model: ForceModel, recordings: Sequence[Recording],
+                 decisions: Decisions = DECISIONS) -> None:
+        self.model, self.recordings, self.decisions = model, tuple(recordings), decisions
+        start = original(model)
+        self.design = Design.of(start, recordings)
+        self.search = Search(self.design, decisions, with_unknown=False)
+        self.none = self.search.evaluate(())
+        self.measured = self.design.residuals.measured
+        self.before = (self.design.residuals if start is model
+                       else measure_residuals(model, recordings)[0]).error
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names."""
+        return self.design.drives
+
+    # Candidates
+
+    def offered(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
+                found: CandidateSet) -> EffectCandidate | None:
+        """Return an effect on some drives, or where it pays best beside a set.
+
+        In the best shape that a scan knows at the noise of the set; None where it cannot act.
+        """
+        if drives is None or not issubclass(effect, DriveEffect):
+            made = [sets[-1] for sets in self._proposals(found)]
+            return next((c for c in made if isinstance(c, EffectCandidate)
+                         and c.effect is effect), None)
+        placements = []
+        for d in drives:
+            one = self._on_drive(effect, d, found)
+            if one is None:
+                return None
+            placements.append(one)
+        return self.search.library.candidate(effect, placements) if placements else None
+
+    def _on_drive(self, effect: type[DriveEffect], d: int, found: CandidateSet,
+                  ) -> Placement | None:
+        library = self.search.library
+        if d in library.local:
+            scanned = library.local[d].offers(found.fit).get(effect.name)
+            if scanned is not None:
+                return library.full(scanned)
+        there = [one for one in library.spanning if one.term.effect is effect and one.drive == d]
+        return max(there, key=lambda one: self.search.regression.gain(found.fit, one.block)
+                   - one.price, default=None)
+
+    def _proposals(self, found: CandidateSet) -> Iterable[tuple[object, ...]]:
+        return self.search.proposals(found, least=-np.inf)
+
+    def offers(self, found: CandidateSet) -> list[Offer]:
+        """Return what every effect that is not in a set would gain beside it, the best first."""
+        there = {c.effect for c in found.effects}
+        # A fit that was ended before it stood still has the deviance of the noise before.
+        found = self.at(found.effects, found)
+        offers = []
+        for proposed in self._proposals(found):
+            candidate = proposed[-1]
+            assert isinstance(candidate, EffectCandidate)
+            if candidate.effect not in there:
+                offers.append(self.offer(found, candidate))
+        return sorted(offers, key=lambda one: -one.evidence)
+
+    def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
+        """Return what one candidate would gain beside a set at its noise."""
+        more = self.at((*found.effects, candidate), found)
+        gain = found.fit.deviance - more.fit.deviance
+        evidence = found.total - more.total
+        return Offer(candidate, gain, gain - evidence, self.residual(more).astype(np.float32))
+
+    def with_chosen(self, tick: Tick) -> EffectCandidate:
+        """Return a tick's candidate in the shapes that somebody chose."""
+        library = self.search.library
+        placements = []
+        for one in tick.best.placements:
+            shape = {name: tick.chosen.get((one.drive, name), value)
+                     for name, value in one.term.shape.items()}
+            placements.append(one if shape == dict(one.term.shape) else library.placed(
+                tick.effect, one.drive, shape, one.names))
+        return library.candidate(tick.effect, placements)
+
+    # Fits
+
+    def at(self, candidates: Sequence[EffectCandidate], near: CandidateSet) -> CandidateSet:
+        """Return a set under the noise of another: linear, in milliseconds."""
+        kept = {placement for candidate in candidates for placement in candidate.placements}
+        doubtful = {one: blocks for one, blocks in near.doubtful.items() if one in kept}
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        fit = self.search.regression.at([*blocks, *chain(*doubtful.values())],
+                                        near.fit.amplitudes)
+        listed = tuple(candidates)
+        return CandidateSet(listed, fit, fit.deviance + self.search.price(listed, fit), doubtful)
+
+    def fitted(self, candidates: Sequence[EffectCandidate], near: CandidateSet) -> CandidateSet:
+        """Return a set with the noise fitted beside it."""
+        return self.search.evaluate(tuple(candidates), near)
+
+    def refined(self, found: CandidateSet) -> CandidateSet:
+        """Return the set with all shapes where the cost is lowest."""
+        return self.search.refined(found)
+
+    def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
+        """Return a set with the linear parameters that somebody chose; all else follows.
+
+        The rest of a Gaussian posterior moves along with what is held; its density there is
+        what the departure costs.
+        """
+        index: list[int] = []
+        delta: list[float] = []
+        by_effect = {tick.effect: tick for tick in ticks}
+        for candidate in found.effects:
+            chosen = by_effect[candidate.effect].chosen
+            for placement in candidate.placements:
+                linear = {parameter.name for parameter in candidate.effect.linear}
+                mine = {name: value for (d, name), value in chosen.items()
+                        if d == placement.drive and name in linear}
+                if not mine or placement.block.is_fixed:
+                    continue
+                c = found.coefficients(placement)
+                wanted = candidate.effect.to_coefficients({**placement.values(c), **mine})
+                place = found.fit.places[placement.block]
+                index += range(place.start, place.stop)
+                delta += [wanted[name] - old for name, old in zip(placement.names, c, strict=True)]
+        if not index:
+            return found
+        covariance = found.fit.covariance
+        moved = np.linalg.solve(covariance[np.ix_(index, index)], np.array(delta))
+        coefficients = found.fit.coefficients + covariance[:, index] @ moved
+        cost = float(np.array(delta) @ moved)
+        fit = replace(found.fit, coefficients=coefficients, deviance=found.fit.deviance + cost)
+        return replace(found, fit=fit, total=found.total + cost)
+
+    # What a set says
+
+    def residual(self, found: CandidateSet) -> Array:
+        """Return what the linear fit leaves, (M, D) [N]."""
+        return linear_residual(self.search, found)
+
+    def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
+        """Return the parameters of every effect of a set, by drive.parameter."""
+        return {candidate.name: {
+            key: value for placement in candidate.placements
+            for key, value in self._of_placement(found, placement).items()}
+            for candidate in found.effects}
+
+    def _of_placement(self, found: CandidateSet, placement: Placement) -> dict[str, float]:
+        every = {**placement.values(found.coefficients(placement)), **placement.term.shape}
+        return {self.key(placement.drive, name): float(value) for name, value in every.items()}
+
+    def estimates(self, found: CandidateSet) -> dict[str, dict[str, Estimate]]:
+        """Return the parameters of every effect of a set with their uncertainty."""
+        return {candidate.name: estimate(self.search, found, candidate).parameters
+                for candidate in found.effects}
+
+    def key(self, drive: int | None, name: str) -> str:
+        """Return the name of a parameter, with its drive's before it."""
+        return name if drive is None else f'{self.drives[drive]}.{name}'
+
+    def exact(self, found: CandidateSet, is_free: bool) -> Exact:
+        """Return the fitted model and what it leaves, with nothing linear about it.
+
+        Where an effect of the set bends the columns of others, and nothing is held, the set is
+        fitted around its own model first.
+
+        Raises
+        ------
+        PprsError
+            For values that no model may have, or that cannot be followed.
+        """
+        search, parameters = self.search, None
+        if is_free and any(c.effect.bends_columns for c in found.effects):
+            search, found = expanded(search, found, self.decisions)
+            parameters = {c.name: estimate(search, found, c).parameters for c in found.effects}
+        model = fitted_model(search, found)
+        return Exact(model, self.measured - exact_forces(search.design, model), parameters)
+
+    def quiet_noise(self, found: CandidateSet) -> dict[str, float]:
+        """Return a first guess of every drive's noise [N]: the fast part of what a fit calls noise.
+
+        The slow part may be what is missing.
+        """
+        regression = self.search.regression
+        fast = with_fast_noise(regression, found.fit)
+        return {self.drives[d]: regression.noise_floor(fast, d) for d in regression.drives}

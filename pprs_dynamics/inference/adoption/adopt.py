@@ -1,0 +1,301 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Adding an effect to a model: fitted, judged on data it was not fitted to, taken or refused.
+
+What decides is the model as it would be written, evaluated on the recordings again; and a wrong
+effect that lowers the error a little is refused because the recordings call for another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.adoption import objections
+from pprs_dynamics.inference.adoption.fit_effect import StandingError, fit_effect
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.regression.base_columns import PresentCoefficient, PresentShape
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
+from pprs_dynamics.inference.search.expansion import fitted_model, linear_error
+from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.paired_errors import block_gains, rms
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.ledger import original_values
+from pprs_dynamics.physics.model.model_file import build_model
+
+BLOCKS, VALIDATION = 'blocks', 'validation'
+# Shares of the work, for the progress bar.
+DIAGNOSIS, FIT = 0.5, 0.85
+
+
+@dataclass(frozen=True)
+class Adoption:
+    """The answer to a requested effect.
+
+    Parameters
+    ----------
+    request : EffectRequest
+    drives : tuple of str or None
+        On which it was fitted.
+    adopted, forced : bool
+        Forced: in spite of objections.
+    reason : str
+        Why, in one sentence.
+    objections, remarks : tuple of str
+    parameters : dict of str to Estimate
+    calibrated : tuple of Calibration
+        Numbers of the model that moved within their tolerances.
+    rivals : tuple of str
+        Effects that explain the recordings as well.
+    before, after : ForceModel
+        As given; and with the effect. The latter is the former where the effect gives no model.
+    residuals_before, residuals_after : Residuals
+        On the recordings.
+    error_before, error_after, held_out_before, held_out_after : float
+        [N]
+    held_out_on : {'blocks', 'validation'}
+    noise_floor : float
+        Root of the mean square of the noise, as the diagnosis has it [N].
+    noise_floors : mapping of str to float
+        The same by drive [N].
+    """
+
+    request: EffectRequest
+    drives: tuple[str, ...] | None
+    adopted: bool
+    forced: bool
+    reason: str
+    objections: tuple[str, ...]
+    remarks: tuple[str, ...]
+    parameters: dict[str, Estimate]
+    calibrated: tuple[Calibration, ...]
+    rivals: tuple[str, ...]
+    before: ForceModel
+    after: ForceModel
+    residuals_before: Residuals
+    residuals_after: Residuals
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    held_out_on: str
+    noise_floor: float
+    noise_floors: dict[str, float]
+
+    @property
+    def unit(self) -> str:
+        """Unit of errors over all drives."""
+        return self.residuals_before.unit
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect."""
+        return self.request.name
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface, and what the README adds to them."""
+        return {
+            'adopted': self.adopted, 'reason': self.reason, 'effect': self.effect,
+            'drives': None if self.drives is None else list(self.drives),
+            'error_before': self.error_before, 'error_after': self.error_after,
+            'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after,
+            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
+            'forced': self.forced, 'objections': list(self.objections),
+            'remarks': list(self.remarks), 'rivals': list(self.rivals),
+            'parameters': {key: one.to_json() for key, one in self.parameters.items()},
+            'calibrated': [one.to_json() for one in self.calibrated]}
+
+
+def adopt(
+    model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
+    validate: Sequence[Recording] = (), force: bool = False,
+    progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
+    decisions: Decisions = DECISIONS,
+) -> Adoption:
+    """Return a model with an effect, or why it should not have it.
+
+    Parameters
+    ----------
+    model : ForceModel
+    request : EffectRequest
+    recordings : sequence of Recording
+        To fit to.
+    validate : sequence of Recording, optional
+        Never fitted, and what decides; else blocks of the recordings do.
+    force : bool, optional
+        Adopt it in spite of objections.
+    progress : callable, optional
+        Called with the share of the work that is done.
+    diagnosis : Diagnosis, optional
+        Of `original(model)` on the same recordings, where it is known already.
+
+    Raises
+    ------
+    EffectRequestError
+        For an effect that cannot act in what the model is of.
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    request.require_place(model)
+    start = original(model)
+    if diagnosis is None:
+        diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share),
+                             decisions)
+    case = _Case(model, start, request, recordings, validate, force, diagnosis, decisions)
+    if request.present(model):
+        return _fit_anew(case, report)
+    try:
+        fitted = fit_effect(start, request, recordings, decisions,
+                            lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
+    except (ModelError, StandingError) as error:
+        return case.without_model(str(error))
+    if fitted is None:
+        return _fit_anew(case, report)
+    before, after = case.residuals(fitted.model)
+    found = [*objections.of_other_effects(request, fitted, diagnosis),
+             *objections.of_identifiability(fitted), *objections.of_physics(fitted, after)]
+    rivals = tuple(name for names in diagnosis.indistinguishable if request.name in names
+                   for name in names if name != request.name)
+    remarks = [f'{", ".join(rivals)} would explain these recordings as well'] if rivals else []
+    remarks += [f'{", ".join(fitted.at_bound)} stands at the edge of what was tried'
+                ] if fitted.at_bound else []
+    others = [one.name for one in diagnosis.effects if one.name != request.name]
+    if others and any(one.name == request.name for one in diagnosis.effects):
+        remarks.append(f'the recordings call for {", ".join(others)}, too')
+    if validate:
+        held_out, gains = case.validated(fitted.plain, fitted.model, diagnosis.noise)
+    else:
+        held_out, gains = (fitted.held_out_before, fitted.held_out_after), fitted.block_gains
+    promised = linear_error(fitted.search, fitted.found)
+    found += [*objections.of_linearity(promised, rms(after), after.unit),
+              *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
+    report(1.0)
+    return case.answer(fitted.model, fitted.drives, found, remarks, rivals, fitted.parameters,
+                       tuple(fitted.calibrated), before, after, held_out)
+
+
+def original(model: ForceModel) -> ForceModel:
+    """Return a model with its numbers as they were before anything was fitted to them.
+
+    Tolerances are limits about what the file said at first; counted from where the last fit
+    left a number, they would let it walk away.
+    """
+    values = original_values(model.values)
+    if all(values[key] == value for key, value in model.values.items()):
+        return model
+    return replace(build_model(values), source=model.source)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """What is asked."""
+
+    model: ForceModel
+    start: ForceModel
+    request: EffectRequest
+    recordings: Sequence[Recording]
+    validate: Sequence[Recording]
+    force: bool
+    diagnosis: Diagnosis
+    decisions: Decisions
+
+    @property
+    def held_out(self) -> str:
+        """What decides, for a sentence."""
+        return ('the validation recordings' if self.validate
+                else 'held-out blocks of the recordings')
+
+    def residuals(self, after: ForceModel) -> tuple[Residuals, Residuals]:
+        """Return those of the model as given and of another on the recordings."""
+        before = (self.diagnosis.residuals if self.start is self.model
+                  else measure_residuals(self.model, self.recordings)[0])
+        return before, measure_residuals(after, self.recordings)[0]
+
+    def validated(self, plain: ForceModel, fitted: ForceModel, noises: dict[str, NoiseSpectrum],
+                  ) -> tuple[tuple[float, float], Array]:
+        """Return errors on the validation recordings, and what the effect gains per block."""
+        given, before, after = (measure_residuals(one, self.validate)[0]
+                                for one in (self.model, plain, fitted))
+        # What the model's own numbers gain by being fitted is not the effect's.
+        return (rms(given), rms(after)), block_gains(before, after, noises)
+
+    def without_model(self, reason: str) -> Adoption:
+        """Return the refusal of an effect whose fit gives no model."""
+        before, _ = measure_residuals(self.model, self.recordings)
+        error = rms(before)
+        held_out = rms(measure_residuals(self.model, self.validate)[0]) if self.validate else error
+        return Adoption(
+            self.request, self.request.drives, False, False, f'its fit gives no model: {reason}',
+            (reason,), (), {}, (), (), self.model, self.model, before, before, error, error,
+            held_out, held_out, VALIDATION if self.validate else BLOCKS,
+            self.diagnosis.noise_floor, self.diagnosis.noise_floors)
+
+    def answer(
+        self, after: ForceModel, drives: tuple[str, ...] | None, found: list[str],
+        remarks: list[str], rivals: tuple[str, ...], parameters: dict[str, Estimate],
+        calibrated: tuple[Calibration, ...], residuals_before: Residuals,
+        residuals_after: Residuals, held_out: tuple[float, float],
+    ) -> Adoption:
+        """Return the answer to all objections that were found."""
+        adopted = not found or self.force
+        falls = f'{held_out[0]:.4g} to {held_out[1]:.4g} {residuals_before.unit}'
+        reason = '; '.join(found) or f'the error on {self.held_out} falls from {falls}'
+        if not found and not self.validate:
+            remarks = [*remarks, 'blocks of the same recordings are weak evidence: give one in '
+                       'another regime (other speeds, other payload) with --validate']
+        return Adoption(
+            self.request, drives, adopted, bool(found) and self.force, reason, tuple(found),
+            tuple(remarks), parameters, calibrated, rivals, self.model, after, residuals_before,
+            residuals_after, rms(residuals_before), rms(residuals_after), *held_out,
+            VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor,
+            self.diagnosis.noise_floors)
+
+
+def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
+    """Return the model with what it has fitted anew, where that gains anything."""
+    design = Design.of(case.start, case.recordings,
+                       lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
+    search, name = Search(design, case.decisions, with_unknown=False), case.request.name
+    found = search.evaluate(())
+    try:
+        fitted = with_widths(fitted_model(search, found), design, estimate_widths(search, found))
+    except ModelError as error:
+        return case.without_model(str(error))
+    before, after = case.residuals(fitted)
+    noises = case.diagnosis.noise
+    gains = block_gains(before, after, noises)
+    free = sum(isinstance(column, (PresentCoefficient, PresentShape)) for column in design.base)
+    evidence = float(gains.sum() - free * np.log(search.regression.samples)
+                     - search.library.prices.of_name())
+    refused = [] if evidence > 0 else [
+        f'{name} is in the model already, and to fit it anew would gain nothing: the error would '
+        f'go from {rms(before):.4g} to {rms(after):.4g} {before.unit} (evidence {evidence:.3g}, '
+        'where 0 is the threshold)']
+    held_out = rms(before), hold_out(search, found).error
+    if case.validate:
+        held_out, gains = case.validated(case.model, fitted, noises)
+    if not refused:
+        refused = [*objections.of_linearity(linear_error(search, found), rms(after), after.unit),
+                   *objections.of_held_out_error(*held_out, gains, case.model, case.held_out)]
+    report(1.0)
+    effect = next(one for one in fitted.effects if one.name == name)
+    return case.answer(
+        fitted, tuple(effect.drives) if isinstance(effect, DriveEffect) else None, refused, [], (),
+        estimate_present(search, found, fitted, name), (), before, after, held_out)

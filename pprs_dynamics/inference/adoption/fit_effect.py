@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""One effect fitted to recordings with all that the model has, whoever asked for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate, calibrations, estimate
+from pprs_dynamics.inference.search.expansion import expanded, fitted_model
+from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.keys import set_number
+from pprs_dynamics.physics.model.model_file import build_model
+
+LEAST_MOVE = 0.02  # of a number's deviation; less is left as the file has it
+
+
+class StandingError(PprsError, ValueError):
+    """Friction that is to be fitted on drives that stand."""
+
+
+@dataclass(frozen=True)
+class EffectFit:
+    """A model with an effect, and how its fit came about.
+
+    Parameters
+    ----------
+    request : EffectRequest
+    drives : tuple of str or None
+        On which it was fitted.
+    model : ForceModel
+        With the effect.
+    plain : ForceModel
+        Without it, its own numbers fitted alike.
+    parameters : dict of str to Estimate
+    at_bound : tuple of str
+    calibrated : list of Calibration
+    evidence : float
+        By which the cost falls with the effect.
+    own_share : float
+        The least share of a column's square that nothing else in the model explains.
+    search : Search
+        Around the model with the effect.
+    found : CandidateSet
+    held_out_before, held_out_after : float
+        Over blocks, each predicted from the others [N].
+    block_gains : (B,) array
+        What the effect takes off the whitened squared error of each held-out block.
+    """
+
+    request: EffectRequest
+    drives: tuple[str, ...] | None
+    model: ForceModel
+    plain: ForceModel
+    parameters: dict[str, Estimate]
+    at_bound: tuple[str, ...]
+    calibrated: list[Calibration]
+    evidence: float
+    own_share: float
+    search: Search
+    found: CandidateSet
+    held_out_before: float
+    held_out_after: float
+    block_gains: Array
+
+
+def fit_effect(
+    model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
+    decisions: Decisions, progress: Callable[[float], None] | None = None,
+) -> EffectFit | None:
+    """Return the model with an effect that it does not have yet; None where it has it all.
+
+    Raises
+    ------
+    ModelError
+        Where the fit gives values that no model may have.
+    StandingError
+        Where friction is asked for on drives that hardly moved.
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    design = Design.of(model, recordings, lambda share: report(0.3 * share))
+    _require_motion(design, request)
+    search = Search(design, decisions, with_unknown=False)
+    without = search.evaluate(())
+    found = search.best_of(request.effect, _numbers(design, request))
+    report(0.6)
+    if found is None:
+        return None
+    share = min(search.regression.own_share(without.fit, block)
+                for block in found.candidates[0].blocks if not block.is_fixed) if any(
+                    not block.is_fixed for block in found.candidates[0].blocks) else 1.0
+    before = hold_out(search, without)
+    # At the noise of the fit with the effect, so that losses of both are comparable.
+    plain_set = replace(without, fit=search.regression.at((), found.fit.amplitudes))
+    plain_losses = hold_out(search, plain_set).losses
+    evidence = without.cost - found.cost
+    last, found = expanded(search, found, decisions)
+    report(0.8)
+    candidate = found.effects[0]
+    said = estimate(last, found, candidate)
+    after = hold_out(last, found)
+    widths = estimate_widths(last, found)
+    moved = [one for one in calibrations(last, found, widths) if _is_move(design, one)]
+    fitted = with_widths(fitted_model(last, found), last.design, widths)
+    final = _with_numbers(fitted, model, moved)
+    parameters = {key: Estimate(float(final.values[f'effects.{request.name}.{key}']), one.std,
+                                one.unit) for key, one in said.parameters.items()}
+    report(1.0)
+    return EffectFit(
+        request, _names(design, candidate), final, fitted_model(search, plain_set), parameters,
+        said.at_bound, moved, evidence, share, last, found, before.error, after.error,
+        plain_losses - after.losses)
+
+
+def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:
+    return None if request.drives is None else tuple(
+        design.drives.index(name) for name in request.drives)
+
+
+def _names(design: Design, candidate: EffectCandidate) -> tuple[str, ...] | None:
+    drives = candidate.drives
+    return None if drives is None else tuple(design.drives[d] for d in drives)
+
+
+def _require_motion(design: Design, request: EffectRequest) -> None:
+    """Raise StandingError for friction on drives that stand, where these are asked for or all."""
+    if not request.effect.is_friction:
+        return
+    asked = request.drives or design.drives
+    standing = [name for name in asked if not design.moves(design.drives.index(name))]
+    if standing and (request.drives or len(standing) == len(asked)):
+        raise StandingError(f'{", ".join(standing)} hardly moved in the recordings, must move '
+                            'where friction is to be fitted')
+
+
+def _is_move(design: Design, one: Calibration) -> bool:
+    """Return whether a number moves at all against what its tolerance allows."""
+    deviations = {(column.number.key, column.number.element): column.number.deviation
+                  for column in design.base if isinstance(column, KnownNumber)}
+    # Widths of reversal have no tolerance: they are told where they differ for certain.
+    return abs(one.after - one.before) > LEAST_MOVE * deviations.get((one.key, one.element), 0.0)
+
+
+def _with_numbers(fitted: ForceModel, start: ForceModel, moved: Sequence[Calibration],
+                  ) -> ForceModel:
+    """Return a fitted model in which only some numbers are not as they were at the start."""
+    values = {**fitted.values, **{key: start.values[key] for key in start.keys}}
+    for one in moved:
+        set_number(values, one.key, one.element, one.after)
+    return replace(build_model(values), source=fitted.source)

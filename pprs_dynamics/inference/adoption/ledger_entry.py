@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""From an adoption to a model file with its entry in the ledger."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+
+from pprs_dynamics import __version__
+from pprs_dynamics.inference.adoption.adopt import Adoption
+from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step, with_step
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.model_writer import refuse_same_file
+from pprs_dynamics.physics.model.parameter_file import find_file
+
+
+@dataclass(frozen=True)
+class RecordingEntry:
+    """A recording as the ledger names it: file, hash, first and last time [s]."""
+
+    name: str
+    sha256: str
+    span: tuple[float, float]
+
+    @classmethod
+    def of(cls, path: str | PathLike[str], recording: Recording) -> RecordingEntry:
+        """Return what the ledger says of a recording from a file."""
+        return cls._of(recording, fingerprint(path))
+
+    @classmethod
+    def of_samples(cls, recording: Recording) -> RecordingEntry:
+        """Return what the ledger says of a recording that came from no file."""
+        return cls._of(recording, samples_fingerprint(recording))
+
+    @classmethod
+    def _of(cls, recording: Recording, sha256: str) -> RecordingEntry:
+        time = recording.epoch + recording.time
+        return cls(recording.name, sha256, (float(time[0]), float(time[-1])))
+
+
+@dataclass(frozen=True)
+class LedgerBook:
+    """Enters adoptions into a model's ledger.
+
+    Parameters
+    ----------
+    fitted, validation : tuple of RecordingEntry
+    """
+
+    fitted: tuple[RecordingEntry, ...]
+    validation: tuple[RecordingEntry, ...]
+
+    @classmethod
+    def of(cls, fitted: Mapping[str, Recording], validation: Mapping[str, Recording]) -> LedgerBook:
+        """Make it from recordings by path."""
+        return cls(tuple(RecordingEntry.of(*one) for one in fitted.items()),
+                   tuple(RecordingEntry.of(*one) for one in validation.items()))
+
+    def entered(self, adoption: Adoption) -> ForceModel:
+        """Return the model of an adoption with its step in the ledger."""
+        values = with_step(adoption.before.values, adoption.after.values, self._step(adoption))
+        return replace(build_model(values), source=adoption.before.source)
+
+    def _step(self, adoption: Adoption) -> Step:
+        before, after = (rms_by_drive(one) for one in (
+            adoption.residuals_before, adoption.residuals_after))
+        found = adoption.parameters
+        return Step(
+            effect=adoption.effect, drives=adoption.drives or (),
+            parameters=tuple(found), values=tuple(one.value for one in found.values()),
+            std=tuple(_rounded(one.std, 3) for one in found.values()),
+            units=tuple(one.unit for one in found.values()),
+            recordings=tuple(one.name for one in self.fitted),
+            sha256=tuple(one.sha256 for one in self.fitted),
+            spans=tuple(time for one in self.fitted for time in one.span),
+            validation=tuple(one.name for one in self.validation),
+            validation_sha256=tuple(one.sha256 for one in self.validation),
+            held_out_on=adoption.held_out_on,
+            error_before=_rounded(adoption.error_before),
+            error_after=_rounded(adoption.error_after),
+            held_out_before=_rounded(adoption.held_out_before),
+            held_out_after=_rounded(adoption.held_out_after),
+            noise_floor=_rounded(adoption.noise_floor), measured=tuple(before),
+            drive_errors_before=tuple(map(_rounded, before.values())),
+            drive_errors_after=tuple(map(_rounded, after.values())),
+            calibrated=tuple(one.label for one in adoption.calibrated), rivals=adoption.rivals,
+            objections=adoption.objections, forced=adoption.forced,
+            date=datetime.now(UTC).isoformat(timespec='seconds'), version=__version__)
+
+
+def check_output(output: str | PathLike[str], model: str | PathLike[str]) -> Path:
+    """Return the model file that an output is to be made from, before minutes are spent on it.
+
+    Raises
+    ------
+    ModelError
+        Where the output is the model itself.
+    """
+    base = find_file(model)
+    refuse_same_file(output, base)
+    return base
+
+
+def _rounded(value: float, digits: int = 6) -> float:
+    return float(f'{value:.{digits}g}') if math.isfinite(value) else NOT_KNOWN

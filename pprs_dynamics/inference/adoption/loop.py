@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The whole way: diagnose, adopt, diagnose again, until nothing more can be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence, Set
+from dataclasses import dataclass
+from typing import Any
+
+from pprs_dynamics.inference.adoption.adopt import Adoption, adopt, original
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+MOST_STEPS = 8
+REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
+
+
+@dataclass(frozen=True)
+class AdoptionRun:
+    """What was adopted, one after the other, and why it ended.
+
+    Parameters
+    ----------
+    steps : tuple of Adoption
+        Those that were refused are among them.
+    ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
+    reason : str
+    model : ForceModel
+        With all that was adopted.
+    last : Diagnosis
+        Of the model where the run ended.
+    """
+
+    steps: tuple[Adoption, ...]
+    ended: str
+    reason: str
+    model: ForceModel
+    last: Diagnosis
+
+    @property
+    def adopted(self) -> tuple[Adoption, ...]:
+        """The steps that were taken."""
+        return tuple(step for step in self.steps if step.adopted)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the run for JSON."""
+        return {'ended': self.ended, 'reason': self.reason,
+                'steps': [step.to_json() for step in self.steps]}
+
+
+def adopt_all(
+    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    record: Callable[[Adoption], ForceModel] = lambda adoption: adoption.after,
+    progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
+) -> AdoptionRun:
+    """Adopt what recordings call for, until a diagnosis finds nothing, or cannot tell.
+
+    Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
+    error, and which of them it is another recording must show. What is refused is left out
+    until something else has been adopted, and the run goes on with what else was found.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : sequence of Recording
+        To fit to.
+    validate : sequence of Recording, optional
+        Never fitted: an effect with which the error on them does not fall is refused.
+    record : callable, optional
+        Returns the model of an adoption with its entry in the ledger.
+    progress : callable, optional
+        Called with what is being done and the share of it that is done.
+    diagnosis : Diagnosis, optional
+        Of the model as given, where it is known already.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda what, share: None)
+    steps: list[Adoption] = []
+    taken = 0
+    refused: list[Adoption] = []
+    if diagnosis is not None and original(model) is not model:
+        diagnosis = None
+    while True:
+        if diagnosis is None:
+            diagnosis = diagnose(original(model), recordings, (),
+                                 lambda share: report('diagnosing', share))
+        found = _next(diagnosis, {step.effect for step in refused})
+        if found is None and refused:
+            reasons = '; '.join(f'{step.effect}: {step.reason}' for step in refused)
+            return AdoptionRun(tuple(steps), REFUSED, reasons, model, diagnosis)
+        if found is None or taken == MOST_STEPS:
+            ended = 'unknown' if diagnosis.depends_on else 'adequate'
+            reason = (f'what remains no effect of the catalogue explains: '
+                      f'{diagnosis.depends_on[0].text}' if diagnosis.depends_on
+                      else 'nothing that is left stands out against noise')
+            return AdoptionRun(tuple(steps), ended, reason, model, diagnosis)
+        name = found.name
+        step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,
+                     progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
+                     diagnosis=diagnosis)
+        steps.append(step)
+        if not step.adopted:
+            refused.append(step)
+            continue
+        model = record(step)
+        taken += 1
+        refused.clear()
+        if step.rivals:
+            reason = (f'{", ".join(step.rivals)} would explain these recordings as well as {name}: '
+                      'pprs next-experiment tells which motion separates them')
+            return AdoptionRun(tuple(steps), AMBIGUOUS, reason, model, diagnosis)
+        diagnosis = None
+
+
+def _next(diagnosis: Diagnosis, refused: Set[str]) -> FoundEffect | None:
+    """Return what to adopt: those that are certain first, an ambiguous one as the last."""
+    new = [one for one in diagnosis.effects if one.name not in refused]
+    ambiguous = {name for names in diagnosis.indistinguishable for name in names}
+    certain = [one for one in new if one.name not in ambiguous]
+    return next(iter(certain or new), None)

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What speaks against adding an effect to a model, each in a sentence with its figures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.adoption.fit_effect import EffectFit
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.measurement.residuals.paired_errors import certainty
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
+from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
+from pprs_dynamics.physics.mechanism.units import common_effort
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+SURE = 2.0  # standard deviations
+MOVING = 5.0  # widths in which friction turns over
+BENT = 1.5  # error of a fitted model over that of its linear fit
+PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
+# Standard errors of the blocks' losses by which the first effect, and further ones, must gain.
+FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
+OWN_SHARE = 1e-6  # of a column's whitened square, below which nothing tells its coefficient
+
+
+def of_other_effects(request: EffectRequest, fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
+    """Return whether the recordings call for another effect, or for none."""
+    mine = next((one for one in diagnosis.effects if one.name == request.name), None)
+    if mine is not None:
+        missed = [drive for drive in fitted.drives or () if drive not in (mine.drives or ())]
+        if mine.drives and missed:
+            return [f'the recordings show {request.name} on {", ".join(mine.drives)}, not on '
+                    f'{", ".join(missed)}']
+        return _evidence(fitted, diagnosis)
+    if any(request.name in names for names in diagnosis.indistinguishable):
+        return _evidence(fitted, diagnosis)
+    if diagnosis.effects:
+        best = diagnosis.effects[0]
+        on = f' on {", ".join(best.drives)}' if best.drives else ''
+        return [f'{best.name}{on} explains these recordings better: evidence '
+                f'{best.evidence:.3g} against {fitted.evidence:.3g}']
+    if diagnosis.depends_on:
+        return [f'no effect of the catalogue has the form of the error: '
+                f'{diagnosis.depends_on[0].text}']
+    suspect = any(one.name == request.name for one in diagnosis.suspects)
+    if fitted.evidence > 0 and not suspect:
+        return ['it does not predict parts of the recordings that it was not fitted to']
+    why = ': slow noise would explain it as well; repeat the recording' if suspect else ''
+    return [f'these recordings do not call for it: evidence {fitted.evidence:.3g}, where 0 is the '
+            f'threshold{why}']
+
+
+def _evidence(fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
+    if fitted.evidence > 0:
+        return []
+    first = diagnosis.effects[0]
+    if first.name != fitted.request.name:
+        return [f'it shows only beside {first.name}: adopt that first (evidence '
+                f'{fitted.evidence:.3g} without it, where 0 is the threshold)']
+    return [f'on {", ".join(fitted.drives or ("the structure",))} the evidence is '
+            f'{fitted.evidence:.3g}, where 0 is the threshold']
+
+
+def of_held_out_error(before: float, after: float, gains: Array, model: ForceModel,
+                      where: str) -> list[str]:
+    """Return whether the error on held-out data fails to fall beyond its uncertainty.
+
+    Parameters
+    ----------
+    before, after : float
+        [N]
+    gains : (B,) array
+        Of whitened squared error, block by block.
+    model : ForceModel
+        As given: more is asked where it has effects already.
+    where : str
+        What was held out, for the sentence.
+    """
+    unit = common_effort(model.units)
+    sure = certainty(gains)
+    asked = FURTHER_ERRORS if any(
+        isinstance(effect, CatalogueEffect) for effect in model.effects) else FIRST_ERRORS
+    if after < before and sure > asked:
+        return []
+    if after >= before:
+        return [f'the error on {where} does not fall: {before:.4g} {unit} before, '
+                f'{after:.4g} {unit} after']
+    return [f'the error on {where} falls from {before:.4g} to {after:.4g} {unit}, which is '
+            f'{sure:.2g} standard errors over blocks, must be more than {asked:g}']
+
+
+def of_linearity(promised: float, found: float, unit: str) -> list[str]:
+    """Return whether a fitted model is far from the linear fit that it was made of.
+
+    Columns of shapes and of numbers that bend forces hold near the model only.
+
+    Parameters
+    ----------
+    promised, found : float
+        Error on the recordings, of the linear fit and of the model.
+    unit : str
+    """
+    if found <= BENT * promised:
+        return []
+    return [f'fitted with it, the model would leave {found:.4g} {unit} where the fit promises '
+            f'{promised:.4g} {unit}: its parameters are too far from where they started']
+
+
+def of_identifiability(fitted: EffectFit) -> list[str]:
+    """Return whether the recordings tell the parameters at all."""
+    if fitted.own_share < OWN_SHARE:
+        return [f'these recordings cannot tell {fitted.request.name} from what the model has: of '
+                f'its square only {fitted.own_share:.1e} is its own']
+    angles = {p.name for p in fitted.request.effect.parameters if p.is_angle}
+
+    def is_angle(key: str) -> bool:
+        return key.rpartition('.')[2] in angles
+
+    told = {key: one for key, one in fitted.parameters.items()
+            if not is_angle(key) and one.value != 0.0}
+    vague = [key for key, one in told.items() if abs(one.value) < SURE * one.std]
+    linear = {p.name for p in fitted.request.effect.linear or fitted.request.effect.shape}
+    sizes = [key for key in told if key.rpartition('.')[2] in linear] or list(told)
+    if sizes and all(key in vague for key in sizes):
+        shown = '; '.join(f'{key} = {_with_std(told[key])}' for key in sizes[:3])
+        return [f'its parameters are not identifiable from these recordings: {shown}']
+    return []
+
+
+def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
+    """Return whether friction would push, or a stiffness or inertia be negative."""
+    bounds = fitted.request.effect.unphysical_below
+    low = {}
+    for key, one in fitted.parameters.items():
+        bound = bounds.get(key.rpartition('.')[2])
+        if bound is not None and one.value + SURE * one.std < bound:
+            low[key] = one
+    if not low:
+        return []
+    first = next(iter(low))
+    told = f'{first} would be {_with_std(low[first])}'
+    if not fitted.request.effect.is_friction:
+        return [f'{told}, must not be negative']
+    pushing = _pushing_drives(fitted.model, after)
+    if fitted.drives is None:
+        shares = pushing.get('', 0.0)
+        return [] if shares < PUSHES else [
+            f'{told}: with all friction of the model, the joints would give power back in '
+            f'{shares:.0%} of the moving time']
+    worst = {drive: pushing[drive] for drive in fitted.drives
+             if pushing[drive] >= PUSHES and any(key.startswith(f'{drive}.') for key in low)}
+    if not worst:
+        return []
+    drive = max(worst, key=lambda name: worst[name])
+    return [f'{told}: with all friction of the model, friction on {drive} would push along the '
+            f'motion in {worst[drive]:.0%} of the moving time']
+
+
+def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]:
+    """Return the share of the moving time with negative friction power, by drive; '' is all."""
+    own = np.zeros(residuals.model.shape)
+    passive = np.zeros(residuals.model.shape)
+    for effect in model.effects:
+        part = residuals.parts.get(effect.name)
+        if part is None:
+            continue
+        if isinstance(effect, (ActiveFriction, AxisFriction)):
+            own += part
+        elif isinstance(effect, PassiveFriction):
+            passive += part
+        elif (isinstance(effect, CatalogueEffect) and effect.unphysical_below
+              and effect.is_friction):
+            if isinstance(effect, DriveEffect):
+                own += part
+            else:
+                passive += part
+    velocity = residuals.variables['velocity']
+    moving = np.abs(velocity) > MOVING * np.asarray(model.reversal.velocity)
+    shares = {drive: _share(own[:, d] * velocity[:, d] < 0, moving[:, d])
+              for d, drive in enumerate(residuals.drives)}
+    power = ((own + passive) * velocity).sum(axis=1)
+    return {**shares, '': _share(power < 0, np.any(moving, axis=1))}
+
+
+def _share(true: Any, among: Any) -> float:
+    count = int(among.sum())
+    return float((true & among).sum()) / count if count else 0.0
+
+
+def _with_std(one: Estimate) -> str:
+    return f'{one.value:.3g} ± {one.std:.2g} {one.unit}'

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""An effect that somebody wants in the model: EFFECT, or EFFECT:drive,drive."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+
+class EffectRequestError(PprsError, ValueError):
+    """An effect or drive that does not exist."""
+
+
+@dataclass(frozen=True)
+class EffectRequest:
+    """An effect that somebody wants in the model.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drives : tuple of str or None
+        On which; None: where the recordings call for it.
+    """
+
+    effect: type[CatalogueEffect]
+    drives: tuple[str, ...] | None = None
+
+    @classmethod
+    def of(cls, text: str, known: tuple[str, ...] = DRIVES) -> EffectRequest:
+        """Read EFFECT or EFFECT:drive,drive, of the drives that are known.
+
+        Raises
+        ------
+        EffectRequestError
+            For an effect or a drive that does not exist.
+        """
+        name, colon, listed = text.partition(':')
+        effect = find_effect(name)
+        if effect is None:
+            close = difflib.get_close_matches(name, list(catalogue()), 1)
+            hint = f' (did you mean {close[0]}?)' if close else ''
+            raise EffectRequestError(f'unknown effect {name!r}{hint}, must be one of '
+                                     f'{", ".join(catalogue())}')
+        if not colon:
+            return cls(effect)
+        drives = tuple(dict.fromkeys(drive.strip() for drive in listed.split(',')))
+        if not issubclass(effect, DriveEffect):
+            raise EffectRequestError(f'{text!r} names drives, but {name} is in the structure and '
+                                     'must stand alone')
+        for drive in drives:
+            if drive not in known:
+                raise EffectRequestError(f'unknown drive {drive!r}, must be one of '
+                                         f'{", ".join(known)}')
+        return cls(effect, tuple(sorted(drives, key=known.index)))
+
+    def require_place(self, model: ForceModel) -> None:
+        """Raise EffectRequestError where the effect cannot act in what the model is of."""
+        if not model.offers(self.effect):
+            offered = [name for name, effect in catalogue().items() if model.offers(effect)]
+            raise EffectRequestError(f'{self.name} does not act in {model.title}, must be one of '
+                                     f'{", ".join(offered)}')
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+        return self.effect.name
+
+    def present(self, model: ForceModel) -> bool:
+        """Return whether the model has it already, on every drive that is asked for."""
+        for effect in model.effects:
+            if effect.name == self.name:
+                return not isinstance(effect, DriveEffect) or (
+                    self.drives is not None and set(self.drives) <= set(effect.drives))
+        return False

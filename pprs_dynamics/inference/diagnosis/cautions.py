@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What may make an answer worth less: motion, length, filtering, bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.search import Search
+
+if TYPE_CHECKING:
+    from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+
+SHORT = 8.0  # [s]
+FEW_SAMPLES = 60.0  # independent ones, per drive
+UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least
+ONE_WAY = 0.95  # of the moving time in one direction
+FILTERED = 0.05  # high frequencies of the effort over those of white noise
+
+
+def find_cautions(
+    search: Search, best: CandidateSet, effects: Sequence[FoundEffect],
+) -> tuple[str, ...]:
+    """Return sentences, the graver first."""
+    return (*_length(search, best), *_motion(search.design), *_filtered(search.design),
+            *_unexcited(search, best), *_bounds(effects))
+
+
+def _length(search: Search, best: CandidateSet) -> list[str]:
+    design, regression = search.design, search.regression
+    residuals = design.residuals
+    duration = len(residuals) * residuals.period
+    if duration < SHORT:
+        return [f'the recordings last {duration:.3g} s together: too short to tell effects from '
+                'slow noise; record at least 20 s']
+    worth = {d: noise.effective_samples(int(regression.series[d].known.sum()))
+             for d, noise in regression.noise(best.fit).items()}
+    poor = [design.drives[d] for d, count in worth.items() if count < FEW_SAMPLES]
+    if poor:
+        least = min(worth.values())
+        return [f'noise on {", ".join(poor)} is so slow that the recording is worth only '
+                f'{least:.0f} independent samples: constants and slow drifts cannot be told from '
+                'it; repeat the recording']
+    return []
+
+
+def _motion(design: Design) -> list[str]:
+    velocity = design.residuals.variables['velocity']
+    still, one_way = [], []
+    for d, name in enumerate(design.drives):
+        v = velocity[:, d]
+        moving = design.moving(d)
+        if not design.moves(d):
+            still.append(name)
+        elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > ONE_WAY:
+            one_way.append(name)
+    found = []
+    if still:
+        found.append(f'{", ".join(still)} hardly move: friction there cannot be seen, and '
+                     'what holds a drive at rest looks like a constant force')
+    if one_way:
+        found.append(f'{", ".join(one_way)} move in one direction only: friction there looks '
+                     'like a constant force; record motion both ways')
+    return found
+
+
+def _filtered(design: Design) -> list[str]:
+    """Look for efforts that hold no fast noise at all, at full rate."""
+    found = []
+    for d, name in enumerate(design.drives):
+        error = [one.effort_measured[part, d] - one.effort[part, d]
+                 for one in design.recordings for part in one.segments]
+        longest = max(error, key=len)
+        longest = longest[np.isfinite(longest)]
+        if len(longest) < 200 or not np.any(longest):
+            continue
+        first, third = np.diff(longest), np.diff(longest, 3)
+        # Third differences of white noise have ten times the variance of first ones.
+        if np.mean(third ** 2) < FILTERED * np.mean(first ** 2):
+            found.append(name)
+    if not found:
+        return []
+    return [f'effort of {", ".join(found)} looks filtered: it holds no fast noise. A filter '
+            'delays and rounds what happens at reversals; switch it off, or look out for '
+            'time_delay and hysteresis that are the filter\'s']
+
+
+def _unexcited(search: Search, best: CandidateSet) -> list[str]:
+    """Return effects that this motion would not show even at a size that matters."""
+    regression = search.regression
+    adopted = {candidate.name for candidate in best.effects}
+    weak = []
+    for term in search.design.structure:
+        if term.effect.name in adopted:
+            continue
+        own = regression.own_information(best.fit, regression.block(term.rows))
+        scales = np.array([c.scale for c in term.effect.coefficients])
+        sizes = np.diag(own) * scales ** 2
+        present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)
+                   if c.name not in search.design.absent(term.effect)}
+        names = [name for name, size in present.items() if size < UNEXCITED]
+        if names:
+            weak.append(term.effect.name if len(names) == len(present)
+                        else f'{term.effect.name} ({", ".join(names)})')
+    if not weak:
+        return []
+    return [f'this motion hardly excites {", ".join(weak)}: it cannot tell whether '
+            f'{"it is" if len(weak) == 1 else "they are"} there']
+
+
+def _bounds(effects: Sequence[FoundEffect]) -> list[str]:
+    return [f'{one.name}: {", ".join(one.at_bound)} stands at the edge of what was tried; its '
+            'value is not to be trusted' for one in effects if one.at_bound]

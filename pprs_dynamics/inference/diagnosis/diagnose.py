@@ -1,0 +1,325 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which physical effect a model lacks: the whole way from recordings to an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.cautions import find_cautions
+from pprs_dynamics.inference.diagnosis.found_effects import (
+    FoundEffect,
+    RankedEffect,
+    RankedSet,
+    WithinModelError,
+)
+from pprs_dynamics.inference.diagnosis.localisation import levels
+from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.estimates import Calibration, calibrations, estimate
+from pprs_dynamics.inference.search.expansion import (
+    Selection,
+    exact_forces,
+    fitted_model,
+    linear_error,
+    linear_residual,
+    select,
+)
+from pprs_dynamics.inference.search.form import Remainder, without_remainders
+from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.inference.search.rivals import find_rivals
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.paired_errors import rms
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+MOST_SETS = 8  # that are told with their costs
+SURE = 2.0  # standard deviations by which a number must have moved to be told
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer.
+
+    Parameters
+    ----------
+    verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
+    effects : tuple of FoundEffect
+        Those without which the error would be largest first.
+    indistinguishable : tuple of tuple of str
+        Each an adopted effect and its rivals.
+    candidates, suspects : tuple of RankedEffect
+    depends_on : tuple of Statement
+        What no effect explains.
+    within_model_error : tuple of WithinModelError
+    sets : tuple of RankedSet
+        The best sets of the search, the best first.
+    calibrated : tuple of Calibration
+        Numbers that moved within their tolerances.
+    warnings, notes : tuple of str
+    model : ForceModel
+        As given.
+    adopted : ForceModel
+        With the effects.
+    residuals : Residuals
+        Of the model as given.
+    remaining : (M, D) array
+        What `adopted` leaves [N].
+    noise : mapping of str to NoiseSpectrum
+        By drive.
+    noise_floors : mapping of str to float
+        Root of the mean square of the noise of each drive [N].
+    noise_floor : float
+        The same over drives [N].
+    held_out_on : {'blocks', 'validation'}
+    selection : Selection, optional
+        The searches, for looking closer.
+    chosen : CandidateSet, optional
+        What was adopted of them.
+    """
+
+    verdict: str
+    effects: tuple[FoundEffect, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    candidates: tuple[RankedEffect, ...]
+    suspects: tuple[RankedEffect, ...]
+    depends_on: tuple[Statement, ...]
+    within_model_error: tuple[WithinModelError, ...]
+    sets: tuple[RankedSet, ...]
+    calibrated: tuple[Calibration, ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    model: ForceModel
+    adopted: ForceModel
+    residuals: Residuals
+    remaining: Array
+    noise: dict[str, NoiseSpectrum]
+    noise_floors: dict[str, float]
+    noise_floor: float
+    held_out_on: str = 'blocks'
+    selection: Selection | None = field(default=None, repr=False, compare=False)
+    chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON of the interface, and what the README adds to it."""
+        return {
+            'verdict': self.verdict,
+            'effects': [one.to_json() for one in self.effects],
+            'indistinguishable': [list(names) for names in self.indistinguishable],
+            'candidates': [one.to_json() for one in self.candidates],
+            'depends_on': [
+                {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
+                 'range': None if s.range is None else list(s.range), 'text': s.text}
+                for s in self.depends_on],
+            'suspects': [{key: value for key, value in s.to_json().items() if key != 'error_after'}
+                         for s in self.suspects],
+            'sets': [one.to_json() for one in self.sets],
+            'calibrated': [one.to_json() for one in self.calibrated],
+            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
+            'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
+
+
+def diagnose(
+    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
+) -> Diagnosis:
+    """Return which physical effect a model lacks, as far as recordings can tell.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : sequence of Recording
+        To fit to.
+    validate : sequence of Recording, optional
+        Never fitted: held-out errors are taken on them, instead of on blocks.
+    progress : callable, optional
+        Called with the share of the work that is done.
+    decisions : Decisions, optional
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    selection = select(model, recordings, decisions, lambda share: report(0.9 * share))
+    diagnosis = _Answer(selection, validate, decisions).diagnosis()
+    report(1.0)
+    return diagnosis
+
+
+class _Answer:
+    """Turns a selection into an answer."""
+
+    def __init__(self, selection: Selection, validate: Sequence[Recording],
+                 decisions: Decisions) -> None:
+        self.decisions, self.validate = decisions, validate
+        self.search: Search = selection.last
+        self.design = self.search.design
+        self.best, self.kept, self.remainders = without_remainders(self.search, selection.best)
+        self.selection = replace(selection, best=self.best)
+        self.drives = self.design.drives
+
+    def diagnosis(self) -> Diagnosis:
+        search, regression = self.search, self.search.regression
+        first = self.selection.first.design
+        widths = estimate_widths(search, self.kept)
+        adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
+        remaining = first.residuals.measured - exact_forces(self.design, adopted)
+        noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
+        floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
+                  for d in regression.drives}
+        rivals = self._rivals()
+        depends = self._depends_on(noise)
+        sets = tuple((name, *others) for name, others in rivals.items() if others)
+        effects = self._effects(remaining)
+        verdict = ('unknown' if depends else 'ambiguous' if sets
+                   else 'effect' if effects else 'adequate')
+        moved = [one for one in calibrations(search, self.kept, widths)
+                 if abs(one.after - one.before) > SURE * one.std]
+        return Diagnosis(
+            verdict, tuple(effects), sets, self._candidates(), self._suspects(), depends,
+            tuple(self._within_model_error(one) for one in self.remainders), self._sets(),
+            tuple(moved), find_cautions(search, self.best, effects), first.notes,
+            first.given, adopted, first.residuals, remaining, noise, floors,
+            float(np.sqrt(np.mean(np.square(list(floors.values()))))),
+            'validation' if self.validate else 'blocks', self.selection, self.kept)
+
+    def _effects(self, remaining: Array) -> list[FoundEffect]:
+        """Return what is adopted, with the errors as one after the other is added."""
+        search = self.search
+        without = {c: self._without(c) for c in self.kept.effects}
+        evidence = {c: one.total - self.kept.total for c, one in without.items()}
+        # First what lowers the error most, as a multiple of each drive's noise: drives may be of
+        # different sizes and units.
+        ordered = sorted(self.kept.effects, key=lambda c: -self._over_noise(without[c]))
+        if not ordered:
+            return []
+        unknown = self.kept.unknowns
+        steps = [search.evaluate((*ordered[:k], *unknown), self.kept)
+                 for k in range(len(ordered))] + [self.kept]
+        errors = [_rms(self.selection.first.design.residuals.error),
+                  *(linear_error(search, step) for step in steps[1:-1]), _rms(remaining)]
+        if self.validate:
+            given = self.selection.first.design.given
+            models = [given, *(fitted_model(search, step) for step in steps[1:])]
+            held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
+        else:
+            held_out = [hold_out(search, step).error for step in steps]
+        near = [one for one in search.evaluated.values()
+                if one.cost < self.best.cost + self.decisions.rival_margin]
+        found = []
+        for k, candidate in enumerate(ordered):
+            said = estimate(search, self.kept, candidate, near)
+            found.append(FoundEffect(
+                candidate.effect, self._names(candidate), said.parameters, evidence[candidate],
+                errors[k], errors[k + 1], held_out[k], held_out[k + 1],
+                self.kept.force(candidate, remaining.shape), said.at_bound))
+        return found
+
+    def _over_noise(self, found: CandidateSet) -> float:
+        """Return the root of the mean square of what a set leaves, over the noise of each drive."""
+        search = self.search
+        left = linear_residual(search, found)
+        shares = [np.nanmean(np.square(left[:, d])) / max(
+            search.regression.noise_floor(self.best.fit, d), 1e-12) ** 2
+            for d in search.regression.drives]
+        return float(np.sqrt(np.mean(shares)))
+
+    def _without(self, candidate: Candidate) -> CandidateSet:
+        return self.search.evaluate(tuple(c for c in self.kept.candidates if c is not candidate),
+                                    self.kept)
+
+    def _rivals(self) -> dict[str, list[str]]:
+        """Return, for each adopted effect, what stands for it in sets that are nearly as good."""
+        rivals: dict[str, list[str]] = {c.name: [] for c in self.kept.effects}
+        for rival in find_rivals(self.selection, self.kept, self.decisions.rival_margin,
+                                 {one.candidate.name for one in self.remainders}):
+            for name in rival.missing:
+                rivals[name] += [one for one in rival.instead if one not in rivals[name]]
+        return rivals
+
+    def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
+        statements = []
+        libraries = {library.d: library for library in self.search.patterns}
+        for candidate in self.kept.unknowns:
+            evidence = self._without(candidate).total - self.kept.total
+            for d, block in candidate.parts.items():
+                statements.append(word_statement(
+                    self.drives[d], libraries[d], candidate, self.kept.fit.of(block), evidence,
+                    ()))
+        statements += levels(self.search.regression.residuals, dict(noise),
+                             self.decisions).values()
+        return tuple(sorted(statements, key=lambda one: -one.evidence))
+
+    def _candidates(self) -> tuple[RankedEffect, ...]:
+        """Return the effects that were fitted as the only one, the best first."""
+        search = self.selection.first
+        none = search.evaluated[frozenset()]
+        best: dict[str, CandidateSet] = {}
+        for one in search.evaluated.values():
+            if len(one.candidates) == 1 and one.effects:
+                name = one.effects[0].name
+                if name not in best or one.cost < best[name].cost:
+                    best[name] = one
+        return tuple(sorted((self._ranked(search, one, one.effects[0], none.cost - one.cost)
+                             for one in best.values()), key=lambda one: -one.evidence))
+
+    def _suspects(self) -> tuple[RankedEffect, ...]:
+        """Return effects that nearly pay beside those adopted: slow noise would do as well."""
+        mine = {c.key for c in self.best.candidates}
+        found: dict[str, RankedEffect] = {}
+        for one in self.search.evaluated.values():
+            more = [c for c in one.effects if c.key not in mine]
+            behind = one.cost - self.best.cost
+            if (len(more) == 1 and len(one.candidates) == len(mine) + 1
+                    and 0 < behind < self.decisions.rival_margin / 2
+                    and more[0].name not in {c.name for c in self.best.effects}):
+                ranked = self._ranked(self.search, one, more[0], -behind)
+                if more[0].name not in found or found[more[0].name].evidence < ranked.evidence:
+                    found[more[0].name] = ranked
+        return tuple(sorted(found.values(), key=lambda one: -one.evidence))
+
+    def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
+                evidence: float) -> RankedEffect:
+        return RankedEffect(candidate.name, self._names(candidate), evidence,
+                            linear_error(search, found))
+
+    def _sets(self) -> tuple[RankedSet, ...]:
+        found: dict[frozenset[str], RankedSet] = {}
+        for one in self.selection.ranked:
+            names = tuple((c.name, self._names(c)) for c in one.candidates)
+            key = frozenset(name for name, _ in names)
+            if key not in found:
+                # Of a set that bends nothing the cost is that in the first design.
+                found[key] = RankedSet(names, max(one.cost - self.best.cost, 0.0))
+            if len(found) == MOST_SETS:
+                break
+        return tuple(found.values())
+
+    def _within_model_error(self, remainder: Remainder) -> WithinModelError:
+        force = remainder.found.force(remainder.candidate, self.design.residuals.measured.shape)
+        return WithinModelError(
+            remainder.candidate.name, self._names(remainder.candidate),
+            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+
+    def _names(self, candidate: Candidate) -> tuple[str, ...] | None:
+        drives = candidate.drives
+        return None if drives is None else tuple(self.drives[d] for d in drives)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.nanmean(values ** 2)))
+
+

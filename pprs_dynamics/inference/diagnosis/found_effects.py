@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parts of a diagnosis: effects that were found, ranked sets, and what is within model error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+
+Drives = tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that the recordings call for.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drives : tuple of str or None
+        On which it sits; None for the structure.
+    parameters : dict of str to Estimate
+    evidence : float
+        By which the cost of the best set rises without it.
+    error_before, error_after, held_out_before, held_out_after : float
+        [N], with the effects before it, and with it as well.
+    force : (M, D) array
+        What it contributes [N].
+    at_bound : tuple of str
+        Parameters that stand at a bound.
+    """
+
+    effect: type[CatalogueEffect]
+    drives: Drives
+    parameters: dict[str, Estimate]
+    evidence: float
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    force: Array
+    at_bound: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Return whether the error on held-out data falls with it."""
+        return self.held_out_after < self.held_out_before
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'name': self.name, 'drives': listed(self.drives),
+                'parameters': {key: one.to_json() for key, one in self.parameters.items()},
+                'evidence': self.evidence,
+                'error_before': self.error_before, 'error_after': self.error_after,
+                'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
+
+
+@dataclass(frozen=True)
+class RankedEffect:
+    """A candidate for the first place, or a suspect."""
+
+    name: str
+    drives: Drives
+    evidence: float
+    error_after: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'name': self.name, 'drives': listed(self.drives), 'evidence': self.evidence,
+                'error_after': self.error_after}
+
+
+@dataclass(frozen=True)
+class RankedSet:
+    """A set of effects with its cost.
+
+    Parameters
+    ----------
+    names : tuple of (name, drives)
+        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
+    cost : float
+        Above that of the best set; lower is better.
+    """
+
+    names: tuple[tuple[str, Drives], ...]
+    cost: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what the README adds to the interface."""
+        return {'cost': self.cost, 'effects': [
+            {'name': name, 'drives': listed(drives)} for name, drives in self.names]}
+
+
+@dataclass(frozen=True)
+class WithinModelError:
+    """What was found and may be no more than the lack of fit of adopted effects.
+
+    Parameters
+    ----------
+    name : str
+        Of an effect, or `unknown, VARIABLE`.
+    drives : tuple of str or None
+    rms : float
+        Of its force on the drive where it is largest [N].
+    of : tuple of str
+        Whose lack of fit it may be.
+    """
+
+    name: str
+    drives: Drives
+    rms: float
+    of: tuple[str, ...]
+
+
+def listed(drives: Drives) -> list[str] | None:
+    """Return names of drives for JSON."""
+    return None if drives is None else list(drives)

@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where the model fails: patterns of each drive's error that stand out against its noise.
+
+The same noise, criterion and patterns as in the search for missing effects, without any effect:
+per drive, the pattern that lowers the cost most is stated, what its variable can carry is taken
+out with it, and the search goes on until nothing lowers the cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm, rankdata
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.patterns import Pattern
+from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
+from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.system.parallel import each
+
+MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
+LEAST_SAMPLES = 100
+ROUNDING = 1e-9  # of the effort, below which a difference is no error
+MOST_STATEMENTS = 3  # per drive
+PROPOSALS = 4  # fitted in full, of each scan
+REVERSAL_SHARE = 0.12  # of the samples, the slowest, that friction may leave out at reversals
+LEAST_SCATTER = 1.5  # ratio of variances worth a statement
+
+
+@dataclass(frozen=True)
+class DriveFindings:
+    """What the search says about one drive.
+
+    Parameters
+    ----------
+    statements : tuple of Statement
+    noise : NoiseSpectrum or None
+        Of what remains; None with too few samples to search.
+    """
+
+    statements: tuple[Statement, ...]
+    noise: NoiseSpectrum | None
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """Findings of all drives, and the statements ranked by evidence.
+
+    Parameters
+    ----------
+    statements : tuple of Statement
+    drives : mapping of str to DriveFindings
+    """
+
+    statements: tuple[Statement, ...]
+    drives: dict[str, DriveFindings]
+
+
+def localise(residuals: Residuals, decisions: Decisions = DECISIONS,
+             progress: Callable[[float], None] | None = None) -> Localisation:
+    """Return where the error of each drive lies, as far as noise would not do the same.
+
+    Parameters
+    ----------
+    residuals : Residuals
+        Averaged to at most 16 000 samples first; what is faster than that is not seen.
+    decisions : Decisions
+    progress : callable, optional
+        Called with the share of the work that is done.
+    """
+    thin = residuals.thinned(MOST_SAMPLES)
+    report = progress or (lambda share: None)
+    done: list[int] = []
+
+    def search_drive(drive: int) -> DriveFindings:
+        found = _search(thin, drive, decisions)
+        done.append(drive)
+        report(len(done) / len(thin.drives))
+        return found
+
+    drives = dict(zip(thin.drives, each(search_drive, range(len(thin.drives))), strict=True))
+    for name, statement in levels(thin, {
+            name: found.noise for name, found in drives.items()}, decisions).items():
+        drives[name] = replace(drives[name], statements=(*drives[name].statements, statement))
+    ranked = sorted((statement for findings in drives.values()
+                     for statement in findings.statements), key=lambda one: -one.evidence)
+    return Localisation(tuple(ranked), drives)
+
+
+def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
+           decisions: Decisions) -> dict[str, Statement]:
+    """Return statements on drives whose slow noise is far above its peers'.
+
+    Against the same drive's fast noise, so that drives of different sizes are compared.
+    """
+    slow = {name: noise.rms / noise.fast_rms for name, noise in noises.items()
+            if noise is not None and noise.fast_rms > 0}
+    found = {}
+    for name, ratio in slow.items():
+        peers = [other for key, other in slow.items() if key != name]
+        noise = noises[name]
+        if len(peers) < 2 or noise is None:
+            continue
+        usual = float(np.median(peers))
+        if ratio > decisions.level_ratio * usual:
+            square = (ratio ** 2 - usual ** 2) * noise.fast_rms ** 2
+            share = square / noise.rms ** 2
+            found[name] = Statement(
+                name, 'time', None, float(min(share, 1.0)), 1.0,
+                f'{name}: its error drifts {ratio / usual:.1f} times as much as that of the other '
+                f'drives, {np.sqrt(square):.2g} N rms, with no pattern that stands out',
+                0.0, 'level', float(np.sqrt(square)), float(square))
+    return found
+
+
+def _search(residuals: Residuals, drive: int, decisions: Decisions) -> DriveFindings:
+    measured = residuals.measured[:, drive]
+    known = np.isfinite(measured)
+    if known.sum() < LEAST_SAMPLES:
+        return DriveFindings((), None)
+    regression = Regression(residuals, drives=(drive,))
+    if drive not in regression.series:
+        return DriveFindings((), None)
+    error = residuals.error[known, drive]
+    if np.abs(error).max() <= ROUNDING * np.abs(measured[known]).max():
+        return DriveFindings((), None)
+    prices = replace(Prices.of(regression, decisions), drives=len(residuals.drives))
+    library = PatternLibrary(regression, prices, drive, with_plain_forms=True)
+    fit = regression.fit(())
+    stated: list[tuple[UnknownCandidate, JointFit, float, tuple[str, ...]]] = []
+    blocks: list[Block] = []
+    while len(stated) < MOST_STATEMENTS:
+        winner = _best(library, fit, blocks, {one[0].family.variable for one in stated})
+        if winner is None:
+            break
+        candidate, found, evidence, rivals = winner
+        stated.append((candidate, found, evidence, rivals))
+        blocks += [*candidate.blocks, *_carried(library, candidate)]
+        fit = regression.fit(blocks, found.amplitudes)
+    statements = [word_statement(residuals.drives[drive], library, candidate,
+                                 found.of(candidate.parts[drive]), evidence, rivals)
+                  for candidate, found, evidence, rivals in stated]
+    scatter = _scatter(library, fit, {one[0].family.variable for one in stated})
+    if scatter is not None:
+        statements.append(word_scatter(residuals.drives[drive], library, *scatter))
+    return DriveFindings(tuple(statements), regression.noise(fit)[drive])
+
+
+def _best(library: PatternLibrary, fit: JointFit, blocks: list[Block], stated: set[str],
+          ) -> tuple[UnknownCandidate, JointFit, float, tuple[str, ...]] | None:
+    """Return the pattern that lowers the cost most, with its fit, evidence and rivals."""
+    regression = library.regression
+    chosen: dict[object, tuple[UnknownCandidate, JointFit]] = {}
+    for near in (fit, with_fast_noise(regression, fit)):
+        for candidate, score in library.proposals(near, PROPOSALS, always=True):
+            variable = candidate.family.variable
+            if (variable in stated and candidate.pattern.kind != 'line') or score < -30:
+                continue
+            chosen.setdefault(candidate.key, (candidate, near))
+    scored = []
+    for candidate, near in chosen.values():
+        refined = library.refined(candidate, near)
+        found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
+        scored.append((fit.deviance - found.deviance - refined.price, refined, found))
+    scored.sort(key=lambda one: -one[0])
+    if not scored or scored[0][0] <= 0:
+        return None
+    evidence, winner, found = scored[0]
+    if _is_friction(winner, library):
+        # What follows the sign of all but the slowest motion is the direction's.
+        evidence, winner, found = next(
+            (one for one in scored if one[1].pattern.kind == 'friction' and one[0] > 0), scored[0])
+    margin = library.prices.decisions.rival_margin
+    kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
+    rivals = [one.family.variable for score, one, _ in scored
+              if score > evidence - margin and one.family.variable not in kin]
+    return winner, found, evidence, tuple(dict.fromkeys(rivals))
+
+
+def _is_friction(winner: UnknownCandidate, library: PatternLibrary) -> bool:
+    if winner.family.variable != 'velocity' or winner.pattern.kind != 'directed_range':
+        return False
+    speed = np.abs(library.values('velocity'))
+    assert winner.pattern.limits is not None
+    low, high = winner.pattern.limits
+    return high >= speed.max() and bool(np.mean(speed < low) <= REVERSAL_SHARE)
+
+
+def _carried(library: PatternLibrary, winner: UnknownCandidate) -> list[Block]:
+    """Return all columns that the variable of a statement can carry, as one block each."""
+    if winner.pattern.kind in ('line', 'offset'):
+        return []
+    variables = {winner.family.variable}
+    if winner.family.variable in ('velocity', 'direction'):
+        variables = {'velocity', 'direction'}
+    return [library.family_block(family) for family in library.families
+            if family.variable in variables and not family.paired]
+
+
+def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
+             ) -> tuple[str, Pattern, Array, float] | None:
+    """Return the range in which the noise is larger than elsewhere, if any stands out.
+
+    Ranks of the sizes of innovations stand for them, so that noise need not be Gaussian.
+    """
+    regression, d = library.regression, library.d
+    series = regression.series[d]
+    white = regression.whitened(fit, d, series.inverse(regression.remaining(fit, d)))
+    known = series.known
+    scores = np.zeros(len(white))
+    n = int(known.sum())
+    ranked = norm.ppf((rankdata(np.abs(white[known])) - 0.5) / n)
+    # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
+    scores[known] = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
+    best: tuple[float, str, Pattern, Array] | None = None
+    for family in library.families:
+        if family.paired or family.variable in stated or len(family.columns) == 1:
+            continue
+        # Bins do not overlap, so that sums over patterns are sums over their bins.
+        members = family.columns[:, known] > 0.5
+        inside = family.weights @ members.sum(axis=1)
+        totals = family.weights @ (members @ scores[known])
+        gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - library.price(family)
+        for at in np.argsort(-gains):
+            pattern, gain = family.patterns[at], float(gains[at])
+            if gain <= max(0.0, best[0] if best else 0.0):
+                break
+            if pattern.kind not in ('range', 'fast') or totals[at] <= 0:
+                continue
+            column = family.pattern_columns(int(at))[0]
+            held = column[known] > 0.5
+            ratio = (np.mean(white[known][held] ** 2)
+                     / max(float(np.mean(white[known][~held] ** 2)), 1e-300))
+            if ratio >= LEAST_SCATTER:
+                best = (gain, family.variable, Pattern('scatter', pattern.limits, float(ratio)),
+                        column)
+    if best is None:
+        return None
+    gain, variable, pattern, column = best
+    # Scatter that comes and goes by itself makes sizes go together: they are worth fewer samples.
+    centred = scores.copy()
+    for part in (known & (column > 0.5), known & ~(column > 0.5)):
+        centred[part] -= centred[part].mean()
+    lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
+    worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
+    price = library.prices.of_pattern(1, 1, 1)
+    score = worth * (gain + price) - price
+    return (variable, pattern, column, score) if score > 0 else None

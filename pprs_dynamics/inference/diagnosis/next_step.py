@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What to do after a diagnosis: in words, and as a command with the real names of files."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass, replace
+
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.quantities import listed
+
+SECOND = 'SECOND_RECORDING'  # that is still to be made
+
+
+@dataclass(frozen=True)
+class GivenFiles:
+    """Names of the files of a diagnosis, for commands that can be copied.
+
+    Parameters
+    ----------
+    recordings, validate : tuple of str
+    model : str
+        '' for the default.
+    """
+
+    recordings: tuple[str, ...] = ('RECORDING',)
+    validate: tuple[str, ...] = ()
+    model: str = ''
+
+    def command(self, *words: str, held_out: bool = False) -> str:
+        """Return a command of `pprs` on the recordings, then options; quoted for a shell.
+
+        Parameters
+        ----------
+        words : str
+            The command and its first arguments; from the first that starts with `--` on they
+            stand behind the recordings.
+        held_out : bool
+            Whether it takes --validate.
+        """
+        first = next((k for k, word in enumerate(words) if word.startswith('--')), len(words))
+        given = ['pprs', *words[:first], *self.recordings]
+        if held_out:
+            given += [part for name in self.validate for part in ('--validate', name)]
+        given += ['--model', self.model] if self.model else []
+        return shlex.join([*given, *words[first:]])
+
+
+PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
+
+
+def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
+    """Return what to do next, and the command for it."""
+    repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
+    if diagnosis.verdict == 'unknown':
+        return ('Look at that place on the machine, and record the motion again: what comes back '
+                'is the machine. Then diagnose both recordings', repeat)
+    if diagnosis.verdict == 'ambiguous':
+        return ('Record a motion that tells the candidates apart; this designs it',
+                files.command('next-experiment', '--output', 'next.csv'))
+    if doubted := [one.name for one in diagnosis.effects if not one.is_confirmed]:
+        return (f'Do not add {listed(doubted)} on this evidence. Record another motion, and '
+                'diagnose both recordings', repeat)
+    if len(diagnosis.effects) == 1:
+        found = diagnosis.effects[0]
+        return ('Confirm it on the machine, then add it', files.command(
+            'adopt', found.name, '--output', f'with_{found.name}.yaml', held_out=True))
+    if diagnosis.effects:
+        return ('Confirm them on the machine, then add them', files.command(
+            'diagnose', '--adopt-all', '--output', 'better.yaml', held_out=True))
+    if diagnosis.suspects:
+        return ('Repeat the recording: what comes back is the machine, what does not was noise',
+                repeat)
+    return ('Nothing to add. Another motion may show what this one does not excite',
+            GivenFiles((SECOND,), (), files.model).command('diagnose'))

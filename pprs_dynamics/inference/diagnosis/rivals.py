@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Rivals of adopted effects, fitted: what stands in their place in sets nearly as good."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.estimates import Estimate, estimate
+from pprs_dynamics.inference.search.expansion import fitted_model, linear_error, linear_residual
+from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.residuals.paired_errors import rms
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+
+
+@dataclass(frozen=True)
+class RivalEffect:
+    """An effect that would explain the recordings about as well as an adopted one.
+
+    Parameters
+    ----------
+    of : str
+        The adopted effect.
+    effect : type of CatalogueEffect
+    drives : tuple of str or None
+    parameters : dict of str to Estimate
+    error_after : float
+        With it in place of the adopted one [N].
+    held_out_after : float
+        The same on held-out data [N]; NaN where it is no model that can be evaluated there.
+    cost : float
+        Of its set, above the best one's.
+    force, remaining : (M, D) array
+        What it contributes, and what its set leaves [N].
+    """
+
+    of: str
+    effect: type[CatalogueEffect]
+    drives: tuple[str, ...] | None
+    parameters: dict[str, Estimate]
+    error_after: float
+    held_out_after: float
+    cost: float
+    force: Array
+    remaining: Array
+
+    @property
+    def name(self) -> str:
+        """Name in the catalogue."""
+        return self.effect.name
+
+
+def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
+                  ) -> tuple[RivalEffect, ...]:
+    """Return each rival that a diagnosis names, from the best set that holds it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    validate : sequence of Recording, optional
+        Those of the diagnosis; without them held-out errors are taken on blocks.
+    """
+    selection = diagnosis.selection
+    if selection is None:
+        return ()
+    found = []
+    for of, name in ((names[0], name) for names in diagnosis.indistinguishable
+                     for name in names[1:]):
+        best = next((one for one in selection.ranked if name in {c.name for c in one.effects}
+                     and of not in {c.name for c in one.effects}), None)
+        if best is None:
+            continue
+        search = (selection.last if any(one is best for one in selection.last.evaluated.values())
+                  else selection.first)
+        candidate = next(c for c in best.effects if c.name == name)
+        remaining = linear_residual(search, best)
+        drives = candidate.drives
+        found.append(RivalEffect(
+            of, candidate.effect,
+            None if drives is None else tuple(search.design.drives[d] for d in drives),
+            estimate(search, best, candidate).parameters,
+            linear_error(search, best), _held_out(search, best, validate),
+            best.cost - selection.best.cost,
+            best.force(candidate, remaining.shape), remaining))
+    return tuple(found)
+
+
+def _held_out(search: Search, found: CandidateSet, validate: Sequence[Recording]) -> float:
+    if not validate:
+        return hold_out(search, found).error
+    try:
+        return rms(measure_residuals(fitted_model(search, found), validate)[0])
+    except PprsError:
+        return float('nan')

@@ -1,0 +1,354 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a diagnosis found, in plain sentences; terminal and page only lay them out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.found_effects import (
+    FoundEffect,
+    RankedEffect,
+    WithinModelError,
+)
+from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
+from pprs_dynamics.inference.diagnosis.quantities import (
+    INTERVAL,
+    change,
+    in_unit,
+    listed,
+    plain,
+    sentence,
+    with_drives,
+    with_uncertainty,
+)
+from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
+from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.inference.diagnosis.unknown_words import describe_unexplained, place_on
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import Parameter
+from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
+
+MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
+AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was found.
+
+    Parameters
+    ----------
+    title : str
+    what, why, cause, confirm : str
+        What is missing, why we think so, what could have caused it, how to confirm it.
+    mark : str
+        How it shows in the error.
+    remarks : tuple of str
+        What else must be known.
+    """
+
+    title: str
+    what: str
+    why: str
+    cause: str
+    confirm: str
+    mark: str = ''
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FittedValue:
+    """A fitted parameter as people read it; `drive` is '' for none."""
+
+    effect: str
+    drive: str
+    parameter: Parameter
+    text: str
+
+
+@dataclass(frozen=True)
+class Sentences:
+    """A diagnosis in words.
+
+    Parameters
+    ----------
+    headline : str
+        The verdict.
+    effects : tuple of Finding
+        In the order of `Diagnosis.effects`.
+    rivals : tuple of Finding
+        In the order of those given to `word_diagnosis`.
+    unexplained : tuple of Finding
+        In the order of `unexplained_groups`.
+    suspects, within_model_error, calibrated, warnings : tuple of str
+    following, command : str
+        What to do next, in words and for a shell.
+    """
+
+    headline: str
+    effects: tuple[Finding, ...]
+    rivals: tuple[Finding, ...]
+    unexplained: tuple[Finding, ...]
+    suspects: tuple[str, ...]
+    within_model_error: tuple[str, ...]
+    calibrated: tuple[str, ...]
+    warnings: tuple[str, ...]
+    following: str
+    command: str
+
+
+def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
+                   rivals: Sequence[RivalEffect] = ()) -> Sentences:
+    """Return a diagnosis in words.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    files : GivenFiles, optional
+        For the command to go on with.
+    rivals : sequence of RivalEffect, optional
+        As `rival_effects` finds them.
+    """
+    following, command = next_step(diagnosis, files)
+    return Sentences(
+        _headline(diagnosis),
+        tuple(_effect(diagnosis, one, k == 0) for k, one in enumerate(diagnosis.effects)),
+        tuple(_rival(diagnosis, one) for one in rivals),
+        tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
+              for group in unexplained_groups(diagnosis)),
+        tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
+        tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
+        tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
+        diagnosis.warnings, following, command)
+
+
+def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
+    """Return the statements on what no effect explains, those of one pattern together."""
+    groups: dict[object, list[Statement]] = {}
+    for one in diagnosis.depends_on:
+        groups.setdefault((one.variable, one.kind, one.range), []).append(one)
+    return [tuple(group) for group in groups.values()]
+
+
+def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
+    """Return all that was fitted and not left at zero, in the order of adoption and of drives."""
+    return [FittedValue(effect.name, drive, parameter,
+                        with_uncertainty(one.value, one.std, one.unit))
+            for effect in diagnosis.effects for drive, parameter, one in _fitted(diagnosis, effect)]
+
+
+def _headline(diagnosis: Diagnosis) -> str:
+    held, unit = [e for e in diagnosis.effects if e.is_confirmed], diagnosis.residuals.unit
+    named = listed([_or_rivals(diagnosis, one) for one in held])
+    doubt = _doubt(diagnosis)
+    fall = '' if not held else (
+        f' With {"it" if len(held) == 1 else "them"} the error '
+        f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
+    if diagnosis.verdict == 'unknown':
+        groups = unexplained_groups(diagnosis)
+        places = listed([place_on(group) for group in groups[:2]])
+        more = len(groups) - 2
+        places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
+        beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
+        return ('Something is missing that no effect of the catalogue explains: '
+                f'{places}.{beside}{doubt}')
+    noise = in_unit(diagnosis.noise_floor, unit)
+    if diagnosis.verdict == 'adequate':
+        return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
+                'that could still hide in it.')
+    if not held:
+        return f'Nothing that was found holds on held-out data.{doubt}'
+    left = held[-1].error_after
+    level = (', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
+             else f'. The noise is {noise}; the rest is within the model error of what was found.'
+             if diagnosis.within_model_error
+             # Only the widths of reversals are fitted and yet not part of the model.
+             else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
+             'over in another width than the model\'s.')
+    which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
+    return f'The model lacks {named}{which}.{fall}{level}{doubt}'
+
+
+def _doubted(diagnosis: Diagnosis) -> list[str]:
+    """Return effects that held-out data do not confirm."""
+    return [one.name for one in diagnosis.effects if not one.is_confirmed]
+
+
+def _doubt(diagnosis: Diagnosis) -> str:
+    names = _doubted(diagnosis)
+    return '' if not names else (
+        f' {listed(names)} {"was" if len(names) == 1 else "were"} fitted as well, but the error '
+        f'on held-out data does not fall with {"it" if len(names) == 1 else "them"}.')
+
+
+def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
+    own = with_drives(effect.name, effect.drives, diagnosis.residuals.drives)
+    return listed([own, *_rivals(diagnosis, effect)], 'or')
+
+
+def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
+    return [name for names in diagnosis.indistinguishable if names[0] == effect.name
+            for name in names[1:]]
+
+
+def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
+    card = found.effect.card_in(diagnosis.model.kind)
+    title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
+    lacks = f'The model lacks {title}' if found.is_confirmed else (
+        f'Fitted, but not confirmed: {title}')
+    what = f'{lacks}: {_parameters(diagnosis, found)}'
+    if issubclass(found.effect, MeasurementEffect):
+        what += ('. This is what the sensor says, not what the drive must do: it enters '
+                 'comparisons and the monitor, never a command')
+    return Finding(
+        title, f'{what}.', _why(diagnosis, found, is_first), sentence(card.causes),
+        sentence(card.confirm), sentence(card.looks_like),
+        (*_ambiguous(diagnosis, found), *_negative(diagnosis, found),
+         *_two_in_one(diagnosis, found), *_bound(found)))
+
+
+def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
+    card = rival.effect.card_in(diagnosis.model.kind)
+    title = with_drives(rival.name, rival.drives, diagnosis.residuals.drives)
+    held_out = '' if isnan(rival.held_out_after) else (
+        f', and {in_unit(rival.held_out_after, diagnosis.residuals.unit)} on held-out data')
+    return Finding(
+        f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '
+        f'{_parameters(diagnosis, rival)}.',
+        f'With it the error is {in_unit(rival.error_after, diagnosis.residuals.unit)}{held_out}; '
+        f'the cost of the set is {plain(rival.cost, 2)} above the best one.', sentence(card.causes),
+        sentence(card.confirm), sentence(card.looks_like))
+
+
+def _parameters(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
+    fitted = _fitted(diagnosis, found)
+    drives = {drive for drive, _, _ in fitted}
+    if len(drives) <= MOST_LISTED:
+        return ', '.join(
+            f'{parameter.description} ({parameter.symbol}) '
+            + with_uncertainty(one.value, one.std, one.unit)
+            + (f' on {drive}' if len(drives) > 1 else '') for drive, parameter, one in fitted)
+    phrases = []
+    for parameter in found.effect.parameters:
+        mine = sorted(((one, drive) for drive, p, one in fitted if p is parameter),
+                      key=lambda pair: pair[0].value)
+        if not mine:
+            continue
+        ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
+        phrases.append(f'{parameter.description} ({parameter.symbol}) ' + ' to '.join(
+            f'{with_uncertainty(one.value, one.std, one.unit)} ({drive})' for one, drive in ends))
+    return ', '.join(phrases)
+
+
+def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
+            ) -> list[tuple[str, Parameter, Estimate]]:
+    """Return drive ('' for none), parameter and estimate of what was not left at zero."""
+    known = {parameter.name: parameter for parameter in found.effect.parameters}
+    order = ['', *diagnosis.residuals.drives]
+    rows = []
+    for key, estimate in found.parameters.items():
+        drive, _, name = key.rpartition('.')
+        if estimate.value or estimate.std:
+            rows.append((drive, known[name], estimate))
+    return sorted(rows, key=lambda row: order.index(row[0]))
+
+
+def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
+    fresh, unit = diagnosis.held_out_on == 'validation', diagnosis.residuals.unit
+    held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
+                fresh else 'On blocks of the same recording, each predicted from the others, it ')
+    held_out += change(found.held_out_before, found.held_out_after, unit)
+    held_out += '' if found.is_confirmed else ': do not adopt it'
+    if not fresh:
+        held_out += ('; that is the weaker evidence, a recording of another motion with '
+                     '--validate is the stronger' if is_first else ' (the weaker evidence)')
+    return (f'With it the error {change(found.error_before, found.error_after, unit)}. '
+            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
+
+
+def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
+    rivals = _rivals(diagnosis, found)
+    if not rivals:
+        return []
+    return [f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
+            'explain it about as well.']
+
+
+def _negative(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
+    remarks = []
+    for drive, parameter, one in _fitted(diagnosis, found):
+        lowest = found.effect.unphysical_below.get(parameter.name)
+        if lowest is None or one.value >= lowest:
+            continue
+        place = f'{found.name}{f" on {drive}" if drive else ""}'
+        value = with_uncertainty(one.value, one.std, one.unit)
+        kind = 'friction' if 'friction' in found.name else parameter.description
+        sure = one.value + INTERVAL * one.std < lowest
+        remarks.append(
+            f'{place}: {parameter.description} is negative, {value}'
+            + ('' if sure else ', though zero is within its uncertainty')
+            + f'. There is no negative {kind}: either the model has too much of it already, or '
+            'something else looks like it.')
+    return remarks
+
+
+def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
+    """Return how the dry part of asymmetric friction reads as two other effects."""
+    if found.effect is not AsymmetricFriction:
+        return []
+    forces: dict[str, dict[str, Estimate]] = {}
+    for drive, parameter, one in _fitted(diagnosis, found):
+        if parameter.name.startswith('force_'):
+            forces.setdefault(drive, {})[parameter.name] = one
+    remarks = []
+    for drive, both in forces.items():
+        unit = diagnosis.residuals.units_of(drive).effort
+        forward, backward = (both[key].value if key in both else 0.0
+                             for key in ('force_forward', 'force_backward'))
+        remarks.append(
+            f'{drive}: the dry part is the same as coulomb_friction of '
+            f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
+            f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the one '
+            'from the two, a reading at rest can.')
+    return remarks
+
+
+def _bound(found: FoundEffect) -> list[str]:
+    if not found.at_bound:
+        return []
+    return [f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of what '
+            'was tried: not to be trusted.']
+
+
+def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:
+    return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}: may be there, but '
+            f'slow noise would explain the same (evidence {one.evidence:.0f}, where 0 is the '
+            'threshold); repeat the recording')
+
+
+def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
+    return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}, '
+            f'{in_unit(one.rms, diagnosis.residuals.unit)} rms, is within the model error of '
+            f'{listed(one.of)}: a real machine is only nearly of the form that the catalogue '
+            'gives it. Not adopted')
+
+
+def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
+    # Widths of reversals come without an uncertainty: no more digits than they can have.
+    after = with_uncertainty(one.after, one.std, one.unit) if one.std else (
+        f'about {with_uncertainty(float(f"{one.after:.2g}"), 0.0, one.unit)}')
+    moved = f'{one.label}: {with_uncertainty(one.before, 0.0, one.unit)} becomes {after}'
+    tolerance = diagnosis.model.values.get(f'tolerances.{one.key}')
+    if not tolerance:
+        return f'{moved}: calibrated'
+    change = abs(one.after - one.before)
+    within = change <= tolerance * abs(one.before) + INTERVAL * one.std
+    return (f'{moved}, within its tolerance of {tolerance:.2g} ({tolerance:.0%}): calibrated, not '
+            'an effect' if within else
+            f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')

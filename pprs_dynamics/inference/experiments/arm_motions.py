@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Motions of an arm within its limits: Fourier series of the joints, and the search among them.
+
+Each joint moves from rest to rest, from the middle of its range, within the limits of the URDF;
+whether links touch each other is not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
+
+HARMONICS = 8  # of the duration
+WIDEST = np.pi  # [rad, m]: a joint is not moved further from the middle, whatever its range
+LOOKED_AT = 150  # samples of a motion, for its efforts and for what it tells
+CHECKED = 2000  # samples at which limits are checked
+DRAWN, CLIMBED = 40, 160  # motions drawn at random, and steps from the best of them
+STEP = 0.3  # of a coefficient of unit size, at the first step; it shrinks to a tenth
+SHRINKS, SHRINK = 40, 0.93  # until a motion keeps the limits
+TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class ArmLimits:
+    """Limits of a motion beside those of the URDF.
+
+    Parameters
+    ----------
+    velocity, acceleration : float
+        Of every joint [rad/s, rad/s^2, or m/s, m/s^2]; the URDF's speeds hold too.
+    margin : float
+        Share of every limit that stays unused.
+    effort_reserve : float
+        Taken off the efforts for what the model does not know of [N m, N].
+    """
+
+    velocity: float = np.inf
+    acceleration: float = 5.0
+    margin: float = 0.1
+    effort_reserve: float = 0.0
+
+
+class ArmMotions:
+    """Motions of one duration within limits.
+
+    Parameters
+    ----------
+    model : ArmModel
+    limits : ArmLimits
+    duration : float
+    """
+
+    def __init__(self, model: ArmModel, limits: ArmLimits, duration: float) -> None:
+        tree, left = model.arm.tree, 1 - limits.margin
+        self.model, self.duration = model, duration
+        lower, upper = np.maximum(tree.lower, -WIDEST), np.minimum(tree.upper, WIDEST)
+        self.middle, self.reach = (lower + upper) / 2, left * (upper - lower) / 2
+        self.speed = left * np.minimum(tree.speed, limits.velocity)
+        self.acceleration = np.full(len(model.drives), left * limits.acceleration)
+        self.effort = np.maximum(left * tree.effort - limits.effort_reserve, 0.0)
+
+    def within_limits(self, drawn: Array, harmonics: int = HARMONICS,
+                      share: Array | float = 1.0) -> JointSeries:
+        """Return the largest motion of a shape that keeps the limits.
+
+        Parameters
+        ----------
+        drawn : (n, p) array
+            Coefficients of the series of each joint, of any size.
+        harmonics : int
+        share : float or (n,) array
+            Of the largest motion of each joint.
+        """
+        time = np.linspace(0, self.duration, CHECKED)
+        found = JointSeries(drawn, self.middle, self.duration, harmonics)
+        motion = found.motion(time)
+        uses = np.max([np.abs(values).max(axis=0) / bound for values, bound in (
+            (motion.position - self.middle, self.reach), (motion.velocity, self.speed),
+            (motion.acceleration, self.acceleration))], axis=0)
+        found = replace(found, coefficients=drawn * (
+            np.broadcast_to(share, len(uses)) / np.maximum(uses, TINY))[:, None])
+        few = time[::CHECKED // LOOKED_AT]
+        for _ in range(SHRINKS):
+            efforts = self.model.drive_forces(found.motion(few)).total
+            if np.all(np.abs(efforts) <= self.effort):
+                break
+            found = replace(found, coefficients=SHRINK * found.coefficients)
+        return found
+
+    def uses(self, found: JointSeries) -> dict[str, float]:
+        """Return the use of each limit, the margin taken off."""
+        motion = found.motion(np.linspace(0, self.duration, CHECKED))
+        efforts = self.model.drive_forces(motion).total
+        return {name: float(np.max(np.abs(values) / bound)) for name, values, bound in (
+            ('range', motion.position - self.middle, self.reach),
+            ('speed', motion.velocity, self.speed),
+            ('acceleration', motion.acceleration, self.acceleration),
+            ('effort', efforts, np.maximum(self.effort, TINY)))}
+
+
+def best_motion(
+    motions: ArmMotions, value: Callable[[JointSeries], float], seed: int,
+    highest: Sequence[int] = (HARMONICS,), smallest: float = 1.0,
+    progress: Callable[[float], None] | None = None,
+) -> JointSeries:
+    """Return the motion of the largest value: the best of many drawn, and steps from there.
+
+    Parameters
+    ----------
+    motions : ArmMotions
+    value : callable
+    seed : int
+    highest : sequence of int
+        Highest harmonics that are drawn.
+    smallest : float
+        Share of the largest motion of a joint; from there to 1 is drawn, evenly in its logarithm.
+    progress : callable, optional
+        Called with the share that is done.
+    """
+    random = np.random.default_rng(seed)
+    count = len(motions.middle)
+    best, most, best_share = None, -np.inf, np.ones(count)
+    for k in range(DRAWN + CLIMBED):
+        if progress is not None:
+            progress(k / (DRAWN + CLIMBED))
+        if best is None or k < DRAWN:
+            harmonics = int(random.choice(highest))
+            drawn = random.normal(size=(count, JointSeries.size(harmonics)))
+            share = np.exp(random.uniform(np.log(smallest), 0.0, count))
+        else:
+            step = STEP * (1 - 0.9 * (k - DRAWN) / CLIMBED)
+            harmonics, shape = best.harmonics, best.coefficients
+            drawn = (shape / np.abs(shape).max(axis=1, keepdims=True)
+                     + step * random.normal(size=shape.shape))
+            share = np.minimum(best_share * np.exp(
+                -step * np.log(smallest) * random.normal(size=count)), 1.0)
+        tried = motions.within_limits(drawn, harmonics, share)
+        told = value(tried)
+        if told > most:
+            best, most, best_share = tried, told, share
+    assert best is not None
+    return best

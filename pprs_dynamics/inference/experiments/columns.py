@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Columns of the regression on a motion that nobody has made yet.
+
+They are those of `regression.design`, in the same order and scale, so that what a new motion
+would tell adds to what the recordings have told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import (
+    BaseColumn,
+    KnownNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+    present_values,
+)
+from pprs_dynamics.inference.regression.collecting import sensitivities_of
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.platform_sensitivities import ChunkSensitivities
+from pprs_dynamics.inference.regression.sensitivities import (
+    DRIVE_WIDTHS,
+    HOMING,
+    NUMBERS,
+    OF_DRIVES,
+    PRESENT,
+)
+from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
+from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+
+HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
+Columns = Mapping[int, tuple[np.typing.NDArray[np.int_], Array]]
+"""By drive: places of the columns that it feels, (p,), and these in time, (p, M) [N]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTerm:
+    """An effect on a drive or in the structure, with values.
+
+    Its columns are those of its coefficients (of one that is 1 where the shape says it all), then
+    the derivatives by its shape parameters, per amount of movement.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drive : int or None
+    shape : mapping of str to float
+    names : tuple of str
+        Coefficients that are fitted.
+    values : (k,) array
+        Theirs; 1 where the shape says it all.
+    """
+
+    effect: type[CatalogueEffect]
+    drive: int | None
+    shape: Mapping[str, float]
+    names: tuple[str, ...]
+    values: Array
+
+    @classmethod
+    def at_scale(cls, effect: type[CatalogueEffect], drive: int | None,
+                 shape: Mapping[str, float], absent: frozenset[str] = frozenset()) -> FittedTerm:
+        """Return an effect with its coefficients at the sizes at which they matter."""
+        present = [c for c in effect.coefficients if c.name not in absent]
+        return cls(effect, drive, shape, tuple(c.name for c in present),
+                   np.array([c.scale for c in present] or [1.0]))
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return len(self.values) + len(self.shape)
+
+    @property
+    def free(self) -> slice:
+        """Columns whose coefficients are fitted."""
+        return slice(len(self.values) - len(self.names), None)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of the free columns: coefficients, then shape parameters."""
+        known = {c.name: c for c in self.effect.coefficients}
+        return (*(known[name] for name in self.names), *self.effect.shape)
+
+    @property
+    def scales(self) -> Array:
+        """Sizes at which the coefficients of the free columns matter; shapes by a factor of e."""
+        return np.array([p.scale for p in self.parameters[:len(self.names)]]
+                        + [1.0] * len(self.shape))
+
+    def rows(self, design: Design) -> Rows:
+        """Return its columns on recordings or on a motion."""
+        term = design.find_term(self.effect, self.drive, self.shape)
+        chosen = [term.names.index(name) for name in self.names] or [0]
+        rows = {d: values[chosen] for d, values in term.rows.items()}
+        if self.shape:
+            assert self.drive is not None
+            every = np.zeros(len(term.names) or 1)
+            every[chosen] = self.values
+            rows[self.drive] = np.concatenate(
+                (rows[self.drive], design.slope_rows(term, every)))
+        return rows
+
+
+class _WholeColumns(NamedTuple):
+    """Columns of motions one after the other, (K, N, D) each; see `Sensitivities.columns`."""
+
+    numbers: Array
+    drive_widths: Array
+    joint_widths: Array
+    structure: Mapping[type[StructureEffect], Array]
+    homing: Array
+
+
+@dataclass(frozen=True)
+class ColumnPlan:
+    """Which columns are wanted, and how they are computed.
+
+    Parameters
+    ----------
+    given, model : ForceModel
+        As the user has it; and around which forces are linear.
+    base : tuple of BaseColumn
+        As the design has them; their rows are those of the recordings, if any.
+    terms : tuple of FittedTerm
+    """
+
+    given: ForceModel
+    model: ForceModel
+    base: tuple[BaseColumn, ...]
+    terms: tuple[FittedTerm, ...]
+
+    @classmethod
+    def of_design(cls, design: Design, terms: Sequence[FittedTerm]) -> ColumnPlan:
+        """Return the plan of a design's base columns and more.
+
+        A drive that stood has no columns of its reversals in the design, but may turn over in a
+        motion.
+        """
+        moved = {one.drive for one in design.base if isinstance(one, ReversalShape)}
+        stood = [drive for drive in range(len(design.drives)) if drive not in moved]
+        return cls(design.given, design.model, (*design.base, *reversal_shapes(stood)),
+                   tuple(terms))
+
+    @property
+    def size(self) -> int:
+        """Number of all columns, base columns first."""
+        return len(self.base) + sum(term.size for term in self.terms)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Places of the model's own numbers."""
+        return tuple(k for k, one in enumerate(self.base) if isinstance(one, KnownNumber))
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Places of the other base columns."""
+        return tuple(k for k in range(len(self.base)) if k not in self.numbers)
+
+    def places(self) -> dict[FittedTerm, slice]:
+        """Return where each term's columns stand."""
+        ends = len(self.base) + np.cumsum([term.size for term in self.terms])
+        return {term: slice(int(end) - term.size, int(end))
+                for end, term in zip(ends, self.terms, strict=True)}
+
+    def on_recordings(self, design: Design) -> Columns:
+        """Return all columns on the recordings of the design that the plan is of."""
+        return self._by_drive([one.rows for one in self.base], design)
+
+    def on_motions(self, forces: Forces, time: Array, block: int = 1) -> list[Columns]:
+        """Return the columns of motions one after the other, each at the same times.
+
+        Parameters
+        ----------
+        forces : Forces
+            Of the model, before its sensors; M motions of N samples.
+        time : (N,) array
+        block : int
+            Samples that are averaged.
+        """
+        samples = len(time)
+        found = self._whole_columns(forces, samples)
+        shared = dict(zip(self.numbers, found.numbers, strict=True))
+        for k, one in enumerate(self.base):
+            if isinstance(one, ReversalShape):
+                shared[k] = (found.joint_widths if one.drive is None
+                             else found.drive_widths)[one.number]
+        treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
+        result = []
+        for start in range(0, len(forces.total), samples):
+            part = slice(start, start + samples)
+
+            def by_drive(column: Array) -> dict[int, Array]:
+                return dict(enumerate(treat(column).T))
+
+            design = replace(
+                self._motion_design(forces, part, time, treat, block), structure=tuple(
+                    Term(effect, None, {}, {d: treat(rows[:, part, d].T).T
+                                            for d in range(len(self.model.drives))})
+                    for effect, rows in found.structure.items()),
+                homing=tuple(by_drive(column[part]) for column in found.homing))
+            base = [self._present(one, design) if isinstance(
+                        one, (PresentCoefficient, PresentShape))
+                    else _felt(one, by_drive(shared[k][part])) for k, one in enumerate(self.base)]
+            result.append(self._by_drive(base, design))
+        return result
+
+    def _whole_columns(self, forces: Any, samples: int) -> _WholeColumns:
+        """Return the columns of all motions at full rate that do not need one motion alone."""
+        numbers = tuple(one.number for one in self.base if isinstance(one, KnownNumber))
+        wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
+            one, (FittedTerm, PresentCoefficient, PresentShape))}
+        structure = tuple(effect for effect in wanted if issubclass(effect, StructureEffect))
+        shifts = any(issubclass(effect, MeasurementEffect) and effect.shifts_positions()
+                     for effect in wanted)
+        none = np.zeros((0, *forces.total.shape))
+        if isinstance(self.model, DriveModel):
+            found = ChunkSensitivities(self.model, forces)
+            return _WholeColumns(
+                found.of_numbers(numbers), found.of_drive_widths(), found.of_passive_widths(),
+                {effect: np.stack([full for full, _ in found.of_structure(effect)])
+                 for effect in structure}, self._homing(found, samples) if shifts else none)
+        sensitivities = sensitivities_of(self.model, self.given)
+        known = {effect.name for effect in self.given.effects}
+        sensitivities.searched = tuple(one for one in structure if one.name not in known)
+        columns = sensitivities.columns(forces)
+        return _WholeColumns(
+            columns[NUMBERS], columns[OF_DRIVES], none,
+            {effect: columns[(PRESENT if effect.name in known else '') + effect.name]
+             for effect in structure}, columns.get(HOMING, none) if shifts else none)
+
+    def _present(self, column: PresentCoefficient | PresentShape, design: Design) -> Rows:
+        """Return the column of what the given model has already on one motion."""
+        effect = next(e for e in self.model.effects if type(e) is column.effect)
+        assert isinstance(effect, CatalogueEffect)
+        values = present_values(effect, column.drive)
+        drive = None if column.drive is None else self.model.drives.index(column.drive)
+        term = design.find_term(column.effect, drive,
+                                {p.name: values[p.name] for p in column.effect.shape})
+        if isinstance(column, PresentCoefficient):
+            at = term.names.index(column.coefficient.name)
+            return {d: rows[at] * column.coefficient.scale for d, rows in term.rows.items()}
+        assert drive is not None
+        weights = effect.to_coefficients(values)
+        slopes = design.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
+        return {drive: slopes[column.effect.shape.index(column.parameter)]}
+
+    def _homing(self, found: ChunkSensitivities, samples: int) -> Array:
+        """Return the columns of wrong zeros by drive, (6, N, 6)."""
+        every = np.arange(len(found.state.velocity))
+        kept = every[::max(1, samples // HOMING_SAMPLES)]
+        return np.stack([np.stack([np.interp(every, kept, column) for column in rows.T], axis=1)
+                         for rows in found.of_homing(kept)])
+
+    def _motion_design(self, forces: Forces, part: slice, time: Array, treat: Treatment,
+                       block: int) -> Design:
+        s, total = forces.mechanism, forces.total[part]
+        full = FullRate(time, s.position[part], s.velocity[part], s.acceleration[part],
+                        s.direction[part], s.guide_load[part], total, total,
+                        (slice(0, len(time)),), treat, float(time[0]))
+        means = treat(total)
+        residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),
+                              means, means, period=float(time[1] - time[0]) * block)
+        return Design(self.given, self.model, residuals, (full,), (), (), (), (), (), means)
+
+    def _by_drive(self, base: Sequence[Rows], design: Design) -> Columns:
+        """Return base columns and those of the terms, drive by drive."""
+        terms = [(place, term.rows(design)) for term, place in self.places().items()]
+        found = {}
+        for d in range(len(self.model.drives)):
+            index = [k for k, rows in enumerate(base) if d in rows]
+            parts = [base[k][d][None] for k in index]
+            for place, rows in terms:
+                if d in rows:
+                    index += range(place.start, place.stop)
+                    parts.append(rows[d])
+            found[d] = (np.array(index, dtype=int), np.concatenate(parts))
+        return found
+
+
+def _felt(column: BaseColumn, rows: Rows) -> Rows:
+    """Return the rows of a column on the drives that may feel it."""
+    if isinstance(column, ReversalShape) and column.drive is not None:
+        return {column.drive: rows[column.drive]}
+    return rows
+
+
+def reversal_shapes(drives: Sequence[int]) -> list[ReversalShape]:
+    """Return the columns of reversals of drives, without rows."""
+    # One for every width, and one for friction that differs by direction while it turns over.
+    return [ReversalShape({}, 1.0, drive, number)
+            for number, _ in enumerate((*DRIVE_WIDTHS, None)) for drive in drives]

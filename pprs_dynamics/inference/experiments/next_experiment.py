@@ -1,0 +1,334 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The next experiment: the whole way from recordings to the motion that would tell most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
+from pprs_dynamics.inference.experiments.arm_search import ArmSearch
+from pprs_dynamics.inference.experiments.columns import FittedTerm
+from pprs_dynamics.inference.experiments.commissioning import commissioning
+from pprs_dynamics.inference.experiments.criteria import Contest, Precision
+from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.question import Question, precision_of, question_of
+from pprs_dynamics.inference.experiments.trajectory_search import Found, TrajectorySearch
+from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+
+PURPOSES = ('separate', 'commission')
+SURE = 0.9  # probability from which a design counts as separating
+SHORTEST, LONGEST = 5.0, 120.0  # [s]
+RESERVE = 4.0  # standard deviations of noise that efforts are kept below their limits by
+
+
+class PurposeError(PprsError, ValueError):
+    """A purpose that needs what is not given."""
+
+
+@dataclass(frozen=True)
+class ExpectedEvidence:
+    """What a motion promises for one contest.
+
+    Parameters
+    ----------
+    truth, rival : str
+    now, expected : float
+        By how much the rival costs more in a diagnosis: of the recordings, and with the motion.
+    probability : float
+        That the rival falls behind by what a diagnosis asks for.
+    """
+
+    truth: str
+    rival: str
+    now: float
+    expected: float
+    probability: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'truth': self.truth, 'rival': self.rival, 'evidence_now': self.now,
+                'expected_evidence': self.expected, 'probability': self.probability}
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How well a number would be known.
+
+    Parameters
+    ----------
+    label : str
+    unit : str
+    scale : float
+        Size at which it matters, or the tolerance's standard deviation.
+    before, after : float
+        Standard deviations.
+    """
+
+    label: str
+    unit: str
+    scale: float
+    before: float
+    after: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'label': self.label, 'unit': self.unit, 'scale': self.scale,
+                'std_before': self.before, 'std_after': self.after}
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A motion with what it promises.
+
+    Parameters
+    ----------
+    kind : {'separate', 'estimate', 'excite', 'commission'}
+    subjects : tuple of str
+        Effects in question.
+    contests : tuple of ExpectedEvidence
+    accuracies : tuple of Accuracy
+    expected_evidence : float
+        The least of all contests that it decides; without contests, of all effects in question
+        against their absence.
+    hidden : tuple of str
+        Effects in question that would not show at the size at which they matter.
+    limits : dict of str to float
+        Use of each limit, its margin taken off: at most 1.
+    duration : float
+        [s]
+    motion : callable
+        Times [s] -> PlatformMotion, or JointMotion of an arm.
+    forces : callable
+        Times [s] -> Forces.
+    model : DriveModel or ArmModel
+    """
+
+    kind: str
+    subjects: tuple[str, ...]
+    contests: tuple[ExpectedEvidence, ...]
+    accuracies: tuple[Accuracy, ...]
+    expected_evidence: float
+    hidden: tuple[str, ...]
+    limits: dict[str, float]
+    duration: float
+    motion: Callable[[Array], Any]
+    forces: Callable[[Array], Forces]
+    model: ForceModel
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """All pairs in question."""
+        return tuple(dict.fromkeys(tuple(sorted((one.truth, one.rival)))  # type: ignore[misc]
+                                   for one in self.contests))
+
+    @property
+    def separates(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that it tells apart whichever of the two is true."""
+        return tuple(pair for pair in self.pairs if all(
+            one.probability >= SURE for one in self.contests if {one.truth, one.rival} == {*pair}))
+
+    @property
+    def fails(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that it does not, or not in every case."""
+        return tuple(pair for pair in self.pairs if pair not in self.separates)
+
+    @property
+    def text(self) -> str:
+        """What it is for, and whether it will do, in one or two sentences."""
+        if self.kind == 'separate':
+            found = []
+            if self.separates:
+                found.append(f'This motion tells {_listed(self.separates)}: evidence of '
+                             f'{self.expected_evidence:.0f} is expected.')
+            if self.fails:
+                found.append(f'It will hardly tell {_listed(self.fails)}: no motion within these '
+                             'limits that was tried does so for sure.')
+            return ' '.join(found)
+        last = (f' At the size at which they matter it would not show {", ".join(self.hidden)}: '
+                'a longer motion or wider limits would.' if self.hidden else '')
+        return {
+            'estimate': f'One explanation is left: {", ".join(self.subjects)}. This motion '
+                        'measures its parameters best.',
+            'excite': 'Nothing is missing as far as the recordings tell. This motion shows what '
+                      f'they hardly excite: {", ".join(self.subjects)}.' if self.subjects else
+                      'Nothing is missing, and all is excited. This motion measures the model\'s '
+                      'own numbers best.',
+            'commission': 'This motion measures the model\'s numbers and shows all common '
+                          'effects.'}[self.kind] + last
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON of the interface, and what the documentation adds to it."""
+        return {'separates': [list(pair) for pair in self.separates],
+                'does_not_separate': [list(pair) for pair in self.fails],
+                'expected_evidence': self.expected_evidence,
+                'question': self.kind, 'subjects': list(self.subjects),
+                'hidden': list(self.hidden), 'text': self.text,
+                'contests': [one.to_json() for one in self.contests],
+                'accuracy': [one.to_json() for one in self.accuracies],
+                'limits': self.limits, 'duration': self.duration}
+
+
+def _listed(pairs: Sequence[tuple[str, str]]) -> str:
+    """Return pairs in words, those of one effect together."""
+    return '; '.join(f'{name} from {", ".join(other for one, other in pairs if one == name)}'
+                     for name in dict.fromkeys(one for one, _ in pairs))
+
+
+def next_experiment(
+    model: DriveModel | ArmModel, recordings: Sequence[Recording] = (), purpose: str = 'separate',
+    limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
+    noise: float = 0.05, progress: Callable[[float], None] | None = None,
+) -> Experiment:
+    """Return the motion that tells most about what is open.
+
+    Parameters
+    ----------
+    model : DriveModel or ArmModel
+        Of an arm for 'separate' only; `arm_excitation` designs its first motion.
+    recordings : sequence of Recording
+    purpose : {'separate', 'commission'}
+        'separate': what recordings leave open. 'commission': a first motion of a new robot.
+    limits : MotionLimits or ArmLimits, optional
+    duration : float
+        [s]
+    seed : int
+        Of the search.
+    noise : float
+        Standard deviation of means of the effort over 0.01 s [N]; for 'commission' without
+        recordings.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    PurposeError
+        For 'separate' without recordings.
+    NoMotionError
+        Where the limits leave no room.
+    PprsError
+        As `diagnose`.
+    """
+    report = progress or (lambda share: None)
+    check_purpose(purpose, recordings)
+    check_duration(duration)
+    question = (commissioning(model, recordings, noise)
+                if purpose == 'commission' and isinstance(model, DriveModel) else
+                question_of(model, recordings, lambda share: report(0.2 * share)))
+    limits = limits or (ArmLimits() if isinstance(model, ArmModel) else MotionLimits())
+    limits = replace(limits, effort_reserve=max(
+        limits.effort_reserve, RESERVE * question.noise_floor))
+    search: TrajectorySearch | ArmSearch = (
+        ArmSearch(question, limits, duration, seed) if isinstance(limits, ArmLimits) else
+        TrajectorySearch(question, limits, duration, seed))
+    found = search.run(lambda share: report(0.2 + 0.8 * share))
+    report(1.0)
+    return experiment_of(question, found)
+
+
+def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
+    """Raise PurposeError for a purpose that needs recordings where there are none."""
+    if purpose not in PURPOSES:
+        raise PurposeError(f'purpose is {purpose!r}, must be one of {", ".join(PURPOSES)}')
+    if purpose == 'separate' and not recordings:
+        raise PurposeError('purpose separate: no recording is given, but it reads from recordings '
+                           'what is to be told apart; a new robot starts with --purpose '
+                           'commission')
+
+
+def check_duration(duration: float) -> None:
+    """Raise PurposeError for a duration that no design is made for."""
+    if not SHORTEST <= duration <= LONGEST:
+        raise PurposeError(f'duration is {duration:g} s, must lie between {SHORTEST:g} and '
+                           f'{LONGEST:g} s')
+
+
+def experiment_of(question: Question, found: Found) -> Experiment:
+    """Return a motion with what it promises for a question."""
+    known, after = question.known, question.known + found.gram
+    contests = tuple(found for one in question.contests for found in _expected(one, known, after))
+    decided = [one.expected for one in contests if one.probability >= SURE]
+    evidences = _evidences(question, after)
+    if contests:
+        expected = min(decided or [one.expected for one in contests])
+    else:
+        expected = min(evidences.values(), default=0.0)
+    return Experiment(
+        question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), contests,
+        tuple(_accuracies(question, known, after)), expected,
+        () if contests else tuple(name for name, one in evidences.items() if one <= 0),
+        dict(found.uses),
+        found.path.duration, found.path.motion,
+        lambda time: question.model.drive_forces(found.path.motion(time)), question.model)
+
+
+def _expected(contest: Contest, known: Array, after: Array) -> list[ExpectedEvidence]:
+    """Return what a motion promises for every pair of effects of a contest."""
+    expected, gained = contest.evidence(known, after), contest.gained(known, after)
+    # Twice a log-likelihood ratio scatters by twice the root of its mean.
+    sure = float(norm.cdf((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
+    return [ExpectedEvidence(truth, rival, contest.now, expected, sure)
+            for truth, rival in product(*contest.sides)]
+
+
+def _evidences(question: Question, after: Array) -> dict[str, float]:
+    """Return the evidence of each subject against its absence, the least of its drives."""
+    base = tuple(range(len(question.plan.base)))
+    found: dict[str, float] = {}
+    for one in question.subjects:
+        own = Precision(one.index, base, np.ones(len(one.index))).own(after)
+        evidence = float(one.truth @ own @ one.truth) - one.price
+        found[one.name] = min(evidence, found.get(one.name, np.inf))
+    return found
+
+
+def _accuracies(question: Question, known: Array, after: Array) -> list[Accuracy]:
+    """Return how well numbers and effects would be known; effects that may be there each alone."""
+    if question.contests:
+        return []
+    plan, found = question.plan, []
+    if question.kind == 'commission' or not question.subjects:
+        numbers = [one.number for one in plan.base if isinstance(one, KnownNumber)]
+        # Their columns are per standard deviation of what is known beforehand.
+        found += _known_to([(one.label, one.unit, one.deviation) for one in numbers],
+                           precision_of(plan, ()), known, after)
+    groups = ([question.subjects] if question.kind == 'estimate' else
+              [(one,) for one in question.subjects])
+    for group in groups:
+        found += _known_to([label for one in group for term in one.terms
+                            for label in _labels(term, question.model)],
+                           precision_of(plan, group), known, after)
+    return found
+
+
+def _known_to(labels: list[tuple[str, str, float]], precision: Precision, known: Array,
+              after: Array) -> list[Accuracy]:
+    """Return accuracies by name, unit and what one scale of the precision is in that unit."""
+    before, later = (precision.deviations(gram) / precision.scales for gram in (known, after))
+    return [Accuracy(label, unit, scale, scale * float(a), scale * float(b))
+            for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
+
+
+def _labels(term: FittedTerm, model: ForceModel) -> list[tuple[str, str, float]]:
+    """Return name, unit and scale of each parameter of a term that is fitted."""
+    prefix, unit = term.effect.name, DriveUnits()
+    if term.drive is not None:
+        prefix, unit = f'{prefix}.{model.drives[term.drive]}', model.units[term.drive]
+    return [(f'{prefix}.{p.name}', unit.of(p.unit),
+             p.spread(1.0, term.shape[p.name]) if p.name in term.shape else p.scale)
+            for p in term.parameters]

@@ -1,0 +1,289 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is to be found out: which explanations remain, or which numbers are poorly known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+from math import log
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
+from pprs_dynamics.inference.experiments.criteria import (
+    Contest,
+    Criterion,
+    Explanation,
+    Precision,
+    Separation,
+    free_of,
+)
+from pprs_dynamics.inference.experiments.information import Information
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.expansion import Selection, select
+from pprs_dynamics.inference.search.form import without_remainders
+from pprs_dynamics.inference.search.rivals import Rival, find_rivals
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least
+HELD = 1e-3  # of a column's square may lie outside the span of another effect's
+Part = tuple[FittedTerm, Array]
+"""A term, and the coefficients that it has in one explanation."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a motion is to tell.
+
+    Parameters
+    ----------
+    kind : {'separate', 'estimate', 'excite', 'commission'}
+    plan : ColumnPlan
+    noise : mapping of drive to NoiseSpectrum
+    known : (P, P) array
+        What recordings and tolerances tell already.
+    criterion : Criterion
+    contests : tuple of Contest
+        For 'separate'.
+    subjects : tuple of Explanation
+        Effects in question.
+    noise_floor : float
+        Largest root of the mean squared noise of a drive [N].
+    """
+
+    kind: str
+    plan: ColumnPlan
+    noise: Mapping[int, NoiseSpectrum]
+    known: Array
+    criterion: Criterion
+    contests: tuple[Contest, ...]
+    subjects: tuple[Explanation, ...]
+    noise_floor: float
+
+    @property
+    def model(self) -> Any:
+        """Around which all is linear."""
+        return self.plan.model
+
+    @property
+    def information(self) -> Information:
+        """Gram matrices of the plan."""
+        return Information(self.plan, self.noise)
+
+    def with_contests(self, contests: Sequence[Contest]) -> Question:
+        """Return the question of some of its contests only."""
+        return replace(self, contests=tuple(contests), criterion=Separation(tuple(contests)))
+
+
+def question_of(model: ForceModel, recordings: Sequence[Recording],
+                progress: Callable[[float], None]) -> Question:
+    """Return what recordings leave open; errors as `diagnose`."""
+    selection = select(model, recordings, DECISIONS, progress)
+    best, adopted, remainders = without_remainders(selection.last, selection.best)
+    selection = replace(selection, best=best)
+    rivals = find_rivals(selection, adopted, DECISIONS.rival_margin,
+                         {one.candidate.name for one in remainders})
+    return question_after(selection, adopted, rivals)
+
+
+def question_after(selection: Selection, adopted: CandidateSet,
+                   rivals: Sequence[Rival]) -> Question:
+    """Return what a selection leaves open.
+
+    Parameters
+    ----------
+    selection : Selection
+    adopted : CandidateSet
+        Of its last search.
+    rivals : sequence of Rival
+        The best first.
+    """
+    if rivals:
+        return _separation(selection, adopted, rivals)
+    search = selection.last
+    if adopted.effects:
+        return _estimation(search, adopted)
+    return _excitation(search, adopted)
+
+
+def _separation(selection: Selection, adopted: CandidateSet, rivals: Sequence[Rival]) -> Question:
+    """Return how to tell sets apart, each pair of effects in the sets of lowest cost."""
+    pairs: set[tuple[str, str]] = set()
+    sets = [adopted]
+    for rival in rivals:
+        new = set(product(rival.missing, rival.instead))
+        if not new <= pairs:
+            pairs |= new
+            sets.append(rival.found)
+    search = _common_search(selection, sets)
+    placed = [search.evaluate(search.library.rebuilt(one.candidates)) for one in sets]
+    terms = _Terms()
+    parts = [terms.of_set(one) for one in placed]
+    further = {(k, j): terms.on_drives_of(placed[k], placed[j])
+               for k, j in permutations(range(len(sets)), 2)}
+    plan = ColumnPlan.of_design(search.design, terms.all)
+    explanations = [_explanation([c.name for c in one.effects], own, plan, 0.0)
+                    for one, own in zip(placed, parts, strict=True)]
+    contests = []
+    for (k, j), more in further.items():
+        free = explanations[k].free + tuple(
+            place for term in more for place in _places(plan, term)[term.free])
+        contest = Contest(explanations[j], explanations[k], (*range(len(plan.base)), *free),
+                          sets[k].cost - sets[j].cost)
+        refitted = [*(term for term, _ in parts[k]), *more]
+        own = [term for term, _ in parts[j] if term.effect.name in contest.sides[0]]
+        # An effect that can be all that another one is fits it on any motion.
+        if all(contest.sides) and not all(_holds(refitted, one, search.design) for one in own):
+            contests.append(contest)
+    subjects = [_explanation([c.name], terms.of_candidate(placed[0], c), plan, 0.0)
+                for c in placed[0].effects]
+    return _asked('separate', search, placed[0], plan, Separation(tuple(contests)), contests,
+                  subjects)
+
+
+def _common_search(selection: Selection, sets: Sequence[CandidateSet]) -> Search:
+    """Return the last search, or the first where one of the sets is linear around its point."""
+    last = selection.last
+    return last if all(last.evaluated.get(one.key) is one for one in sets) else selection.first
+
+
+def _estimation(search: Search, adopted: CandidateSet) -> Question:
+    """Return how to measure the parameters of effects that are there."""
+    terms = _Terms()
+    parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
+    plan = ColumnPlan.of_design(search.design, terms.all)
+    samples = search.library.prices.samples
+    subjects = [_explanation([c.name], own, plan, c.total_price + sum(
+        len(term.names) for term, _ in own) * log(samples))
+        for c, own in zip(adopted.effects, parts, strict=True)]
+    return _asked('estimate', search, adopted, plan, precision_of(plan, subjects), (), subjects)
+
+
+def _excitation(search: Search, nothing: CandidateSet) -> Question:
+    """Return how to show effects that the motion would not show at a size that matters."""
+    regression = search.regression
+    weak = []
+    for term in search.design.structure:
+        block = regression.block(term.rows)
+        gain = np.diag(regression.own_information(nothing.fit, block))
+        found = FittedTerm.at_scale(term.effect, None, {}, search.design.absent(term.effect))
+        here = [term.names.index(name) for name in found.names]
+        if np.any(gain[here] * found.scales ** 2 < UNEXCITED):
+            weak.append(found)
+    plan = ColumnPlan.of_design(search.design, weak)
+    subjects = subjects_of(plan, search.library.prices)
+    return _asked('excite', search, nothing, plan, precision_of(plan, subjects), (), subjects)
+
+
+def subjects_of(plan: ColumnPlan, prices: Prices) -> list[Explanation]:
+    """Return each term of a plan as an effect that may be there."""
+    subjects = []
+    for term in plan.terms:
+        price = (prices.of_name() + prices.of_placement(term.effect, 1)
+                 + len(term.names) * log(prices.samples))
+        if term.drive is not None:
+            price += prices.of_drives(1)
+        subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, price))
+    return subjects
+
+
+def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision:
+    """Return how well effects are known beside the base; without any, the model's numbers."""
+    if not subjects:
+        return Precision(plan.numbers, plan.others, np.ones(len(plan.numbers)))
+    scales = np.concatenate([term.scales for one in subjects for term in one.terms])
+    return Precision(free_of(subjects), tuple(range(len(plan.base))), scales)
+
+
+def _asked(kind: str, search: Search, found: CandidateSet, plan: ColumnPlan, criterion: Criterion,
+           contests: Sequence[Contest], subjects: Sequence[Explanation]) -> Question:
+    """Return a question under the noise of a set."""
+    regression, fit = search.regression, found.fit
+    noise = regression.noise(fit)
+    known = Information(plan, noise).of_recordings(search.design, regression, fit)
+    floor = max(regression.noise_floor(fit, d) for d in regression.drives)
+    return Question(kind, plan, noise, known, criterion, tuple(contests), tuple(subjects), floor)
+
+
+class _Terms:
+    """Terms of several sets; what they share is there once."""
+
+    def __init__(self) -> None:
+        self._found: dict[Hashable, FittedTerm] = {}
+
+    @property
+    def all(self) -> tuple[FittedTerm, ...]:
+        """In the order in which they came."""
+        return tuple(self._found.values())
+
+    def of_set(self, found: CandidateSet) -> list[Part]:
+        """Return the terms of a set."""
+        return [part for c in found.effects for part in self.of_candidate(found, c)]
+
+    def of_candidate(self, found: CandidateSet, candidate: EffectCandidate) -> list[Part]:
+        """Return the terms of an effect of a set."""
+        parts = []
+        for one in candidate.placements:
+            values = found.coefficients(one)
+            term = FittedTerm(candidate.effect, one.drive, one.term.shape, one.names, values)
+            parts.append((self._once(term), values))
+        return parts
+
+    def on_drives_of(self, found: CandidateSet, truth: CandidateSet) -> list[FittedTerm]:
+        """Return the effects of a set on further drives, where those of another set sit."""
+        theirs = {d for c in truth.effects for d in c.drives or ()}
+        more = []
+        for c in found.effects:
+            first = c.placements[0]
+            if c.drives is not None and c.name not in {one.name for one in truth.effects} and (
+                    len(first.term.rows) == 1):
+                values = found.coefficients(first) * first.term.is_fixed
+                more += [self._once(FittedTerm(c.effect, d, first.term.shape, first.names, values))
+                         for d in sorted(theirs - set(c.drives))]
+        return more
+
+    def _once(self, term: FittedTerm) -> FittedTerm:
+        key = (term.effect, term.drive, tuple(sorted(term.shape.items())), term.names)
+        return self._found.setdefault(key, term)
+
+
+def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, price: float,
+                 ) -> Explanation:
+    places = [_places(plan, term) for term, _ in parts]
+    return Explanation(
+        tuple(names), tuple(term for term, _ in parts),
+        tuple(k for place, (term, _) in zip(places, parts, strict=True) for k in place[term.free]),
+        tuple(k for place, (_, values) in zip(places, parts, strict=True)
+              for k in place[:len(values)]),
+        np.concatenate([values for _, values in parts]), price)
+
+
+def _places(plan: ColumnPlan, term: FittedTerm) -> range:
+    place = plan.places()[term]
+    return range(place.start, place.stop)
+
+
+def _holds(larger: Sequence[FittedTerm], smaller: FittedTerm, design: Design) -> bool:
+    """Return whether terms with more coefficients on the same drive can be all that one is."""
+    same = [term for term in larger if term.drive == smaller.drive]
+    if sum(len(term.values) for term in same) <= len(smaller.values):
+        return False
+    theirs = [term.rows(design) for term in same]
+    for d, mine in smaller.rows(design).items():
+        own = mine[:len(smaller.values)]
+        span = np.concatenate([rows[d][:len(term.values)] for term, rows in zip(
+            same, theirs, strict=True) if d in rows] or [np.zeros((1, own.shape[1]))])
+        rest = own - np.linalg.lstsq(span.T, own.T, rcond=None)[0].T @ span
+        if np.sum(rest ** 2) > HELD * np.sum(own ** 2):
+            return False
+    return True

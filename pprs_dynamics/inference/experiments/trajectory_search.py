@@ -1,0 +1,320 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The search for the motion that tells most, within what the robot may do.
+
+Random series, each blown up until it meets a limit, are compared first; the best of several
+kinds are improved by sequential quadratic programming with the limits as constraints, and what
+comes out is checked at the rate at which it is played.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.experiments.climbing import climb
+from pprs_dynamics.inference.experiments.criteria import Contest, misfits_of
+from pprs_dynamics.inference.experiments.fourier_path import (
+    FREEDOMS,
+    FourierFamily,
+    FourierPath,
+    joined_motion,
+)
+from pprs_dynamics.inference.experiments.motion_limits import MotionLimits, limit_names
+from pprs_dynamics.inference.experiments.question import Question
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.measurement.motion.treatment import block_length
+from pprs_dynamics.physics.mechanism.paths import HOME
+from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
+from pprs_dynamics.system.parallel import each
+
+HARMONICS = 4  # of each degree of freedom
+SLOWEST_TOP = 5  # the highest harmonic of the slowest motions
+HIGHEST_FREQUENCY = 1.5  # [Hz]; above it reconstruction from positions smooths
+SAMPLES_PER_PERIOD = 12  # of the highest harmonic, while searching
+DRAWS, STARTS = 48, 2
+NEARBY = (0.7, 1.2)  # scales that put a step back on the limits
+BATCH = 8  # motions evaluated at once
+REACH, TURN = 0.08, 0.25  # [m, rad], excursions to start from
+SCALES = (0.02, 4.0)  # times these
+HALVINGS = 7
+# Some series are left smaller than the limits allow: slow motion tells of friction near rest.
+SMALLER, SMALLEST = 0.25, 0.1
+OTHER_SPECTRUM = 0.2  # difference of ln of the highest harmonic
+OUTSIDE = 2.0  # use of limits where the mechanism cannot follow
+FINE_RATE = 500.0  # [Hz], at which limits are checked
+
+
+class NoMotionError(PprsError, ValueError):
+    """The robot has no room for a motion within its limits."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A motion with what it is worth and uses.
+
+    Parameters
+    ----------
+    path : FourierPath or JointSeries
+    gram : (P, P) array
+        What it would tell.
+    uses : mapping of str to float
+        Of the limits, 1 is all.
+    value : float
+        Of the criterion.
+    """
+
+    path: FourierPath | JointSeries
+    gram: Array
+    uses: Mapping[str, float]
+    value: float
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A random motion.
+
+    Parameters
+    ----------
+    family : FourierFamily
+    parameters : (p,) array
+    gram : (P, P) array
+        What it would tell, nearly.
+    value : float
+    """
+
+    family: FourierFamily
+    parameters: Array
+    gram: Array
+    value: float
+
+    @property
+    def path(self) -> FourierPath:
+        """The motion."""
+        return self.family.path(self.parameters)
+
+    @property
+    def top(self) -> int:
+        """Highest harmonic."""
+        return int(self.family.harmonics.max())
+
+
+class TrajectorySearch:
+    """Searches for a motion that answers a question.
+
+    Parameters
+    ----------
+    question : Question
+    limits : MotionLimits
+    duration : float
+        [s]
+    seed : int
+
+    Raises
+    ------
+    NoMotionError
+        Where the limits do not even let the robot stand at the centre.
+    """
+
+    def __init__(self, question: Question, limits: MotionLimits, duration: float,
+                 seed: int) -> None:
+        self.question, self.limits, self.duration, self.seed = question, limits, duration, seed
+        model = question.model
+        # Poses near a singularity are compared, not refused, while searching.
+        self._lenient = replace(model, limits=replace(
+            model.limits, condition_number=np.inf, rod_sine=1e-3))
+        self.top = max(HARMONICS + 1, int(HIGHEST_FREQUENCY * duration))
+        self.centre = self._centre()
+        samples = SAMPLES_PER_PERIOD * self.top
+        self._time: Array = np.arange(samples, dtype=float) * (duration / samples)
+        self._fine: Array = np.arange(round(duration * FINE_RATE) + 1) / FINE_RATE
+
+    def run(self, progress: Callable[[float], None] = lambda share: None) -> Found:
+        """Return the best motion found.
+
+        Contests that no motion drawn could decide are left out of the rest of the search.
+        """
+        drawn = self.screen(lambda share: progress(0.3 * share))
+        hopeful = self._hopeful(drawn)
+        if 0 < len(hopeful) < len(self.question.contests):
+            self.question = self.question.with_contests(hopeful)
+            drawn = self._ranked([replace(draw, value=self._worth(draw.gram)) for draw in drawn])
+        starts = self._kinds(drawn)
+        done = [0]
+
+        def improved(start: Drawn) -> FourierPath:
+            path = self._improve(start)
+            done[0] += 1
+            progress(0.3 + 0.6 * done[0] / len(starts))
+            return path
+
+        paths = [starts[0].path, *each(improved, starts)]
+        return max((self.assess(path) for path in paths), key=lambda one: one.value)
+
+    def _hopeful(self, drawn: list[Drawn]) -> list[Contest]:
+        """Return the contests that at least one motion drawn would decide."""
+        contests = self.question.contests
+        if not contests:
+            return []
+        known = self.question.known
+        gained = np.max([misfits_of(contests, known + draw.gram) for draw in drawn],
+                        axis=0) - misfits_of(contests, known)
+        return [one for one, more in zip(contests, gained, strict=True)
+                if one.now + more > DECISIONS.rival_margin]
+
+    def screen(self, progress: Callable[[float], None] = lambda share: None,
+               draws: int = DRAWS) -> list[Drawn]:
+        """Return random motions within the limits, best first."""
+        rng = np.random.default_rng(self.seed)
+        fitted = []
+        for k in range(draws):
+            family, x, share = self._draw(rng)
+            fitted.append((family, share * self._to_limits(family, x)))
+            progress(0.5 * (k + 1) / draws)
+        drawn: list[Drawn] = []
+        for k in range(0, draws, BATCH):
+            some = fitted[k:k + BATCH]
+            grams, _ = self._grams([family.path(x) for family, x in some])
+            drawn += [Drawn(family, x, gram, self._worth(gram))
+                      for (family, x), gram in zip(some, grams, strict=True)]
+            progress(0.5 + 0.5 * len(drawn) / draws)
+        return self._ranked(drawn)
+
+    def _ranked(self, drawn: list[Drawn]) -> list[Drawn]:
+        return sorted(drawn, key=lambda one: -one.value)
+
+    def _worth(self, gram: Array) -> float:
+        return self.question.criterion.value(self.question.known + gram)
+
+    def assess(self, path: FourierPath) -> Found:
+        """Return a motion at full rate, made smaller where it exceeds a limit there."""
+        path = self._allowed(path)
+        forces = self._forces([path], self._fine)
+        uses = self.limits.uses(self.question.model, forces, len(self._fine))[0].tolist()
+        question = self.question
+        block = block_length(1 / FINE_RATE)
+        columns = question.plan.on_motions(forces, self._fine, block)[0]
+        gram = question.information.of_motion(columns, self.duration)
+        return Found(path, gram, dict(zip(limit_names(question.model), uses, strict=True)),
+                     self._worth(gram))
+
+    def _kinds(self, drawn: list[Drawn]) -> list[Drawn]:
+        """Return the best, and the best of others whose spectrum is another."""
+        chosen = [drawn[0]]
+        for one in drawn[1:]:
+            if len(chosen) < STARTS and all(abs(np.log(one.top / other.top)) > OTHER_SPECTRUM
+                                            for other in chosen):
+                chosen.append(one)
+        return chosen
+
+    def _draw(self, rng: np.random.Generator) -> tuple[FourierFamily, Array, float]:
+        highest = int(np.exp(rng.uniform(np.log(min(SLOWEST_TOP, self.top)),
+                                         np.log(self.top + 1))))
+        highest = min(max(highest, HARMONICS), self.top)
+        harmonics = np.stack([np.sort(1 + rng.choice(highest, HARMONICS, replace=False))
+                              for _ in range(FREEDOMS)])
+        family = FourierFamily(self.duration, harmonics, self.centre)
+        x = rng.normal(size=(FREEDOMS, family.size // FREEDOMS))
+        x *= np.exp(rng.normal(scale=0.7, size=FREEDOMS))[:, None]
+        x /= np.abs(x).max()
+        x[:3] *= REACH
+        x[3:] *= TURN
+        share = float(np.exp(rng.uniform(np.log(SMALLEST), 0))) if rng.random() < SMALLER else 1.0
+        return family, x.ravel(), share
+
+    def _to_limits(self, family: FourierFamily, x: Array,
+                   scales: tuple[float, float] = SCALES) -> Array:
+        """Return the parameters times the largest factor that the limits allow."""
+        low, high = np.log(scales)
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            if self._worst(family.path(np.exp(middle) * x), self._time) <= 1:
+                low = middle
+            else:
+                high = middle
+        factor: float = np.exp(low)
+        result: Array = factor * x
+        return result
+
+    def _allowed(self, path: FourierPath) -> FourierPath:
+        """Return the path, made smaller until it keeps the limits at full rate."""
+        worst = self._worst(path, self._fine)
+        while worst > 1:
+            path = path.scaled(0.995 if worst < 1.01 else 0.97)
+            worst = self._worst(path, self._fine)
+        return path
+
+    def _worst(self, path: FourierPath, time: Array) -> float:
+        try:
+            forces = self._forces([path], time)
+        except PprsError:
+            return OUTSIDE
+        return float(self.limits.uses(self.question.model, forces, len(time)).max())
+
+    def _forces(self, paths: list[FourierPath], time: Array) -> DriveForces:
+        return forces_of(self._lenient, paths, time)
+
+    def _grams(self, paths: list[FourierPath]) -> tuple[list[Array], Array]:
+        """Return what several paths would tell, and their uses of the limits."""
+        question = self.question
+        forces = self._forces(paths, self._time)
+        grams = [question.information.of_motion(columns, self.duration)
+                 for columns in question.plan.on_motions(forces, self._time)]
+        return grams, self.limits.uses(self.question.model, forces, len(self._time))
+
+    def _improve(self, start: Drawn) -> FourierPath:
+        """Return the path after a few steps of sequential quadratic programming."""
+        family = start.family
+        # Lengths and angles, of like size.
+        unit = np.repeat((REACH, TURN), family.size // 2)
+
+        def evaluated(rows: Array) -> tuple[Array, Array]:
+            values, rooms = [], []
+            for k in range(0, len(rows), BATCH):
+                grams, uses = self._grams([family.path(unit * row) for row in rows[k:k + BATCH]])
+                values += [self._worth(gram) for gram in grams]
+                rooms.append(1 - uses)
+            return np.array(values), np.concatenate(rooms)
+
+        best = climb(start.parameters / unit, evaluated,
+                     lambda z: self._to_limits(family, unit * z, NEARBY) / unit)
+        return family.path(unit * best)
+
+    def _centre(self) -> tuple[float, float, float]:
+        """Return the home pose, or the middle of the lifts' strokes where home leaves no room."""
+        limits, geometry = self.question.model.limits, self.question.model.robot.geometry
+        lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
+            np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
+        middle = sum(limits.lift_stroke) / 2 + geometry.elbow_sign * geometry.rod_length * float(
+            np.sqrt(max(1 - lean ** 2, 0.0)))
+        for centre in (HOME, (0.0, 0.0, middle)):
+            family = FourierFamily(self.duration, np.tile((1, 2), (FREEDOMS, 1)), centre)
+            if self._worst(family.path(np.zeros(family.size)), self._time_at_rest()) <= 1:
+                return centre
+        raise NoMotionError(f'no motion is allowed: standing at {HOME} m or {middle:.4g} m high '
+                            f'the robot is beyond {self._first_limit(middle)} already; the '
+                            'limits, with their margin, must leave room')
+
+    def _first_limit(self, height: float) -> str:
+        family = FourierFamily(self.duration, np.tile((1, 2), (FREEDOMS, 1)), (0.0, 0.0, height))
+        time = self._time_at_rest()
+        try:
+            forces = self._forces([family.path(np.zeros(family.size))], time)
+        except PprsError as error:
+            return str(error)
+        uses = self.limits.uses(self.question.model, forces, len(time))[0]
+        return limit_names(self.question.model)[int(uses.argmax())]
+
+    def _time_at_rest(self) -> Array:
+        return np.linspace(0.0, self.duration, 4)
+
+
+def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> DriveForces:
+    """Return the forces that drives must apply along paths, one after the other."""
+    return model.drive_forces(joined_motion(paths, time))

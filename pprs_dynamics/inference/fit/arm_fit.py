@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The base model of an arm from recordings of free motion.
+
+Inertia of links and rotors, friction and offsets are fitted together, each joint weighted by its
+error and by how many independent samples that error is worth. Links are held to what bodies can
+be, and weakly to their description: what the motion does not excite stays as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.fit.arm_columns import (
+    ARMATURE,
+    COULOMB,
+    OF_JOINT,
+    OFFSET,
+    VISCOUS,
+    ArmColumns,
+    own_numbers,
+)
+from pprs_dynamics.inference.fit.bodies import Bodies
+from pprs_dynamics.inference.regression.base_columns import rounded
+from pprs_dynamics.physics.mechanism.urdf import PARAMETERS
+from pprs_dynamics.physics.model.arm_model import ArmModel, inertial_values
+from pprs_dynamics.physics.model.model_file import build_model
+
+# A link's pseudo-inertia is known to as much as itself: drawings often have bodies as points or
+# rods, yet not of ten times the mass.
+SPREAD = 1.0
+# Standard deviations of what nothing is known of, in units of the joint's largest effort over the
+# size of its column: friction and offsets may be as large as all there is.
+OWN_SPREAD = 1.0
+WIDTHS = np.geomspace(0.1, 10.0, 13)  # times the model's width of reversal, tried
+ROUNDS = 3  # of weights and widths
+DETERMINED = 0.5  # of what was known before, that a determined number may still be uncertain by
+STANDS = 0.05  # share of the samples in which a joint must move for its friction to be fitted
+
+
+@dataclass(frozen=True)
+class ArmFit:
+    """What was found.
+
+    Parameters
+    ----------
+    model : ArmModel
+    determined, total : int
+        Combinations of the links' inertial parameters that the motion determines, and all.
+    std : dict of str to (n,) array
+        Of armature, viscous and dry friction, offset by key; infinite where not determined.
+    weak_links : tuple of str
+        Joints of whose link the mass stays what the description says.
+    standing : tuple of str
+        Joints that hardly move.
+    """
+
+    model: ArmModel
+    determined: int
+    total: int
+    std: dict[str, Array]
+    weak_links: tuple[str, ...]
+    standing: tuple[str, ...]
+
+
+def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
+    """Return the model fitted to recordings.
+
+    Parameters
+    ----------
+    model : ArmModel
+        As described; its added effects stay as they are.
+    columns : sequence of ArmColumns
+        Of that model.
+    """
+    count = len(model.drives)
+    bodies = Bodies(model.arm.inertial)
+    known = np.concatenate([np.isfinite(one.measured) for one in columns])
+    inertial = np.concatenate([one.inertial for one in columns])
+    rest = np.concatenate([one.measured - one.rest for one in columns])
+    width = np.broadcast_to(np.asarray(model.reversal.velocity, dtype=float), (count,)).copy()
+    start = own_numbers(model)
+    own, point = start.copy(), np.zeros(len(bodies))
+    moving = known.mean(axis=0) >= STANDS
+    weights = np.zeros(count)
+    problem: _Problem | None = None
+    for _ in range(ROUNDS):
+        joints = np.concatenate([one.of_joints(width) for one in columns])
+        problem = _Problem(bodies, inertial, joints, rest, known & moving, start)
+        weights = problem.weights(point, own)
+        point, own = problem.solved(weights, point, own)
+        width = _widths(columns, rest - inertial @ bodies.inertial(point).ravel(), known, own,
+                        width, moving)
+    joints = np.concatenate([one.of_joints(width) for one in columns])
+    problem = _Problem(bodies, inertial, joints, rest, known & moving, start)
+    weights = problem.weights(point, own)
+    point, own = problem.solved(weights, point, own)
+    spread = problem.spread(weights, point, own)
+    links = len(bodies)
+    ratio = np.linalg.eigvalsh(spread[:links, :links]) / SPREAD ** 2
+    masses = np.sqrt(np.diag(spread)[9:links:PARAMETERS]) / SPREAD
+    std = np.sqrt(np.diag(spread)[links:]).reshape(OF_JOINT, count)
+    std[:, ~moving] = np.inf
+    names = np.array(model.drives)
+    return ArmFit(
+        _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
+        links, {'arm.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
+                'friction.coulomb': std[COULOMB], 'friction.offset': std[OFFSET]},
+        tuple(names[masses > DETERMINED].tolist()), tuple(names[~moving].tolist()))
+
+
+def _with(model: ArmModel, inertial: Array, own: Array, width: Array) -> ArmModel:
+    """Return the model with fitted numbers, rounded as files have them."""
+    def numbers(values: Array) -> tuple[float, ...]:
+        return tuple(rounded(float(value)) for value in values)
+
+    values: dict[str, Any] = {
+        **model.values,
+        **{key: numbers(np.array(found)) for key, found in inertial_values(inertial).items()},
+        'arm.armature': numbers(own[:, ARMATURE]), 'friction.viscous': numbers(own[:, VISCOUS]),
+        'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
+        'friction.reversal_velocities': numbers(width)}
+    fitted = build_model(values, model.source)
+    assert isinstance(fitted, ArmModel)
+    return fitted
+
+
+class _Problem:
+    """Least squares in points of `Bodies` and the joints' own numbers.
+
+    Parameters
+    ----------
+    bodies : Bodies
+    inertial : (M, n, 10 n) array
+    joints : (M, n, 4) array
+    rest : (M, n) array
+        Measured efforts without added effects.
+    known : (M, n) bool array
+    start : (n, 4) array
+        What own numbers are pulled to, as weakly as can be.
+    """
+
+    def __init__(self, bodies: Bodies, inertial: Array, joints: Array, rest: Array, known: Array,
+                 start: Array) -> None:
+        self.bodies, self.start = bodies, start
+        count = rest.shape[1]
+        self.rows, self.target = [], []
+        for j in range(count):
+            own = np.zeros((int(known[:, j].sum()), count * OF_JOINT))
+            own[:, j * OF_JOINT:(j + 1) * OF_JOINT] = joints[known[:, j], j]
+            self.rows.append(np.concatenate((inertial[known[:, j], j], own), axis=1))
+            self.target.append(rest[known[:, j], j])
+        # All that depends on the samples, once: R and Q' y of each joint.
+        self.reduced = [np.linalg.qr(np.column_stack((rows, y)), mode='r') if len(y) else None
+                        for rows, y in zip(self.rows, self.target, strict=True)]
+        size = np.array([np.abs(y).max(initial=0.0) for y in self.target])
+        scale = np.sqrt(np.array([np.mean(joints[known[:, j], j] ** 2, axis=0)
+                                  if len(self.target[j]) else np.ones(OF_JOINT)
+                                  for j in range(count)]))
+        self.own_spread = OWN_SPREAD * np.maximum(size, 1e-3)[:, None] / np.maximum(scale, 1e-6)
+
+    def errors(self, point: Array, own: Array) -> list[Array]:
+        """Return what is left of each joint's efforts."""
+        numbers = np.concatenate((self.bodies.inertial(point).ravel(), own.ravel()))
+        return [y - rows @ numbers for rows, y in zip(self.rows, self.target, strict=True)]
+
+    def weights(self, point: Array, own: Array) -> Array:
+        """Return one over the variance of each joint's error, by independent samples."""
+        weights = np.zeros(len(self.target))
+        for j, error in enumerate(self.errors(point, own)):
+            if len(error):
+                share = min(1.0, independent_share(error))
+                weights[j] = share / max(float(np.mean(error ** 2)), 1e-12)
+        return weights
+
+    def _residuals(self, unknown: Array, weights: Array) -> Array:
+        links = len(self.bodies)
+        point, own = unknown[:links], unknown[links:]
+        numbers = np.concatenate((self.bodies.inertial(point).ravel(), own, [-1.0]))
+        parts = [np.sqrt(weight) * (reduced @ numbers)
+                 for weight, reduced in zip(weights, self.reduced, strict=True)
+                 if reduced is not None]
+        return np.concatenate((*parts, self.bodies.distance(point) / SPREAD,
+                               (own - self.start.ravel()) / self.own_spread.ravel()))
+
+    def solved(self, weights: Array, point: Array, own: Array) -> tuple[Array, Array]:
+        """Return the best point and own numbers.
+
+        Armature and friction that would be negative are held at 0, and the others fitted again.
+        """
+        unknown = np.concatenate((point, own.ravel()))
+        lowest = np.zeros(own.shape)
+        lowest[:, OFFSET] = -np.inf
+        bound = np.concatenate((np.full(len(point), -np.inf), lowest.ravel()))
+        free = np.ones(len(unknown), dtype=bool)
+        while True:
+            unknown = self._descended(unknown, free, weights)
+            below = free & (unknown < bound)
+            if not np.any(below):
+                return unknown[:len(point)], unknown[len(point):].reshape(own.shape)
+            free &= ~below
+            unknown[below] = 0.0
+
+    def _descended(self, unknown: Array, free: np.typing.NDArray[np.bool_], weights: Array,
+                   ) -> Array:
+        def residuals(part: Array) -> Array:
+            every = unknown.copy()
+            every[free] = part
+            return self._residuals(every, weights)
+
+        found: Array = unknown.copy()
+        found[free] = least_squares(residuals, unknown[free], x_scale='jac', max_nfev=60).x
+        return found
+
+    def spread(self, weights: Array, point: Array, own: Array) -> Array:
+        """Return the covariance of the unknowns; own numbers in the order of `OF_JOINT`."""
+        at = np.concatenate((point, own.ravel()))
+        step = 1e-6
+        before = self._residuals(at, weights)
+        J: Array = np.column_stack([(self._residuals(at + step * unit, weights) - before) / step
+                             for unit in np.eye(len(at))])
+        covariance: Array = np.asarray(np.linalg.inv(J.T @ J), dtype=float)
+        links = len(point)
+        order = np.arange(own.size).reshape(own.shape).T.ravel() + links
+        chosen = np.concatenate((np.arange(links), order))
+        return covariance[np.ix_(chosen, chosen)]
+
+
+def independent_share(error: Array) -> float:
+    """Return how many independent samples one of a correlated error is worth, 0 to 1.
+
+    By the lag at which the autocorrelation is first below 1/e.
+    """
+    centred = error - error.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
+    correlation = np.fft.irfft(spectrum)[:len(centred)]
+    if not correlation[0] > 0:
+        return 1.0
+    below = np.flatnonzero(correlation < correlation[0] / np.e)
+    return 1 / (1 + 2 * float(below[0] if len(below) else len(centred)))
+
+
+def _widths(columns: Sequence[ArmColumns], rest: Array, known: Array, own: Array, width: Array,
+            moving: Array) -> Array:
+    """Return the width of reversal of each joint with which its friction fits best."""
+    tried = [np.clip(width * factor, 1e-6, None) for factor in WIDTHS]
+    turning = [np.concatenate([one.turning(each) for one in columns]) for each in tried]
+    found = width.copy()
+    motion = np.concatenate([one.motion for one in columns])
+    for j in np.flatnonzero(moving):
+        at = known[:, j]
+        y = rest[at, j] - motion[at, j, 0] * own[j, ARMATURE]
+        left = []
+        for direction in turning:
+            rows = np.column_stack((motion[at, j, 1], direction[at, j], np.ones(at.sum())))
+            solution = np.linalg.lstsq(rows, y, rcond=None)[0]
+            left.append(float(np.sum((y - rows @ solution) ** 2)))
+        found[j] = tried[int(np.argmin(left))][j]
+    return found

@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The base model that recordings call for, and how well it predicts what it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.fit.arm_columns import columns_of
+from pprs_dynamics.inference.fit.arm_fit import ArmFit, fit_arm
+from pprs_dynamics.inference.fit.open_numbers import fit_open_numbers
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
+
+
+class FitError(PprsError, ValueError):
+    """A fit that has nothing to do."""
+
+
+@dataclass(frozen=True)
+class FittedNumber:
+    """A number of the model, before and after, with its standard deviation."""
+
+    key: str
+    drive: str
+    before: float
+    after: float
+    std: float
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the number for JSON."""
+        return {'key': self.key, 'drive': self.drive, 'before': self.before, 'after': self.after,
+                'std': self.std if np.isfinite(self.std) else None, 'unit': self.unit}
+
+
+@dataclass(frozen=True)
+class BaseFit:
+    """A fitted base model.
+
+    Parameters
+    ----------
+    model : ForceModel
+    numbers : tuple of FittedNumber
+    told : tuple of str
+        What the motion determines and what it does not, as sentences.
+    before, after, held_out : dict of str to float
+        rms error by drive: of the model as it was and as it is on the recordings, and on data
+        that took no part in a fit.
+    held_out_on : {'recordings', 'halves', 'validation'}
+        Each recording, or half of the only one, predicted from the others; or the validation.
+    """
+
+    model: ForceModel
+    numbers: tuple[FittedNumber, ...]
+    told: tuple[str, ...]
+    before: dict[str, float]
+    after: dict[str, float]
+    held_out: dict[str, float]
+    held_out_on: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fit for JSON."""
+        return {'numbers': [one.to_json() for one in self.numbers], 'notes': list(self.told),
+                'error_before': self.before, 'error_after': self.after,
+                'held_out': self.held_out, 'held_out_on': self.held_out_on}
+
+
+def fit_base(model: ForceModel, recordings: Sequence[Recording],
+             validate: Sequence[Recording] = (),
+             progress: Callable[[float], None] | None = None) -> BaseFit:
+    """Return the base model that fits recordings best.
+
+    Parameters
+    ----------
+    model : ForceModel
+        Of an arm all inertia and friction is fitted; of the others what `tolerances` leave open.
+    recordings : sequence of Recording
+        Of free motion.
+    validate : sequence of Recording, optional
+        For the held-out error, instead of a part of the recordings.
+    progress : callable, optional
+
+    Raises
+    ------
+    FitError
+        Where nothing is left open.
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    fitted, numbers, told = _fitted(model, recordings)
+    report(0.4)
+    if validate:
+        held_out, on = errors_of(fitted, validate), VALIDATION
+    else:
+        parts, on = list(recordings), RECORDINGS
+        if len(parts) == 1:
+            parts, on = halves(parts[0]), HALVES
+        squares = [_squares(_fitted(model, [*parts[:k], *parts[k + 1:]])[0], [part])
+                   for k, part in enumerate(parts)]
+        held_out = _rms(model, np.concatenate(squares))
+    report(0.9)
+    return BaseFit(fitted, numbers, told, errors_of(model, recordings),
+                   errors_of(fitted, recordings), held_out, on)
+
+
+def halves(recording: Recording) -> list[Recording]:
+    """Return the first and the second half of a recording."""
+    parts = recording.segments
+    middle = sum(part.stop - part.start for part in parts) // 2
+    first, second, done = [], [], 0
+    for part in parts:
+        cut = min(max(part.start + middle - done, part.start), part.stop)
+        first.append(slice(part.start, cut))
+        second.append(slice(cut, part.stop))
+        done += part.stop - part.start
+    return [replace(recording, segments=tuple(part for part in found if part.stop > part.start))
+            for found in (first, second)]
+
+
+def errors_of(model: ForceModel, recordings: Sequence[Recording]) -> dict[str, float]:
+    """Return the rms error by drive on recordings."""
+    return _rms(model, _squares(model, recordings))
+
+
+def _squares(model: ForceModel, recordings: Sequence[Recording]) -> Array:
+    squares: Array = measure_residuals(model, recordings)[0].error ** 2
+    return squares
+
+
+def _rms(model: ForceModel, squares: Array) -> dict[str, float]:
+    known = np.isfinite(squares).sum(axis=0)
+    return {drive: float(np.sqrt(np.nanmean(squares[:, d]))) for d, drive in
+            enumerate(model.drives) if known[d]}
+
+
+def _fitted(model: ForceModel, recordings: Sequence[Recording],
+            ) -> tuple[ForceModel, tuple[FittedNumber, ...], tuple[str, ...]]:
+    if isinstance(model, ArmModel):
+        fit = fit_arm(model, columns_of(model, recordings))
+        return fit.model, _numbers(model, fit), _told(model, fit)
+    if not any(key.startswith('tolerances.') and value for key, value in model.values.items()):
+        raise FitError('tolerances: the model gives none, must name the numbers that are to be '
+                       'fitted, e.g. masses.payload: 0.05')
+    after, calibrated = fit_open_numbers(model, recordings)
+    return after, tuple(FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
+                        for one in calibrated), ()
+
+
+def _numbers(model: ArmModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
+    """Return what was fitted of each joint; links are told in `_told`."""
+    found = []
+    widths = {'friction.reversal_velocities': np.full(len(model.drives), np.inf)}
+    for key, std in {**fit.std, **widths}.items():
+        units = [unit.strip() for unit in model.keys[key].unit.split(',')]
+        for k, drive in enumerate(model.drives):
+            unit = units[0] if model.units[k].turns else units[-1]
+            before = model.values[key][k] or (
+                model.values['friction.reversal_velocity'] if key in widths else 0.0)
+            found.append(FittedNumber(key, drive, float(before), float(fit.model.values[key][k]),
+                                      float(std[k]), unit))
+    return tuple(found)
+
+
+def _told(model: ArmModel, fit: ArmFit) -> tuple[str, ...]:
+    told = [f'the motion determines {fit.determined} combinations of the {fit.total} inertial '
+            'parameters of the links; all others stay near those of the URDF']
+    if fit.weak_links:
+        told.append('masses of single links that it does not determine: what '
+                    f'{", ".join(fit.weak_links)} move')
+    if fit.standing:
+        told.append(f'{", ".join(fit.standing)} hardly moves: its friction stays as it was')
+    if model.values['arm.effort_unit'] == 'A':
+        told.append('efforts are currents times arm.gain: a gain that is wrong by 1 % makes all '
+                    'numbers wrong by 1 %')
+    return tuple(told)

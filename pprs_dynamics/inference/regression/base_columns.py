@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Columns that take part in every fit: what the model has already, and how friction turns over.
+
+A coefficient of 0 is the model as it was given. Each type knows its prior and what its
+coefficient means for the model's values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.sensitivities import Number
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.keys import set_number
+
+DIGITS = 6  # significant, of fitted values
+LARGEST_SHAPE_MOVE = 0.5  # of a shape parameter in one fit, as an amount of movement
+
+
+@dataclass(frozen=True)
+class BaseColumn:
+    """A column of every fit.
+
+    Parameters
+    ----------
+    rows : mapping of drive to (M,) array
+        Change of the drive's force per unit of the coefficient [N].
+    precision : float
+        Of the Gaussian prior about 0, in which the coefficient is what the model file says.
+    """
+
+    rows: Mapping[int, Array]
+    precision: float
+
+
+@dataclass(frozen=True)
+class KnownNumber(BaseColumn):
+    """A number within its tolerance; the coefficient counts standard deviations away from 0."""
+
+    number: Number
+
+    def value(self, coefficient: float) -> float:
+        """Return the number [its unit]."""
+        moved = self.number.value + np.sign(self.number.value) * coefficient * self.number.deviation
+        return rounded(moved)
+
+
+@dataclass(frozen=True)
+class ReversalShape(BaseColumn):
+    """Friction that turns over otherwise than the model's; `drive` None: in passive joints.
+
+    `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`.
+    """
+
+    drive: int | None
+    number: int
+
+
+@dataclass(frozen=True)
+class PresentCoefficient(BaseColumn):
+    """A coefficient of an effect that the given model has, per unit of its `scale`."""
+
+    effect: type[CatalogueEffect]
+    drive: str | None
+    coefficient: Parameter
+
+
+@dataclass(frozen=True)
+class PresentShape(BaseColumn):
+    """A shape parameter of an effect that the given model has, by its amount of movement."""
+
+    effect: type[CatalogueEffect]
+    drive: str | None
+    parameter: Parameter
+
+
+def rounded(value: float) -> float:
+    """Return a fitted value with the digits that a model file gets."""
+    return float(f'{value:.{DIGITS}g}')
+
+
+def within(parameter: Parameter, value: float) -> float:
+    """Return a fitted value, rounded, within the bounds of its parameter."""
+    return float(min(max(rounded(value), parameter.lower), parameter.upper))
+
+
+def move_numbers(values: dict[str, Any], base: Sequence[BaseColumn], coefficients: Array) -> None:
+    """Put known numbers as coefficients have them into a model's values."""
+    for column, c in zip(base, coefficients, strict=True):
+        if isinstance(column, KnownNumber):
+            set_number(values, column.number.key, column.number.element, column.value(float(c)))
+
+
+def move_present(values: dict[str, Any], given: ForceModel, base: Sequence[BaseColumn],
+                 coefficients: Array) -> None:
+    """Put the given model's effects as coefficients have them into a model's values."""
+    moves: dict[tuple[type[CatalogueEffect], str | None],
+                list[tuple[PresentCoefficient | PresentShape, float]]] = {}
+    for column, c in zip(base, coefficients, strict=True):
+        if isinstance(column, (PresentCoefficient, PresentShape)):
+            moves.setdefault((column.effect, column.drive), []).append((column, float(c)))
+    for effect in given.effects:
+        for (kind, drive), found in moves.items():
+            if kind is not type(effect):
+                continue
+            block = present_values(effect, drive)
+            linear = kind.to_coefficients(block)
+            shape = {p.name: block[p.name] for p in kind.shape}
+            for column, c in found:
+                if isinstance(column, PresentCoefficient):
+                    linear[column.coefficient.name] += c * column.coefficient.scale
+                else:
+                    p = column.parameter
+                    shape[p.name] = p.moved(shape[p.name], float(np.clip(
+                        c, -LARGEST_SHAPE_MOVE, LARGEST_SHAPE_MOVE)))
+            every = {**kind.from_coefficients(linear), **shape}
+            prefix = f'effects.{kind.name}.' + (f'{drive}.' if drive else '')
+            for parameter in kind.parameters:
+                values[prefix + parameter.name] = within(parameter, every[parameter.name])
+
+
+def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, float]:
+    """Return the parameters that an effect of a model has, on a drive or in the structure."""
+    if isinstance(effect, DriveEffect):
+        assert drive is not None
+        return effect.drives[drive]
+    assert isinstance(effect, StructureEffect)
+    return effect.values

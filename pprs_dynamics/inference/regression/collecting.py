@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Columns and full-rate motion, collected chunk by chunk while a model is evaluated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.arm_sensitivities import ArmSensitivities
+from pprs_dynamics.inference.regression.axis_sensitivities import AxisSensitivities
+from pprs_dynamics.inference.regression.platform_sensitivities import PlatformSensitivities
+from pprs_dynamics.inference.regression.sensitivities import NUMBERS, Sensitivities
+from pprs_dynamics.inference.regression.terms import FullRate
+from pprs_dynamics.measurement.motion.reconstruction import Reconstruction
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.axis_model import AxisModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.keys import ARM_GAIN
+
+COLUMN = 'column '
+
+
+def stacked_columns(tables: list[dict[str, Array]], count: int) -> dict[str, Array]:
+    """Take the columns out of tables, (k, D, M) each by name."""
+    stacked: dict[str, Array] = {}
+    for name in [name for name in tables[0] if name.startswith(COLUMN)]:
+        flat = np.concatenate([table.pop(name) for table in tables])
+        stacked[name.removeprefix(COLUMN)] = flat.reshape(len(flat), -1, count).transpose(1, 2, 0)
+    return stacked
+
+
+def sensitivities_of(model: ForceModel, given: ForceModel) -> Sensitivities:
+    """Return the sensitivities of a model of any kind."""
+    if isinstance(model, ArmModel):
+        return ArmSensitivities(model, given)
+    if isinstance(model, AxisModel):
+        return AxisSensitivities(model, given)
+    assert isinstance(model, DriveModel)
+    return PlatformSensitivities(model, given)
+
+
+class ColumnCollector:
+    """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
+
+    def __init__(self, sensitivities: Sensitivities, reconstruction: Reconstruction) -> None:
+        self.sensitivities = sensitivities
+        # A gain changes nothing of efforts that were not recorded as currents.
+        self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
+                             if number.key == ARM_GAIN
+                             and np.isnan(reconstruction.gain[number.element])]
+        self.share = reconstruction.recorded_share(sensitivities.model)
+        self.sensors = [effect.name for effect in sensitivities.model.effects
+                        if isinstance(effect, MeasurementEffect)]
+        self.kept: list[tuple[Array, ...]] = []
+
+    def __call__(self, forces: Forces) -> dict[str, Array]:
+        s: Any = forces.mechanism
+        effort = forces.total - sum((forces.parts[name] for name in self.sensors),
+                                    np.zeros_like(forces.total))
+        self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
+        columns = self.sensitivities.columns(forces)
+        columns[NUMBERS][self.without_gain] = 0.0
+        return {COLUMN + name: (self.share * column).transpose(1, 0, 2).reshape(len(s.velocity), -1)
+                for name, column in columns.items()}
+
+    def full_rate(self, reconstruction: Reconstruction) -> FullRate:
+        """Return what the drives did, with positions as the mechanism has them."""
+        velocity, acceleration, direction, load, effort = (
+            np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
+        return FullRate(
+            reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
+            effort, reconstruction.effort, reconstruction.segments, reconstruction.treat,
+            reconstruction.start)

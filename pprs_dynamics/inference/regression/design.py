@@ -1,0 +1,354 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Columns of the regression: the model's own numbers, and every catalogue effect that may lack.
+
+Model and columns are computed at full rate from one motion and then averaged in blocks, as the
+measured effort is; were one side treated otherwise, each reversal would look like friction.
+
+Forces are linear around a point: the model as given at first, and later one that has what was
+found. There the error is extrapolated back to the given model (Gauss-Newton), so that
+coefficients, priors and costs always mean the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import (
+    BaseColumn,
+    KnownNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+    present_values,
+)
+from pprs_dynamics.inference.regression.collecting import (
+    ColumnCollector,
+    sensitivities_of,
+    stacked_columns,
+)
+from pprs_dynamics.inference.regression.sensitivities import (
+    BARE,
+    HOMING,
+    NUMBERS,
+    OF_DRIVES,
+    OF_JOINTS,
+    PRESENT,
+)
+from pprs_dynamics.inference.regression.terms import FullRate, Point, Term
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.reconstruction import Reconstruction, reconstruct, with_zeros
+from pprs_dynamics.measurement.residuals.measuring import join_tables, treated_table
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.effects.drive_effect import (
+    DriveEffect,
+    DriveRange,
+    DriveSamples,
+    MeasurementEffect,
+)
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
+FREE = 1e-6  # prior precision of what is not known beforehand
+# A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
+# over, times the first: in less than the second of the time.
+TURNED, LEAST_MOVING = 2.0, 0.05
+
+
+@dataclass
+class Design:
+    """Measured efforts, the model's, and the columns that may explain the difference.
+
+    Parameters
+    ----------
+    given, model : ForceModel
+        As the user has it; and around which forces are linear.
+    residuals : Residuals
+        Whose error is that of the given model, extrapolated linearly from `model`.
+    recordings : tuple of FullRate
+    base : tuple of BaseColumn
+    structure : tuple of Term
+        Effects that are not in single drives.
+    homing : tuple of dict of drive to (M,) array
+        Change of all forces per metre that a drive is measured too far [N/m].
+    notes : tuple of str
+    reconstructions : tuple of Reconstruction
+    forces : (M, D) array
+        Of `model`, exactly [N].
+    point : Point, optional
+        None: the given model.
+    """
+
+    given: ForceModel
+    model: ForceModel
+    residuals: Residuals
+    recordings: tuple[FullRate, ...]
+    base: tuple[BaseColumn, ...]
+    structure: tuple[Term, ...]
+    homing: tuple[Mapping[int, Array], ...]
+    notes: tuple[str, ...]
+    reconstructions: tuple[Reconstruction, ...] = field(repr=False)
+    forces: Array = field(repr=False)
+    point: Point | None = None
+    _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
+        default_factory=dict, repr=False, compare=False)
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        return self.residuals.drives
+
+    @classmethod
+    def of(
+        cls, model: ForceModel, recordings: Sequence[Recording],
+        progress: Callable[[float], None] | None = None,
+    ) -> Design:
+        """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`."""
+        reconstructions = tuple(reconstruct(model, recording) for recording in recordings)
+        return cls._evaluated(model, model, reconstructions, progress)
+
+    def around(self, point: Point, progress: Callable[[float], None] | None = None) -> Design:
+        """Return the design of the same recordings around another point."""
+        design = self._evaluated(point.model, self.given, self.reconstructed(point.model),
+                                 progress)
+        shift = np.zeros_like(design.residuals.model)
+        for column, c in zip(design.base, point.base, strict=True):
+            if not isinstance(column, ReversalShape):
+                for d, row in column.rows.items():
+                    shift[:, d] += c * row
+        for one in point.effects:
+            term = design.find_term(one.effect, one.drive, one.shape)
+            weights = np.array([one.coefficients[name] for name in term.names] or [1.0])
+            for d, rows in term.rows.items():
+                shift[:, d] += weights @ rows
+        residuals = replace(design.residuals, model=design.residuals.model - shift)
+        return replace(design, residuals=residuals, point=point)
+
+    def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
+        """Return the motion of the recordings with the zeros that a model's drives have."""
+        shift = model.position_error - self.model.position_error
+        if not np.any(shift):
+            return self.reconstructions
+        key = np.asarray(shift).tobytes()
+        if key not in self._moved:
+            self._moved.clear()
+            self._moved[key] = tuple(with_zeros(one, model, shift)
+                                     for one in self.reconstructions)
+        return self._moved[key]
+
+    @classmethod
+    def _evaluated(cls, model: ForceModel, given: ForceModel,
+                   reconstructions: tuple[Reconstruction, ...],
+                   progress: Callable[[float], None] | None) -> Design:
+        sensitivities = sensitivities_of(model, given)
+        tables: list[dict[str, Array]] = []
+        full: list[FullRate] = []
+        notes: list[str] = []
+        for k, reconstruction in enumerate(reconstructions):
+            def report(done: int, total: int, k: int = k) -> None:
+                if progress is not None:
+                    progress((k + done / total) / len(reconstructions))
+
+            collector = ColumnCollector(sensitivities, reconstruction)
+            tables.append(treated_table(model, reconstruction, report, collector))
+            full.append(collector.full_rate(reconstruction))
+            notes += reconstruction.notes
+        stacked = stacked_columns(tables, len(model.drives))
+        residuals = join_tables(model, tables)
+        count = len(model.drives)
+        structure = tuple(
+            Term(effect, None, {}, _by_drive(stacked[effect.name], count),
+                 _by_drive(stacked[BARE + effect.name], count)
+                 if BARE + effect.name in stacked else None)
+            for effect in sensitivities.searched)
+        homing = tuple(dict(enumerate(column)) for column in stacked.get(HOMING, ()))
+        design = cls(given, model, residuals, tuple(full), (), structure, homing, tuple(notes),
+                     reconstructions, residuals.model)
+        base: list[BaseColumn] = [
+            KnownNumber(_rows(column), 1.0, number)
+            for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
+        # Where a drive stands, friction that turns over otherwise is any constant force.
+        base += [ReversalShape({d: column[d]}, 1.0, d, number)
+                 for number, column in enumerate(stacked[OF_DRIVES])
+                 for d in range(count) if np.any(column[d]) and design.moves(d)]
+        base += [ReversalShape(_rows(column), 1.0, None, number)
+                 for number, column in enumerate(stacked.get(OF_JOINTS, ())) if np.any(column)]
+        for effect in given.effects:
+            if isinstance(effect, DriveEffect):
+                base += design._present_in_drives(effect)
+            elif isinstance(effect, StructureEffect):
+                base += [PresentCoefficient(_rows(column * c.scale), FREE, type(effect), None, c)
+                         for c, column in zip(effect.coefficients, stacked[PRESENT + effect.name],
+                                              strict=True)]
+        return replace(design, base=tuple(base))
+
+    def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
+        """Return when a drive is in motion, (M,)."""
+        width = np.broadcast_to(self.given.reversal.velocity, len(self.drives))[drive]
+        return np.abs(self.residuals.variables['velocity'][:, drive]) > float(TURNED * width)
+
+    def moves(self, drive: int) -> bool:
+        """Return whether a drive is in motion for a noteworthy share of the time."""
+        return bool(np.mean(self.moving(drive)) >= LEAST_MOVING)
+
+    @cached_property
+    def covered(self) -> tuple[DriveRange, ...]:
+        """What each drive did."""
+        return tuple(self._covered(drive) for drive in range(len(self.drives)))
+
+    def _covered(self, drive: int) -> DriveRange:
+        position = np.concatenate([one.position[:, drive] for one in self.recordings])
+        velocity = np.concatenate([one.velocity[:, drive] for one in self.recordings])
+        longest = max(self.recordings, key=lambda recording: len(recording.time))
+        return DriveRange(float(longest.time[-1] - longest.time[0]),
+                          float(np.median(np.diff(longest.time))),
+                          float(np.ptp(position)), float(np.abs(velocity).max()),
+                          self.given.gear_ratios[drive])
+
+    def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
+        """Return whether an effect may be looked for on a drive: it may act, and is not there."""
+        present = next((e for e in self.given.effects if type(e) is effect), None)
+        return (issubclass(effect, DriveEffect) and self.given.offers(effect)
+                and not (isinstance(present, DriveEffect) and self.drives[drive] in present.drives)
+                and (not effect.is_friction or self.moves(drive)))
+
+    def absent(self, effect: type[CatalogueEffect]) -> frozenset[str]:
+        """Return the coefficients of an effect that the model has no body for."""
+        if isinstance(self.model, ArmModel) and issubclass(effect, BodyEffect):
+            return effect.absent(self.model.arm)
+        return frozenset()
+
+    def drive_rows(self, effect: type[DriveEffect], drive: int,
+                   shape: Mapping[str, float]) -> Array:
+        """Return the treated columns of an effect on one drive, (k, M)."""
+        parts = []
+        for recording in self.recordings:
+            pieces = [self._columns(effect, recording, part, drive, shape)
+                      for part in recording.segments]
+            parts.append(recording.treat(np.concatenate(pieces, axis=1).T).T)
+        return np.concatenate(parts, axis=1)
+
+    def _columns(self, effect: type[DriveEffect], recording: FullRate, part: slice, drive: int,
+                 shape: Mapping[str, float]) -> Array:
+        """Return an effect's columns in one segment, (k, N), as the sensors show them."""
+        time = recording.time[part]
+        if issubclass(effect, MeasurementEffect):
+            effort = self._sensed(recording.effort[None, part, drive], time, drive, effect)[0]
+            return np.stack(effect.sensor_columns(effort, time, **shape))
+        memory = effect.drive_memory()
+        if memory is not None:
+            effect.begin(memory, recording.start)
+        rows = np.stack(effect.columns(recording.samples(part, drive, memory), **shape))
+        return self._sensed(rows, time, drive)
+
+    def _sensed(self, rows: Array, time: Array, drive: int,
+                without: type[CatalogueEffect] | None = None) -> Array:
+        """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
+        for effect in self.model.effects:
+            if (isinstance(effect, MeasurementEffect) and self.drives[drive] in effect.drives
+                    and type(effect) is not without):
+                rows = np.stack([effect.sensed(np.repeat(row[:, None], len(self.drives), axis=1),
+                                               time, self.drives)[:, drive] for row in rows])
+        return rows
+
+    def term(self, effect: type[DriveEffect], drive: int, shape: Mapping[str, float]) -> Term:
+        """Return an effect on one drive, of one shape."""
+        if issubclass(effect, MeasurementEffect) and effect.shifts_positions():
+            units = [effect({self.drives[drive]: effect.from_coefficients(
+                {c.name: float(c is unit) for c in effect.coefficients})}).position_error(
+                    self.drives) for unit in effect.coefficients]
+            every = {d: np.stack([sum(shift[k] * self.homing[k][d] for k in np.flatnonzero(shift))
+                                  for shift in units]) for d in range(len(self.drives))}
+            return Term(effect, drive, dict(shape), every)
+        return Term(effect, drive, dict(shape), {drive: self.drive_rows(effect, drive, shape)})
+
+    def find_term(self, effect: type[CatalogueEffect], drive: int | None,
+                  shape: Mapping[str, float]) -> Term:
+        """Return an effect on a drive or in the structure."""
+        if drive is None:
+            return next(term for term in self.structure if term.effect is effect)
+        assert issubclass(effect, DriveEffect)
+        return self.term(effect, drive, shape)
+
+    def trial_terms(self, effect: type[DriveEffect], drive: int,
+                    shapes: Sequence[Mapping[str, float]]) -> list[Term]:
+        """Return an effect on one drive in many shapes, with rows for `scanned` only."""
+        variables = self.residuals.variables
+        time = self.residuals.time
+        means = DriveSamples(time, variables['position'][:, drive],
+                             variables['velocity'][:, drive], np.zeros_like(time),
+                             np.zeros_like(time), np.zeros_like(time))
+        rows = effect.averaged(means, self.residuals.period, shapes)
+        if rows is None:
+            return [self.term(effect, drive, shape) for shape in shapes]
+        return [Term(effect, drive, shape, {drive: block}) for shape, block
+                in zip(shapes, rows, strict=True)]
+
+    def slope_rows(self, term: Term, coefficients: Array) -> Array:
+        """Return the derivatives of a term's force by its shape parameters, (s, M) [N].
+
+        Parameters
+        ----------
+        term : Term
+        coefficients : (k,) array
+            By which its rows are multiplied; 1 where it is fixed.
+        """
+        assert term.drive is not None
+        assert issubclass(term.effect, DriveEffect)
+        before = coefficients @ term.rows[term.drive]
+        slopes = []
+        for parameter in term.effect.shape:
+            value = term.shape[parameter.name]
+            moved = {**term.shape, parameter.name: parameter.moved(value, SHAPE_STEP)}
+            after = coefficients @ self.drive_rows(term.effect, term.drive, moved)
+            slopes.append((after - before) / SHAPE_STEP)
+        return np.stack(slopes)
+
+    def _present_in_drives(self, effect: DriveEffect) -> list[BaseColumn]:
+        """Return what an effect of the given model may still change, drive by drive."""
+        found: list[BaseColumn] = []
+        kind = type(effect)
+        for name in effect.drives:
+            drive, values = self.drives.index(name), present_values(effect, name)
+            term = self.term(kind, drive, {p.name: values[p.name] for p in kind.shape})
+            weights = kind.to_coefficients(values)
+            found += [PresentCoefficient({d: rows[k] * c.scale for d, rows in term.rows.items()},
+                                         FREE, kind, name, c)
+                      for k, c in enumerate(kind.coefficients)]
+            if kind.shape:
+                slopes = self.slope_rows(term, np.array(
+                    [weights[name] for name in term.names] or [1.0]))
+                found += [PresentShape({drive: row}, FREE, kind, name, p)
+                          for p, row in zip(kind.shape, slopes, strict=True)]
+        return found
+
+    def friction(self) -> ActiveFriction | AxisFriction | None:
+        """Return the friction that the model has in its drives."""
+        own = (ActiveFriction, AxisFriction)
+        return next((effect for effect in self.model.effects if isinstance(effect, own)), None)
+
+
+def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
+    """Return the effects on drives that the given model may lack."""
+    return [effect for effect in catalogue().values() if issubclass(effect, DriveEffect)
+            and any(design.acts_on(effect, d) for d in range(len(design.drives)))]
+
+
+def _rows(column: Array) -> dict[int, Array]:
+    return {drive: row for drive, row in enumerate(column) if np.any(row)}
+
+
+def _by_drive(columns: Array, count: int) -> dict[int, Array]:
+    return {d: columns[:, d] for d in range(count)}

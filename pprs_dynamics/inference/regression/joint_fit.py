@@ -1,0 +1,305 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+r"""All drives' errors fitted together: what the model has, what it may lack, and the noise.
+
+With the transformed errors y_d of the drives, columns X_d and noise spectra S_d, a set of columns
+with Gaussian priors of precision Lambda about 0 has the penalised deviance
+
+.. math::
+
+    D = \sum_{d, k} \left( \ln S_d + \frac{r_d^2}{S_d} \right) + c^T \Lambda c
+        + \ln \det (H + \Lambda) - \ln \det \Lambda, \qquad H = \sum_d X_d^T S_d^{-1} X_d,
+
+-2 ln of the likelihood with the coefficients integrated out (restricted likelihood), but for a
+constant. Coefficients and noise are fitted in turn until it stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import BaseColumn
+from pprs_dynamics.inference.regression.normal_equations import (
+    Block,
+    DriveEquations,
+    NormalEquations,
+    term_gains,
+)
+from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.measurement.residuals.noise import NoiseShapes, NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+
+LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
+# The fit has converged when a round changes the deviance by less, or by less than this share of
+# what it lies above the one it is compared with; rounds are bounded.
+CONVERGED, HOPELESS, MOST_ROUNDS, NOISE_STEPS = 0.01, 0.005, 40, 60
+MOST_EQUATIONS = 300  # of drives that are kept: some 0.1 to 0.5 MB each
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """A fit of blocks.
+
+    Parameters
+    ----------
+    blocks : tuple of Block
+    coefficients : (P,) array
+        Of the base columns, then of the blocks in order.
+    covariance : (P, P) array
+    amplitudes : (D, J + 1) array
+        Of the noise spectra [N^2].
+    spectra : (D, B) array
+        At the bands [N^2].
+    deviance : float
+        See the module.
+    squares : (D, B) array
+        Sums of squares that are left in the bands [N^2].
+    """
+
+    blocks: tuple[Block, ...]
+    coefficients: Array
+    covariance: Array
+    amplitudes: Array
+    spectra: Array
+    deviance: float
+    squares: Array
+    places: Mapping[Block, slice] = field(repr=False)
+
+    def of(self, block: Block) -> Array:
+        """Return the coefficients of a block; 1 for a fixed one."""
+        return np.ones(1) if block.is_fixed else self.coefficients[self.places[block]]
+
+
+class Regression:
+    """Errors of drives, transformed, and the fits to them.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    base : sequence of BaseColumn
+        That take part in every fit.
+    drives : sequence of int, optional
+        Of the residuals; by default all that have enough samples.
+    error_scale : mapping of drive to float, optional
+        Force that priors of effects allow [N], so that costs of two designs mean the same; by
+        default the rms of the error.
+
+    Raises
+    ------
+    ResidualsError
+        Where no drive has enough samples.
+    """
+
+    def __init__(self, residuals: Residuals, base: Sequence[BaseColumn] = (),
+                 drives: Sequence[int] | None = None,
+                 error_scale: Mapping[int, float] | None = None) -> None:
+        self.residuals, self.columns = residuals, tuple(base)
+        self.bands = FrequencyBands.for_residuals(residuals)
+        self.noise_shapes = NoiseShapes.of(self.bands)
+        every = {d: DriveSeries(residuals, d, self.bands)
+                 for d in (range(len(residuals.drives)) if drives is None else drives)}
+        self.series = {d: one for d, one in every.items() if one.known.sum() >= LEAST_SAMPLES}
+        self.drives = tuple(self.series)
+        if not self.drives:
+            most = max((int(one.known.sum()) for one in every.values()), default=0)
+            raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
+                                 f'hold at least {LEAST_SAMPLES} of a drive')
+        self.counts = np.stack([self.series[d].counts for d in self.drives])
+        self.precision = np.array([column.precision for column in self.columns])
+        self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
+                                        if d in column.rows], dtype=int) for d in self.drives}
+        # The error is the last row of each drive's base.
+        self.base = {d: series.transform(np.stack(
+            [self.columns[k].rows[d][series.index] for k in self.base_index[d]] + [series.error]))
+            for d, series in self.series.items()}
+        self.base_products = {d: self.series[d].products(rows, rows)
+                               for d, rows in self.base.items()}
+        self._products: dict[tuple[Block, Block | None, int], Array] = {}
+        self._equations: dict[tuple[int, tuple[Block, ...]], DriveEquations] = {}
+        self.error_scale = error_scale or {
+            d: float(np.sqrt(np.mean(rows[-1] ** 2))) for d, rows in self.base.items()}
+
+    @property
+    def samples(self) -> int:
+        """Samples of the drive that has most."""
+        return max(len(series) for series in self.series.values())
+
+    def block(self, rows: Mapping[int, Array], is_fixed: bool = False,
+              precision: Array | None = None) -> Block:
+        """Return a block of rows in time, (k, M) by drive, by default with the g-prior.
+
+        The g-prior lets the force of any combination of the rows be of the size of the error
+        that the drives show: its determinant is ln of the number of samples that a coefficient
+        is worth, so that what slow noise could be as well is cheap and weak by itself.
+        """
+        return self.transformed_block(
+            {d: self.series[d].transform(np.atleast_2d(values)) for d, values in rows.items()
+             if d in self.series}, is_fixed, precision)
+
+    def transformed_block(self, rows: Mapping[int, Array], is_fixed: bool = False,
+                          precision: Array | None = None) -> Block:
+        """Return a block of rows that are transformed already, (k, n) by drive."""
+        if precision is None:
+            precision = self.g_prior({d: values @ values.T for d, values in rows.items()})
+        return Block(rows, precision, is_fixed)
+
+    def g_prior(self, grams: Mapping[int, Array]) -> Array:
+        """Return the precision of coefficients whose rows have these sums of products, (k, k)."""
+        felt = {d: gram for d, gram in grams.items() if np.any(gram)}
+        precision = sum(gram / (len(self.series[d]) * max(self.error_scale[d], 1e-12) ** 2)
+                        for d, gram in felt.items()) / max(len(felt), 1)
+        size = len(next(iter(grams.values()))) if grams else 1
+        precision = np.zeros((size, size)) + precision
+        scale = np.trace(precision) / size
+        full: Array = precision + (1e-9 * scale + 1e-300) * np.eye(size)
+        return full
+
+    def products(self, a: Block, b: Block | None, d: int) -> Array:
+        """Return the band sums of a block's rows with another's, or with the base and error."""
+        key = (a, b, d)
+        if key not in self._products:
+            if b is not None and (b, a, d) in self._products:
+                return self._products[b, a, d].transpose(0, 2, 1)
+            other = self.base[d] if b is None else b.rows[d]
+            self._products[key] = self.series[d].products(a.rows[d], other)
+        return self._products[key]
+
+    def equations(self, d: int, felt: tuple[Block, ...]) -> DriveEquations:
+        """Return the equations of a drive, kept: sets that follow each other differ on few."""
+        key = (d, felt)
+        if key not in self._equations:
+            if len(self._equations) >= MOST_EQUATIONS:
+                self._equations.clear()
+            self._equations[key] = DriveEquations(self, d, felt)
+        return self._equations[key]
+
+    def fit(self, blocks: Sequence[Block], start: Array | None = None,
+            rival: float = np.inf) -> JointFit:
+        """Return the fit of blocks beside the base columns, the noise fitted with it.
+
+        Parameters
+        ----------
+        blocks : sequence of Block
+        start : (D, J + 1) array, optional
+            Amplitudes of the noise to start from.
+        rival : float
+            The deviance to be compared with: far above it the fit is only a rough one.
+        """
+        system = NormalEquations(self, blocks)
+        shapes = self.noise_shapes
+        if start is None:
+            start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
+        amplitudes, spectra = start, shapes.spectra(start)
+        solution = system.solve(spectra, self.counts)
+        for _ in range(MOST_ROUNDS - 1):
+            before = solution.deviance
+            amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,
+                                         solution.leverage, NOISE_STEPS)
+            spectra = shapes.spectra(amplitudes)
+            solution = system.solve(spectra, self.counts)
+            above = solution.deviance - rival
+            if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
+                break
+        return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
+                        spectra, solution.deviance, solution.squares, system.places)
+
+    def at(self, blocks: Sequence[Block], amplitudes: Array) -> JointFit:
+        """Return the fit of blocks under given noise."""
+        system = NormalEquations(self, blocks)
+        spectra = self.noise_shapes.spectra(amplitudes)
+        solution = system.solve(spectra, self.counts)
+        return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
+                        spectra, solution.deviance, solution.squares, system.places)
+
+    def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
+        """Return the noise of every drive."""
+        return {d: NoiseSpectrum(self.noise_shapes.corners, fit.amplitudes[k],
+                                 self.residuals.period, float(fit.spectra[k, 0]))
+                for k, d in enumerate(self.drives)}
+
+    def left(self, fit: JointFit) -> Array:
+        """Return the root of the mean square that a fit leaves on each drive, (D,) [N]."""
+        found: Array = np.sqrt(fit.squares.sum(axis=1) / self.counts.sum(axis=1))
+        return found
+
+    def noise_floor(self, fit: JointFit, d: int) -> float:
+        """Return the root of the mean square of a drive's noise over its coefficients [N].
+
+        With the constant that the lowest frequencies show, not with what may lie below them.
+        """
+        k = self.drives.index(d)
+        power = fit.amplitudes[k] @ self.noise_shapes.at_bands
+        return float(np.sqrt(self.counts[k] @ power / max(self.counts[k].sum(), 1)))
+
+    def weights(self, fit: JointFit, d: int) -> Array:
+        """Return 1 / S at the bands of a drive, (B,) [1/N^2]."""
+        weights: Array = 1 / fit.spectra[self.drives.index(d)]
+        return weights
+
+    def whitened(self, fit: JointFit, d: int, rows: Array) -> Array:
+        """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""
+        series = self.series[d]
+        factor = series.spread(np.sqrt(self.weights(fit, d)))
+        white = series.inverse(series.transform(rows) * factor)
+        white[..., ~series.known] = 0.0
+        return white
+
+    def local(self, fit: JointFit, d: int) -> tuple[Array, list[Block]]:
+        """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""
+        felt = [block for block in fit.blocks if d in block.rows and not block.is_fixed]
+        index = [self.base_index[d]]
+        index += [np.arange(fit.places[block].start, fit.places[block].stop) for block in felt]
+        return np.concatenate(index), felt
+
+    def remaining(self, fit: JointFit, d: int) -> Array:
+        """Return the DCT coefficients of what a fit leaves on a drive, (n,) [N]."""
+        rest: Array = (self.base[d][-1]
+                       - fit.coefficients[self.base_index[d]] @ self.base[d][:-1])
+        for block in fit.blocks:
+            if d in block.rows:
+                rest = rest - fit.of(block) @ block.rows[d]
+        return rest
+
+    def gain(self, fit: JointFit, block: Block) -> float:
+        """Return by how much the deviance falls with one more block, at the noise of a fit."""
+        S, b, _ = self._beside(fit, block)
+        return float(term_gains(S[None], b[None], block.precision[None], block.is_fixed)[0])
+
+    def own_information(self, fit: JointFit, block: Block) -> Array:
+        """Return the information on a block's coefficients that a fit leaves, (k, k)."""
+        return self._beside(fit, block)[0]
+
+    def own_share(self, fit: JointFit, block: Block) -> float:
+        """Return the least share of a column's whitened square that a fit cannot take."""
+        S, _, plain = self._beside(fit, block)
+        return float(np.min(np.diag(S) / np.maximum(plain, 1e-300)))
+
+    def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
+        """Return own sums of products, those with what is left, and full squares of a block."""
+        size = len(next(iter(block.rows.values())))
+        S, b = np.zeros((size, size)), np.zeros(size)
+        taken = np.zeros((size, len(fit.coefficients)))
+        for d in block.rows:
+            weights = self.weights(fit, d)
+            index, felt = self.local(fit, d)
+
+            def weighted(other: Block | None, d: int = d, weights: Array = weights) -> Array:
+                pair = self.products(block, other, d)
+                found: Array = (weights @ pair.reshape(len(weights), -1)).reshape(pair.shape[1:])
+                return found
+
+            with_base = weighted(None)
+            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in felt)], axis=1)
+            S += weighted(block)
+            b += with_base[:, -1] - known @ fit.coefficients[index]
+            for one in fit.blocks:
+                if one.is_fixed and d in one.rows:
+                    b -= weighted(one)[:, 0]
+            taken[:, index] += known
+        plain = np.diag(S).copy()
+        return S - taken @ fit.covariance @ taken.T, b, plain

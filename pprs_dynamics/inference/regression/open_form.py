@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the form of an effect on a drive leaves open, in proportion to its force.
+
+Friction turns over at reversals in a width that nobody knows, and real effects depart from the
+catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Each gives a column
+whose coefficient has unit prior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.sensitivities import reversal_columns
+from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+
+
+def open_rows(design: Design, term: Term, coefficients: Array) -> Array:
+    """Return what a term's form leaves open, (w, M) [N]; (0, M) for nothing.
+
+    Parameters
+    ----------
+    design : Design
+    term : Term
+    coefficients : (k,) array
+        By which its rows are multiplied.
+    """
+    return np.concatenate((reversal_rows(design, term, coefficients),
+                           _deviation_rows(design, term, coefficients)))
+
+
+def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
+    """Return what a term's friction changes by where it turns over otherwise, (w, M) [N].
+
+    None, (0, M), for what is no friction or knows its past.
+    """
+    effect = term.effect
+    if (term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect)
+            or effect.drive_memory() is not None):
+        return np.zeros((0, len(design.residuals)))
+    width = np.broadcast_to(design.model.reversal.velocity, len(design.drives))[term.drive]
+    parts = []
+    for recording in design.recordings:
+        samples = recording.samples(slice(None), term.drive)
+        forward, backward = (coefficients @ np.stack(effect.columns(
+            replace(samples, direction=np.full_like(samples.velocity, sign)), **term.shape))
+            for sign in (1.0, -1.0))
+        rows = np.stack(reversal_columns(
+            (forward - backward) / 2, samples.velocity, samples.direction, width))
+        parts.append(recording.treat(rows.T).T)
+    return np.concatenate(parts, axis=1)
+
+
+def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
+    """Return what real forms of a term's effect may add to its force, (w, M) [N]."""
+    effect = term.effect
+    if term.drive is None or not issubclass(effect, DriveEffect):
+        return np.zeros((0, len(design.residuals)))
+    found = [effect.deviations(recording.samples(slice(None), term.drive), **term.shape)
+             for recording in design.recordings]
+    if not found[0]:
+        return np.zeros((0, len(design.residuals)))
+    return np.concatenate([
+        recording.treat(np.stack([coefficients @ np.stack(one) for one in columns], axis=-1)).T
+        for recording, columns in zip(design.recordings, found, strict=True)], axis=1)

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Terms of the regression: an effect on a drive or in the structure, and what drives did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.physics.effects.drive_effect import DriveSamples
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+Rows = Mapping[int, Array]
+"""Columns by drive, (k, M) each; drives that are not in it feel nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One way in which an effect may be there: on one drive, or in the structure; one shape.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drive : int or None
+        On which it sits.
+    shape : mapping of str to float
+    rows : dict of drive to (k, M) array
+        One row per coefficient [N].
+    bare : dict of drive to (k, M) array, optional
+        The rows if friction did not follow the loads that the effect adds.
+    """
+
+    effect: type[CatalogueEffect]
+    drive: int | None
+    shape: Mapping[str, float]
+    rows: Rows
+    bare: Rows | None = None
+
+    @property
+    def is_fixed(self) -> bool:
+        """True where the only row has the coefficient 1: its shape says it all."""
+        return not self.effect.coefficients
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Coefficients of the rows; none where the only row has the coefficient 1."""
+        return tuple(c.name for c in self.effect.coefficients)
+
+
+@dataclass(frozen=True)
+class FullRate:
+    """What the drives did at every sample of a recording, in segments; (N, D) arrays.
+
+    `effort` is what the model's drives apply, before any sensor; `effort_measured` the
+    recording's; `start` the time at which the recording began [s].
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    direction: Array
+    guide_load: Array
+    effort: Array
+    effort_measured: Array
+    segments: tuple[slice, ...]
+    treat: Treatment
+    start: float
+
+    def samples(self, part: slice, drive: int, memory: object = None) -> DriveSamples:
+        """Return one drive in one segment."""
+        return DriveSamples(
+            self.time[part], self.position[part, drive], self.velocity[part, drive],
+            self.acceleration[part, drive], self.direction[part, drive],
+            self.guide_load[part, drive], memory)
+
+
+@dataclass(frozen=True)
+class PlacedEffect:
+    """An effect on a drive or in the structure, with all its coefficients by name."""
+
+    effect: type[CatalogueEffect]
+    drive: int | None
+    shape: Mapping[str, float]
+    coefficients: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where forces are linear: a model, and what makes it differ from the given one.
+
+    Parameters
+    ----------
+    model : ForceModel
+    base : (P,) array
+        Coefficients of the base columns; those of reversals are 0.
+    effects : tuple of PlacedEffect
+        What it has beside the given model.
+    """
+
+    model: ForceModel
+    base: Array
+    effects: tuple[PlacedEffect, ...] = ()

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""How much of the error the lack of fit of effects may be.
+
+The catalogue's friction, springs and cords are only nearly of the form that real ones have, and so
+is the model's own friction: they may leave a small share of their force. Masses, gravity and
+sensors are exact, and nothing else's lack of fit looks like them by much.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+
+
+def share_of_allowance(design: Design, regression: Regression, decisions: Decisions,
+                       found: CandidateSet, candidate: Candidate,
+                       ) -> tuple[float, tuple[str, ...]]:
+    """Return a candidate's force beyond the others over what their lack of fit may leave."""
+    # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
+    exact = isinstance(candidate, EffectCandidate) and not (
+        candidate.effect.idealised or candidate.effect.shows_at_reversals)
+    share = decisions.exact_share if exact else decisions.form_share
+    drives = {d for block in candidate.blocks for d in block.rows}
+    allowed, names = 0.0, []
+    for other in found.effects:
+        if other is candidate or not other.effect.idealised:
+            continue
+        size = sum(whitened_square(regression, found, block, drives) for block in other.blocks)
+        if size > 0:
+            allowed += share ** 2 * size
+            names.append(other.name)
+    for effect in design.given.effects:
+        if isinstance(effect, CatalogueEffect) and effect.idealised:
+            allowed += share ** 2 * _square_of_part(regression, found, effect.name, drives)
+            names.append(effect.name)
+    own = 0.0 if exact else decisions.own_form_share ** 2 * _own_friction(
+        design, regression, found, drives)
+    if own > allowed:
+        names = ["the model's own friction"]
+    square = beyond_others(regression, found, candidate)
+    return float(np.sqrt(square / max(allowed + own, 1e-300))), tuple(names)
+
+
+def beyond_others(regression: Regression, found: CandidateSet, candidate: Candidate) -> float:
+    """Return the whitened square of what no refit of the others makes good."""
+    free = [block for block in candidate.blocks if not block.is_fixed]
+    if not free:
+        return sum(whitened_square(regression, found, block, set(block.rows))
+                   for block in candidate.blocks)
+    index = np.concatenate([np.arange(place.start, place.stop) for place in (
+        found.fit.places[block] for block in free)])
+    c = found.fit.coefficients[index]
+    return float(c @ np.linalg.solve(found.fit.covariance[np.ix_(index, index)], c))
+
+
+def whitened_square(regression: Regression, found: CandidateSet, block: Block,
+                    drives: set[int]) -> float:
+    """Return the whitened square of a block's force on some drives."""
+    total = 0.0
+    c = found.fit.of(block)
+    for d in drives & set(block.rows):
+        gram = np.tensordot(regression.weights(found.fit, d),
+                            regression.products(block, block, d), 1)
+        total += float(c @ gram @ c)
+    return total
+
+
+def _own_friction(design: Design, regression: Regression, found: CandidateSet,
+                  drives: set[int]) -> float:
+    """Return the whitened square of the friction that the given model has on some drives."""
+    own = [effect.name for effect in design.given.effects
+           if not isinstance(effect, CatalogueEffect) and effect.name.endswith('friction')]
+    return sum(_square_of_part(regression, found, name, drives) for name in own)
+
+
+def _square_of_part(regression: Regression, found: CandidateSet, name: str,
+                    drives: set[int]) -> float:
+    """Return the whitened square of a part of the given model's force on some drives."""
+    force = regression.residuals.parts.get(name)
+    if force is None:
+        return 0.0
+    white = [regression.whitened(found.fit, d, force[:, d]) for d in drives]
+    return sum(float(one @ one) for one in white)

@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parameters with uncertainty, from a set and those that are nearly as good."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import KnownNumber, PresentCoefficient, within
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.reversal_widths import place_of
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+MOST_AVERAGED = 4  # further sets that estimates are averaged over
+AT_EDGE = 0.02  # of a value: how near the smallest or largest shape tried it is not to be trusted
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted value and its standard deviation."""
+
+    value: float
+    std: float
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'value': self.value, 'std': self.std, 'unit': self.unit}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A number of the model that was moved within its tolerance."""
+
+    key: str
+    element: int | None
+    before: float
+    after: float
+    std: float
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """Name for people, e.g. masses.slides[2]."""
+        return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the keys of the interface."""
+        return {'key': self.label, 'before': self.before, 'after': self.after, 'std': self.std,
+                'unit': self.unit}
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What a fit says about an effect.
+
+    Parameters
+    ----------
+    parameters : dict of str to Estimate
+        By drive.parameter, or parameter.
+    at_bound : tuple of str
+        Those at a bound of the catalogue, or at the edge of the shapes that were tried.
+    """
+
+    parameters: dict[str, Estimate]
+    at_bound: tuple[str, ...]
+
+
+def estimate(search: Search, found: CandidateSet, candidate: EffectCandidate,
+             near: Sequence[CandidateSet] = ()) -> Estimates:
+    """Return the parameters of an effect, in the values that the set has.
+
+    Their uncertainty is that of the whole fit: shapes take part by their derivatives, priors and
+    noise as they are, and sets that are nearly as good by exp(-cost / 2), with what they say
+    differently.
+
+    Parameters
+    ----------
+    search : Search
+    found : CandidateSet
+    candidate : EffectCandidate
+        Of the set.
+    near : sequence of CandidateSet
+        Of the same search.
+    """
+    own, bound = _of_set(search, found, candidate)
+    weights = [1.0]
+    mixed: dict[str, list[tuple[float, float]]] = {
+        key: [(one.value, one.std)] for key, one in own.items()}
+    for other in sorted(near, key=lambda one: one.cost)[:MOST_AVERAGED]:
+        same = next((c for c in other.effects if c.effect is candidate.effect), None)
+        if same is None or other is found:
+            continue
+        weights.append(float(np.exp(-0.5 * max(other.cost - found.cost, 0.0))))
+        said, _ = _of_set(search, other, same)
+        for key, one in own.items():
+            there = said.get(key, one)
+            mixed[key].append((there.value, there.std))
+    share = np.array(weights) / sum(weights)
+    parameters = {}
+    for key, one in own.items():
+        values, stds = np.array(mixed[key]).T
+        spread = float(np.sqrt(share @ (stds ** 2 + (values - one.value) ** 2)))
+        parameters[key] = Estimate(one.value, spread, one.unit)
+    return Estimates(parameters, bound)
+
+
+def _of_set(search: Search, found: CandidateSet, candidate: EffectCandidate,
+            ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
+    slopes = dict(search.slopes(found))
+    fit = search.regression.at((*found.fit.blocks, *slopes.values()), found.fit.amplitudes)
+    parameters: dict[str, Estimate] = {}
+    bound: list[str] = []
+    for placement in candidate.placements:
+        blocks = [placement.block, *([slopes[placement]] if placement in slopes else [])]
+        index = np.concatenate([np.arange(place.start, place.stop) for place in (
+            fit.places[block] for block in blocks)])
+        covariance = fit.covariance[np.ix_(index, index)]
+        c = found.coefficients(placement)
+        some, held = _of_placement(search, placement, c, covariance)
+        parameters.update(some)
+        bound += held
+    return parameters, tuple(bound)
+
+
+def _of_placement(search: Search, placement: Placement, c: Array, covariance: Array,
+                  ) -> tuple[dict[str, Estimate], list[str]]:
+    effect, term = placement.term.effect, placement.term
+    prefix = '' if placement.drive is None else f'{search.design.drives[placement.drive]}.'
+    unit_of = _units(search.design, placement.drive)
+    values = placement.values(c)
+    size = placement.block.size
+    found, bound = {}, []
+    # From coefficients to parameters: the map is smooth but for angles, which it may wrap.
+    for parameter in effect.linear:
+        slope = np.zeros(size)
+        for k in range(size):
+            step = 1e-4 * max(float(np.sqrt(covariance[k, k])), 1e-12)
+            moved = c.copy()
+            moved[k] += step
+            slope[k] = (placement.values(moved)[parameter.name] - values[parameter.name]) / step
+        variance = float(slope @ covariance[:size, :size] @ slope)
+        found[prefix + parameter.name] = Estimate(
+            within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
+            unit_of(parameter.unit))
+        if not parameter.lower <= values[parameter.name] <= parameter.upper:
+            bound.append(prefix + parameter.name)
+    for k, parameter in enumerate(effect.shape):
+        value = float(term.shape[parameter.name])
+        amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
+        found[prefix + parameter.name] = Estimate(
+            within(parameter, value), parameter.spread(amount, value),
+            unit_of(parameter.unit))
+        trials = sorted({trial[parameter.name] for trial in _trials(search, placement)})
+        if len(trials) > 2 and not (trials[0] + AT_EDGE * abs(trials[0]) < value
+                                    < trials[-1] - AT_EDGE * abs(trials[-1])):
+            bound.append(prefix + parameter.name)
+    return found, bound
+
+
+def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
+    """Return what makes units of a drive's parameters from those of a drive that pushes."""
+    if drive is None:
+        return lambda unit: unit
+    name = drive if isinstance(drive, str) else design.drives[drive]
+    return design.residuals.units_of(name).of
+
+
+def _trials(search: Search, placement: Placement) -> Sequence[Mapping[str, float]]:
+    effect, d = placement.term.effect, placement.drive
+    if d is None or not issubclass(effect, DriveEffect):
+        return ()
+    return effect.trials(search.design.covered[d])
+
+
+def estimate_present(search: Search, found: CandidateSet, fitted: ForceModel, name: str,
+                     ) -> dict[str, Estimate]:
+    """Return the parameters of an effect that the given model has, as a fit moves them.
+
+    Deviations are known for parameters that are coefficients.
+    """
+    known = {}
+    for k, column in enumerate(search.design.base):
+        if isinstance(column, PresentCoefficient) and column.effect.name == name:
+            key = f'{column.drive}.{column.coefficient.name}' if column.drive else (
+                column.coefficient.name)
+            known[key] = float(np.sqrt(found.fit.covariance[k, k])) * column.coefficient.scale
+    effect = next(type(e) for e in search.design.given.effects if e.name == name)
+    units = {p.name: p.unit for p in getattr(effect, 'parameters', ())}
+    prefix = f'effects.{name}.'
+    return {key: Estimate(float(value), known.get(key, float('nan')),
+                          _units(search.design, key.rpartition('.')[0] or None)(
+                              units[key.rpartition('.')[2]]))
+            for full, value in fitted.values.items() if full.startswith(prefix)
+            for key in [full.removeprefix(prefix)]}
+
+
+def calibrations(search: Search, found: CandidateSet, widths: Mapping[int, float],
+                 ) -> list[Calibration]:
+    """Return the numbers as the fit moves them within their tolerances, and reversal widths.
+
+    Parameters
+    ----------
+    search : Search
+    found : CandidateSet
+    widths : mapping of drive to float
+        Widths of reversal that differ from the given model's for certain [m/s].
+    """
+    design = search.design
+    calibrated = []
+    for k, column in enumerate(design.base):
+        if isinstance(column, KnownNumber):
+            number = column.number
+            std = float(np.sqrt(found.fit.covariance[k, k])) * number.deviation
+            calibrated.append(Calibration(
+                number.key, number.element, number.value,
+                column.value(float(found.fit.coefficients[k])), std, number.unit))
+    before = np.broadcast_to(design.given.reversal.velocity, len(design.drives))
+    # Widths are told without an uncertainty: the fits allow for all of them anyway.
+    return calibrated + [
+        Calibration(*place_of(design, d), float(before[d]), width, 0.0, _units(design, d)('m/s'))
+        for d, width in widths.items() if width != before[d]]
+
+

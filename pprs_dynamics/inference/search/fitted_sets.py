@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Sets of candidates, fitted: their cost, and shapes moved to where it is lowest."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.allowance import share_of_allowance
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+    Placement,
+    Prices,
+    set_key,
+)
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.library import Library
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+
+SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
+LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
+
+SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
+
+Candidates = tuple[Candidate, ...]
+
+
+class FittedSets:
+    """All sets of one design that were fitted.
+
+    Parameters
+    ----------
+    design : Design
+    decisions : Decisions
+    error_scale : mapping of drive to float, optional
+        See `Regression`.
+    """
+
+    def __init__(self, design: Design, decisions: Decisions,
+                 error_scale: Mapping[int, float] | None = None) -> None:
+        self.design, self.decisions = design, decisions
+        self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
+        self.prices = Prices.of(self.regression, decisions)
+        self.library = Library(design, self.regression, self.prices)
+        self.evaluated: dict[Hashable, CandidateSet] = {}
+        self._doubtful: dict[Hashable, tuple[Block, ...]] = {}
+
+    @property
+    def best(self) -> CandidateSet:
+        """The set of lowest cost so far."""
+        return min(self.evaluated.values(), key=lambda found: found.cost)
+
+    def evaluate(self, candidates: Candidates, near: CandidateSet | None = None) -> CandidateSet:
+        """Return a set, fitted; one that was fitted before is not fitted again."""
+        key = set_key(candidates)
+        if key not in self.evaluated:
+            start = near.fit.amplitudes if near is not None else (
+                self.evaluated[frozenset()].fit.amplitudes if self.evaluated else None)
+            self.evaluated[key] = self._fitted(candidates, start)
+        return self.evaluated[key]
+
+    def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        if start is not None:
+            # The size of its forces, in proportion to which friction is in doubt, need not be
+            # exact: the noise of a near set does, and steps of it, whose columns are kept.
+            doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
+        else:
+            doubtful = {}
+        rival = min((one.fit.deviance for one in self.evaluated.values()), default=np.inf)
+        fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start, rival)
+        found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+        return replace(found, is_admissible=self._is_admissible(found))
+
+    def _is_admissible(self, found: CandidateSet) -> bool:
+        """Return whether every pattern is more than the lack of fit of the effects beside it."""
+        return all(share_of_allowance(self.design, self.regression, self.decisions, found,
+                                      candidate)[0] >= 1 for candidate in found.unknowns)
+
+    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
+                         ) -> dict[Placement, tuple[Block, ...]]:
+        """Return columns for what effects leave open, in proportion to their fitted force.
+
+        Whether friction follows the loads that an effect adds; how friction turns over; and how
+        real forms depart from the catalogue's. Each has a coefficient of unit prior.
+        """
+        found = {}
+        for candidate in candidates:
+            for placement in candidate.placements if isinstance(candidate, EffectCandidate) else ():
+                size = _stepped(fit.of(placement.block))
+                key = (placement, tuple(size.tolist()))
+                if key not in self._doubtful:
+                    self._doubtful[key] = self._doubtful_of(placement, size)
+                if self._doubtful[key]:
+                    found[placement] = self._doubtful[key]
+        return found
+
+    def _doubtful_of(self, placement: Placement, c: Array) -> tuple[Block, ...]:
+        """Return the columns of one placement, for its coefficients (k,)."""
+        blocks = []
+        if placement.bare is not None:
+            rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
+            blocks.append(Block(rows, np.eye(1)))
+        left_open = self.library.open_rows(placement)
+        if left_open is not None:
+            assert placement.drive is not None
+            blocks.append(Block({placement.drive: np.tensordot(c, left_open, 1)},
+                                np.eye(left_open.shape[1])))
+        return tuple(blocks)
+
+    def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
+        """Return a smaller set under the noise of a larger one: what a replacement starts from."""
+        placements = {placement for candidate in candidates
+                      if isinstance(candidate, EffectCandidate)
+                      for placement in candidate.placements}
+        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in placements}
+        blocks = [block for candidate in candidates for block in candidate.blocks]
+        fit = self.regression.at([*blocks, *chain(*doubtful.values())], found.fit.amplitudes)
+        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+
+    def price(self, candidates: Candidates, fit: JointFit) -> float:
+        """Return the price of all that was chosen, and of signs that are unphysical."""
+        total = 0.0
+        for candidate in candidates:
+            total += candidate.total_price
+            if isinstance(candidate, EffectCandidate):
+                total += sum(self.library.prices.of_signs(
+                    candidate.effect, placement.values(fit.of(placement.block)))
+                    for placement in candidate.placements)
+        return total
+
+    def drop_cost(self, found: CandidateSet, placement: Placement) -> float:
+        """Return by how much the deviance rises without a placement, at the noise of a fit.
+
+        By the Savage-Dickey ratio of prior and posterior density at 0.
+        """
+        if placement.block.is_fixed:
+            return np.inf
+        place = found.fit.places[placement.block]
+        c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
+        return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
+                     + np.linalg.slogdet(placement.block.precision)[1])
+
+    def refined(self, found: CandidateSet) -> CandidateSet:
+        """Return the set with all shapes moved by Gauss-Newton steps that lower the cost.
+
+        Each may be twice as long as the one before.
+        """
+        for number in range(SHAPE_ROUNDS):
+            moved = self._moved(found, 2.0 ** number)
+            if moved is None:
+                return found
+            after = self.evaluate(moved, found)
+            if after.cost > found.cost - LEAST_IMPROVEMENT:
+                return found
+            found = after
+        return found
+
+    def _moved(self, found: CandidateSet, longest: float) -> Candidates | None:
+        """Return candidates with shapes after one Gauss-Newton step, by `longest` reaches at most.
+        """
+        slopes = self.slopes(found)
+        if not slopes:
+            return None
+        fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
+                                 found.fit.amplitudes)
+        moved: dict[Placement, Placement] = {}
+        for placement, block in slopes:
+            effect, d = placement.term.effect, placement.drive
+            assert d is not None
+            assert issubclass(effect, DriveEffect)
+            shape = dict(placement.term.shape)
+            reach = self._reach(placement)
+            for parameter, step in zip(effect.shape, fit.of(block), strict=True):
+                limit = longest * reach[parameter.name]
+                value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
+                shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
+            moved[placement] = self.library.placed(effect, d, shape, placement.names)
+        return tuple(
+            self.library.candidate(c.effect, [moved.get(one, one) for one in c.placements])
+            if isinstance(c, EffectCandidate) else c for c in found.candidates)
+
+    def slopes(self, found: CandidateSet) -> list[tuple[Placement, Block]]:
+        """Return derivatives by the shapes of a set, of unit prior, for the placements with any."""
+        slopes = []
+        for candidate in found.effects:
+            for placement in candidate.placements if candidate.effect.shape else ():
+                c = found.coefficients(placement)
+                if placement.names:
+                    every = np.zeros(len(placement.term.names))
+                    every[[placement.term.names.index(name) for name in placement.names]] = c
+                    c = every
+                assert placement.drive is not None
+                rows = self.design.slope_rows(placement.term, c)
+                slopes.append((placement, self.regression.block(
+                    {placement.drive: rows}, precision=np.eye(len(rows)))))
+        return slopes
+
+    def _reach(self, placement: Placement) -> dict[str, float]:
+        """Return how far each shape parameter may move at once: half the way between trials."""
+        effect, d = placement.term.effect, placement.drive
+        assert d is not None
+        assert issubclass(effect, DriveEffect)
+        trials = effect.trials(self.design.covered[d])
+        reach = {}
+        for parameter in effect.shape:
+            value = placement.term.shape[parameter.name]
+            known = np.array(sorted({trial[parameter.name] for trial in trials}))
+            if len(known) < 2:
+                reach[parameter.name] = 0.5
+                continue
+            at = int(np.clip(np.searchsorted(known, value), 1, len(known) - 1))
+            gap = float(known[at] - known[at - 1])
+            reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
+        return reach
+
+
+def _stepped(coefficients: Array) -> Array:
+    """Return coefficients rounded to steps of their logarithm."""
+    size = np.abs(coefficients)
+    steps = np.round(np.log(np.where(size > 0, size, 1.0)) / SIZE_STEP)
+    stepped: Array = np.sign(coefficients) * np.where(size > 0, np.exp(SIZE_STEP * steps), 0.0)
+    return stepped

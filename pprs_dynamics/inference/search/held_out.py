@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Blocks of the recordings, each predicted from a fit to the others.
+
+The noise and the priors are those of the whole fit. Rows are whitened and brought back into time,
+so that a block's share in the normal equations can be taken out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import ReversalShape
+from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.search import Search
+
+BLOCKS = 10
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Block cross-validation of a set.
+
+    Parameters
+    ----------
+    error : float
+        Root of the mean square over samples and drives, reversals as the model has them [N].
+    losses : (BLOCKS,) array
+        Whitened squared error of each block.
+    """
+
+    error: float
+    losses: Array
+
+
+def hold_out(search: Search, found: CandidateSet) -> HeldOut:
+    """Return how well blocks of the recordings are predicted from the others."""
+    regression, fit = search.regression, found.fit
+    size = len(fit.coefficients)
+    total = len(regression.residuals)
+    edges = np.linspace(0, total, BLOCKS + 1)
+    H, b = np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size))
+    white: dict[int, tuple[Array, Array, Array]] = {}
+    for d in regression.drives:
+        series = regression.series[d]
+        index, felt = regression.local(fit, d)
+        rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in felt)])
+        y = regression.base[d][-1] - sum(
+            (block.rows[d][0] for block in fit.blocks if block.is_fixed and d in block.rows),
+            np.zeros(len(series)))
+        root = np.sqrt(series.spread(regression.weights(fit, d)))
+        stacked = series.inverse(np.concatenate((rows, y[None])) * root)
+        stacked[:, ~series.known] = 0.0
+        white[d] = index, stacked, series.inverse(np.concatenate((rows, y[None])))
+        at = np.searchsorted(series.index, edges)
+        for k in range(BLOCKS):
+            part = stacked[:, at[k]:at[k + 1]]
+            H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
+            b[k, index] += part[:-1] @ part[-1]
+    prior = _precision(search, found)
+    fits = np.stack([_solved(H.sum(axis=0) - H[k] + prior, b.sum(axis=0) - b[k])
+                     for k in range(BLOCKS)])
+    reversals = [k for k, column in enumerate(search.design.base)
+                 if isinstance(column, ReversalShape)]
+    reversals += [k for blocks in found.doubtful.values() for block in blocks
+                  for k in range(fit.places[block].start, fit.places[block].stop)]
+    plain = fits.copy()
+    plain[:, reversals] = 0.0
+    losses, squares, count = np.zeros(BLOCKS), 0.0, 0
+    for d, (index, stacked, rows) in white.items():
+        series = regression.series[d]
+        at = np.searchsorted(series.index, edges)
+        for k in range(BLOCKS):
+            block = slice(at[k], at[k + 1])
+            left = stacked[-1, block] - fits[k, index] @ stacked[:-1, block]
+            losses[k] += float(left @ left)
+            rest = (rows[-1, block] - plain[k, index] @ rows[:-1, block])[series.known[block]]
+            squares, count = squares + float(rest @ rest), count + len(rest)
+    # Numbers that are stretched beyond what is known of them cost their share in every block.
+    losses += np.einsum('kp,pq,kq->k', fits, prior, fits) / BLOCKS
+    return HeldOut(float(np.sqrt(squares / max(count, 1))), losses)
+
+
+def _precision(search: Search, found: CandidateSet) -> Array:
+    size = len(found.fit.coefficients)
+    precision = np.zeros((size, size))
+    count = len(search.regression.precision)
+    precision[:count, :count] = np.diag(search.regression.precision)
+    for block in found.fit.blocks:
+        place = found.fit.places[block]
+        if not block.is_fixed:
+            precision[place, place] = block.precision
+    return precision
+
+
+def _solved(H: Array, b: Array) -> Array:
+    scale = 1 / np.sqrt(np.diag(H))
+    matrix = H * np.outer(scale, scale) + 1e-10 * np.eye(len(H))
+    solution: Array = scale * np.linalg.solve(matrix, scale * b)
+    return solution

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which effects, on which drives, would lower the cost of a set: proposals by a scan.
+
+A scan takes all terms in all shapes at the noise of a set's fit, where the gain of each is a matter
+of sums that are known. It proposes; a fit with its own noise decides (`selection.search`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Sequence
+from functools import partial
+
+import numpy as np
+
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.system.parallel import each
+
+PROPOSED = -12.0  # lowest score of a proposal
+SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
+
+
+class ScannedSets(FittedSets):
+    """Fitted sets, and what a scan proposes to add to each."""
+
+    def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,
+                  least: float = PROPOSED,
+                  effects: Container[type[CatalogueEffect]] | None = None) -> list[Candidates]:
+        """Return sets with one effect more, or one on more drives, by a scan at a set's noise.
+
+        Parameters
+        ----------
+        base : CandidateSet
+        count : int, optional
+            At most; by default all.
+        drive : int, optional
+            Only effects on this one.
+        least : float
+            By which the cost must fall at the set's noise.
+        effects : container of type, optional
+            Only these.
+        """
+        scored: list[tuple[float, Callable[[], Candidates]]] = []
+        for effect, found in self._scan(base, drive).items():
+            if effects is not None and effect not in effects:
+                continue
+            old = next((c for c in base.effects if c.effect is effect), None)
+            score, chosen = self._best_drives(effect, found, old)
+            if score > least and chosen:
+                scored.append((score, self._joined(base, effect, chosen, old)))
+        scored.sort(key=lambda one: -one[0])
+        return [make() for _, make in scored[:count]]
+
+    def _scan(self, base: CandidateSet, drive: int | None = None,
+              ) -> dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]]:
+        """Return gains less prices of placements, by effect; one for each drive."""
+        library, fit = self.library, base.fit
+        taken = {(c.effect, placement.drive) for c in base.effects for placement in c.placements}
+        found: dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]] = {}
+        drives = tuple(library.local) if drive is None else (drive,)
+        offered = each(lambda d: library.local[d].offers(fit), drives)
+        for d, offers in zip(drives, offered, strict=True):
+            for offer in offers.values():
+                effect = offer.term.effect
+                if (effect, d) not in taken:
+                    price = library.prices.of_placement(
+                        effect, library.local[d].trials[effect.name])
+                    found.setdefault(effect, []).append(
+                        (offer.gain - price, partial(library.full, offer)))
+        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
+        for placement, gain in library.shared_offers(fit) if drive is None else ():
+            key = (placement.term.effect, placement.drive)
+            if key not in taken:
+                net = gain - placement.price
+                if key not in best or net > best[key][0]:
+                    best[key] = (net, placement)
+        for (effect, _), (net, placement) in best.items():
+            found.setdefault(effect, []).append((net, partial(_same, placement)))
+        return found
+
+    def _best_drives(
+        self, effect: type[CatalogueEffect],
+        found: list[tuple[float, Callable[[], Placement]]], old: EffectCandidate | None,
+    ) -> tuple[float, list[Callable[[], Placement]]]:
+        """Return the drives on which an effect pays, and the score of all together."""
+        prices = self.library.prices
+        found = sorted(found, key=lambda one: -one[0])
+        if not issubclass(effect, DriveEffect):
+            return found[0][0] - prices.of_name(), [found[0][1]]
+        there = len(old.placements) if old else 0
+        before = prices.of_drives(there) if there else -prices.of_name()
+        nets = np.cumsum([net for net, _ in found])
+        scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
+        best = int(np.argmax(scores))
+        return float(scores[best]), [make for _, make in found[:best + 1]]
+
+    def _joined(self, base: CandidateSet, effect: type[CatalogueEffect],
+                chosen: Sequence[Callable[[], Placement]], old: EffectCandidate | None,
+                ) -> Callable[[], Candidates]:
+        def make() -> Candidates:
+            placements = [*(old.placements if old else ()), *(one() for one in chosen)]
+            kept = tuple(c for c in base.candidates if c is not old)
+            return (*kept, self.library.candidate(effect, placements))
+        return make
+
+
+def _same(placement: Placement) -> Placement:
+    return placement
+
+
+def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
+    """Return a fit under the noise that the higher frequencies alone would tell.
+
+    The slow part of a noise spectrum may be what is missing. It only proposes.
+    """
+    amplitudes = fit.amplitudes.copy()
+    amplitudes[:, 1:][:, regression.noise_shapes.is_slow] *= SLOW_LEFT
+    return regression.at(fit.blocks, amplitudes)

@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Search for the set of effects with the lowest cost.
+
+The cost of a set is its penalised deviance (`regression.joint_fit`) plus the prices of what was
+chosen (`Prices`). From the best set, effects are added, placed on other drives, dropped, replaced
+and merged, until no neighbour is better. A scan at the noise of a fit proposes, a fit with its own
+noise decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+    UnknownCandidate,
+    set_key,
+)
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates
+from pprs_dynamics.inference.search.scanned_sets import ScannedSets, with_fast_noise
+from pprs_dynamics.inference.search.unknown import PatternLibrary, best_patterns
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+
+MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
+BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
+REPLACEMENTS = 3  # candidates tried in the place of one or of two
+REFINED = 3  # of the sets fitted in a round
+# How much worse than the best a replacement may look at the best one's noise (its own noise may
+# favour it by about as much), and how much of what is lost without it it has to make good there.
+REPLACED, RECOVERED = 15.0, 0.9
+
+
+class Search(ScannedSets):
+    """A search over the candidates of one design.
+
+    Parameters
+    ----------
+    design, decisions, error_scale
+        See `FittedSets`.
+    progress : callable, optional
+        Called with the share of the work that is done.
+    with_unknown : bool
+        Patterns of no catalogue take part.
+    """
+
+    def __init__(self, design: Design, decisions: Decisions,
+                 error_scale: Mapping[int, float] | None = None,
+                 progress: Callable[[float], None] | None = None,
+                 with_unknown: bool = True) -> None:
+        super().__init__(design, decisions, error_scale)
+        self.patterns = ([PatternLibrary(self.regression, self.prices, d)
+                          for d in self.regression.drives] if with_unknown else [])
+        self._report = progress or (lambda share: None)
+
+    def run(self, *starts: Candidates) -> CandidateSet:
+        """Return the best set that the search reaches from all starts, by effects alone at first.
+
+        A pattern of no catalogue stands only beside what effects explain. Where an effect joins
+        that bends the columns, the search ends: what would come next might only make good that
+        they are not bent.
+        """
+        self.evaluate(())
+        for number, start in enumerate(starts):
+            improve = self.refined if number else self.rescanned
+            improve(self.evaluate(start))
+        if len(starts) != 1:
+            self._descend(False, 0.0)
+        if self.patterns and not self.is_beyond_point:
+            self._descend(True, 0.5)
+        self._report(1.0)
+        return self.best
+
+    @property
+    def is_beyond_point(self) -> bool:
+        """Whether the best set has an effect that bends columns, and these are not bent by it."""
+        point = self.design.point
+        known = {(one.effect, one.drive) for one in point.effects} if point else set()
+        return any(c.effect.bends_columns and (c.effect, placement.drive) not in known
+                   for c in self.best.effects for placement in c.placements)
+
+    def _descend(self, with_patterns: bool, begin: float) -> None:
+        """Move from the best set to better neighbours until there is none."""
+        left = 0.5
+        while True:
+            left *= 0.7
+            self._report(begin + 0.5 - left)
+            before = self.best.cost
+            self._try(self._additions(with_patterns))
+            if self.best.cost > before - LEAST_IMPROVEMENT:
+                self._try(self._replacements(self.best))
+                if self.best.cost > before - LEAST_IMPROVEMENT:
+                    return
+            self._simplify()
+            if self.is_beyond_point:
+                self._try(self._other_bending(self.best))
+                return
+
+    # Moves
+
+    def _try(self, sets: Iterable[tuple[Candidates, CandidateSet]]) -> None:
+        """Fit sets, each from the noise of a near one, and refine the shapes of the best few."""
+        new = []
+        for candidates, near in sets:
+            if set_key(candidates) not in self.evaluated and self._is_bounded(candidates):
+                new.append(self.evaluate(candidates, near))
+        # No noise takes a constant: what lacks nothing else is judged once it has it.
+        for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
+            new += [self.evaluate(more, found) for more in self.proposals(found, 1)
+                    if self._is_bounded(more)]
+        # A pattern of no catalogue is at its best from the start, an effect once its shape is.
+        shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
+        for number, found in enumerate(sorted(shaped, key=lambda one: one.cost)):
+            # The first effect decides which way the search goes.
+            if number < REFINED or len(found.candidates) == 1:
+                self.refined(found)
+
+    def _all_but_constants(self, found: CandidateSet) -> float:
+        """Return the cost of a set if its drives' constants were what their noise expects."""
+        squares = found.fit.squares[:, 0] / found.fit.spectra[:, 0]
+        return found.cost - float(np.sum(np.maximum(squares - self.regression.counts[:, 0], 0)))
+
+    @staticmethod
+    def _is_bounded(candidates: Candidates) -> bool:
+        unknown = sum(isinstance(candidate, UnknownCandidate) for candidate in candidates)
+        return unknown <= MOST_UNKNOWN and len(candidates) - unknown <= MOST_EFFECTS
+
+    def _additions(self, with_patterns: bool) -> list[tuple[Candidates, CandidateSet]]:
+        """Return sets with one candidate more, or on more drives, from the best few sets."""
+        found: list[tuple[Candidates, CandidateSet]] = []
+        ranked = sorted(self.evaluated.values(), key=lambda one: one.cost)
+        for rank, base in enumerate(ranked[:BEAM]):
+            count = PROPOSALS if rank == 0 else 2
+            found += [(candidates, base) for candidates in self.proposals(base, count)]
+            if rank == 0:
+                fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
+                found += [(candidates, fast) for candidates in self.proposals(fast, REPLACEMENTS)]
+                for near in (base, fast) if with_patterns else ():
+                    patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
+                    found += [((*base.candidates, pattern), near) for pattern in patterns]
+        return found
+
+    def _other_bending(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
+        """Yield sets in which another effect that bends the columns stands for one that does.
+
+        Several add nearly constant forces: around the wrong one, all would be computed in vain.
+        """
+        for candidate in best.effects:
+            if candidate.effect.bends_columns:
+                rest = tuple(one for one in best.candidates if one is not candidate)
+                for candidates in self.proposals(self.at_noise_of(best, rest)):
+                    if any(one.effect.bends_columns for one in candidates
+                           if isinstance(one, EffectCandidate) and one not in rest):
+                        yield candidates, best
+
+    def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
+                ) -> CandidateSet | None:
+        """Return the best set of one effect alone, on some drives or where it pays.
+
+        None where the model has it everywhere already.
+        """
+        base = self.evaluated[frozenset()]
+        fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
+        for near in (base, fast):
+            found = self._scan(near).get(effect, [])
+            if drives is None:
+                chosen = self._best_drives(effect, found, None)[1] if found else []
+            else:
+                chosen = [make for _, make in found if make().drive in drives]
+            if chosen:
+                candidate = self.library.candidate(effect, [make() for make in chosen])
+                self.refined(self.evaluate((candidate,), near))
+        while True:
+            alone = [one for one in self.evaluated.values() if one.candidates]
+            if not alone:
+                return None
+            best = min(alone, key=lambda one: one.cost)
+            for candidate in (*self._alternatives(best.effects[0]),
+                              *(self._variants(best.effects[0]))):
+                self.evaluate((candidate,), best)
+            after = min((one for one in self.evaluated.values() if one.candidates),
+                        key=lambda one: one.cost)
+            if after.cost > best.cost - LEAST_IMPROVEMENT:
+                return best
+            self.refined(after)
+
+    def rescanned(self, found: CandidateSet) -> CandidateSet:
+        """Return the set on all drives where its effects pay, in shapes that scans find."""
+        for candidates in self.proposals(found, effects={c.effect for c in found.effects}):
+            found = min(found, self.evaluate(candidates, found), key=lambda one: one.cost)
+        for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.placements
+                          if c.effect.shape and one.drive is not None]:
+            candidate = next(c for c in found.effects if c.effect is effect)
+            others = [one for one in candidate.placements if one.drive != d]
+            rest = tuple(c for c in found.candidates if c is not candidate)
+            less = (*rest, self.library.candidate(effect, others)) if others else rest
+            offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
+            if effect.name in offers:
+                placements = [*others, self.library.full(offers[effect.name])]
+                found = min(found, self.evaluate(
+                    (*rest, self.library.candidate(effect, placements)), found),
+                    key=lambda one: one.cost)
+        return self.refined(found)
+
+    def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
+        """Yield the candidate with other coefficients of one placement."""
+        for placement in candidate.placements:
+            for names in candidate.effect.variants:
+                if names != placement.names and not placement.term.is_fixed:
+                    rest = [one for one in candidate.placements if one is not placement]
+                    yield self.library.candidate(candidate.effect, [
+                        *rest, self.library.placement(placement.term, names)])
+
+    def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
+                 ) -> CandidateSet:
+        """Return the best of a set and those in which something else stands for one or two."""
+        before = set(self.evaluated)
+        self._try(self._replacements(found))
+        better = [one for key, one in self.evaluated.items()
+                  if key not in before and one.cost < found.total - LEAST_IMPROVEMENT]
+        return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
+                    found)
+
+    def pruned(self, found: CandidateSet) -> CandidateSet:
+        """Return a set without the candidates that do not pay in it."""
+        while found.candidates:
+            less = min((self.evaluate(tuple(c for c in found.candidates if c is not gone), found)
+                        for gone in found.candidates), key=lambda one: one.total)
+            if less.total > found.total:
+                break
+            found = less
+        return found
+
+    def _replacements(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
+        """Yield sets in which something else stands for one or two candidates, or for a drive's.
+
+        Under the noise of the set, so that a replacement that explains as much is seen to.
+        """
+        rests: list[tuple[Candidates, int | None]] = []
+        for size in (1, 2):
+            for gone in combinations(best.candidates, size):
+                if size == 1 or any(isinstance(c, EffectCandidate) for c in gone):
+                    rests.append((tuple(c for c in best.candidates if c not in gone), None))
+        for candidate in best.effects:
+            for placement in candidate.placements if len(candidate.placements) > 1 else ():
+                # On one of its drives it, or some of its coefficients, may stand for another.
+                others = [one for one in candidate.placements if one is not placement]
+                fewer = [names for names in candidate.effect.variants
+                         if set(names) < set(placement.names)]
+                for kept in ([], *([self.library.placement(placement.term, names)]
+                                   for names in fewer)):
+                    less = self.library.candidate(candidate.effect, [*others, *kept])
+                    rests.append((self._exchanged(best, candidate, less), placement.drive))
+        for rest, drive in rests:
+            base = self.at_noise_of(best, rest)
+            least = RECOVERED * (base.total - best.total) - REPLACED
+            for candidates in self.proposals(base, REPLACEMENTS, drive, least):
+                yield candidates, best
+        for candidate in best.effects:
+            for other in self._alternatives(candidate):
+                yield self._exchanged(best, candidate, other), best
+            if len(candidate.hypotheses) > 1:
+                yield from self._two_for(best, candidate)
+
+    def _two_for(self, best: CandidateSet, gone: EffectCandidate,
+                 ) -> Iterable[tuple[Candidates, CandidateSet]]:
+        """Yield sets in which two other effects stand for one that claims more than one thing."""
+        rest = tuple(one for one in best.candidates if one is not gone)
+
+        def with_another(candidates: Candidates) -> list[Candidates]:
+            found = self.proposals(self.at_noise_of(best, candidates), REPLACEMENTS + 1)
+            return [more for more in found if all(
+                one.effect is not gone.effect for one in more if isinstance(one, EffectCandidate))]
+        for first in with_another(rest):
+            for second in with_another(first)[:REPLACEMENTS]:
+                yield second, best
+
+    def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
+        """Yield the candidate in the shapes that its own is easily taken for."""
+        effect = candidate.effect
+        if not issubclass(effect, DriveEffect) or not effect.shape:
+            return
+        shapes = [effect.alternatives(placement.term.shape) for placement in candidate.placements]
+        for number in range(min(map(len, shapes))):
+            placements = [self.library.placed(
+                effect, placement.drive, others[number], placement.names)
+                for placement, others in zip(candidate.placements, shapes, strict=True)]
+            yield self.library.candidate(effect, placements)
+
+    def _simplify(self) -> None:
+        """Drop candidates and drives, and try variants, as long as that lowers the cost."""
+        while True:
+            best = self.best
+            for candidates in self._simpler(best):
+                self.evaluate(candidates, best)
+            if self.best.cost > best.cost - LEAST_IMPROVEMENT:
+                return
+            self.refined(self.best)
+
+    def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
+        for candidate in best.candidates:
+            if len(best.candidates) > 1:
+                yield tuple(c for c in best.candidates if c is not candidate)
+            if not isinstance(candidate, EffectCandidate):
+                continue
+            effect = candidate.effect
+            # The drives where it matters most; fewer of them may be better though one less is not.
+            strength = {one: self.drop_cost(best, one) for one in candidate.placements}
+            ranked = sorted(candidate.placements, key=lambda one: -strength[one])
+            for count in range(1, len(ranked)):
+                if sum(strength[one] for one in ranked[count:]) < 3 * self.decisions.rival_margin:
+                    yield self._exchanged(best, candidate,
+                                          self.library.candidate(effect, ranked[:count]))
+            if len({one.names for one in candidate.placements}) > 1:
+                for names in effect.variants:
+                    yield self._exchanged(best, candidate, self.library.candidate(effect, [
+                        self.library.placement(one.term, names) for one in candidate.placements]))
+            for placement in candidate.placements:
+                for names in effect.variants:
+                    # The others take part in every scan.
+                    if names != placement.names and not set(names) <= set(effect.scanned):
+                        other = self.library.placement(placement.term, names)
+                        rest = [one for one in candidate.placements if one is not placement]
+                        yield self._exchanged(best, candidate, self.library.candidate(
+                            effect, [*rest, other]))
+
+    @staticmethod
+    def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
+        return tuple(new if c is old else c for c in found.candidates)

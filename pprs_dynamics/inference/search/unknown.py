@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Patterns of one drive's error that are in no catalogue: ranges, growths, lines, coupling.
+
+They compete with the effects of the catalogue in the same search and by the same criterion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import fft
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
+from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
+from pprs_dynamics.inference.search.patterns import (
+    Family,
+    Pattern,
+    build_families,
+    trial_limits,
+)
+from pprs_dynamics.measurement.residuals.bins import LEAST_SHARE
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.system.parallel import each
+
+LOWEST_LINE = 3.0  # periods within the longest stretch, below which a line is a drift
+OVERSAMPLING = 4  # of the frequencies at which lines are looked for
+FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
+# Limits of a range are moved by up to a bin, then by shares of it: a step in time is to be met to
+# the sample.
+LIMIT_STEPS = (1.0, 0.2, 0.04, 0.008)
+
+
+@dataclass(frozen=True)
+class _Scanned:
+    """A family with its columns transformed.
+
+    Parameters
+    ----------
+    family : Family
+    columns : (C, n) array
+    gram : (B, C, C) array
+        Band sums.
+    precision : (P,) or (P, 2, 2) array
+        Of the patterns' g-priors.
+    """
+
+    family: Family
+    columns: Array
+    gram: Array
+    precision: Array
+
+
+class PatternLibrary:
+    """Patterns of one drive.
+
+    Parameters
+    ----------
+    regression : Regression
+    prices : Prices
+    d : int
+    with_plain_forms : bool
+        Also what effects of the catalogue are exactly: a constant, friction, a ripple.
+    """
+
+    def __init__(self, regression: Regression, prices: Prices, d: int,
+                 with_plain_forms: bool = False) -> None:
+        self.regression, self.prices, self.d = regression, prices, d
+        self.series = regression.series[d]
+        self.with_plain_forms = with_plain_forms
+        residuals = regression.residuals
+        index = self.series.index
+        self.residuals = Residuals(
+            residuals.drives, residuals.time[index], residuals.segment[index],
+            residuals.measured[index], residuals.model[index], {},
+            {name: values[index] for name, values in residuals.variables.items()},
+            residuals.period, residuals.units)
+
+    @cached_property
+    def _scanned(self) -> list[_Scanned]:
+        found = []
+        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
+        for family in build_families(self.residuals, self.d):
+            if not self.with_plain_forms and (family.paired or family.is_plain):
+                continue
+            columns = self.series.transform(family.columns.astype(np.float32))
+            gram = self.series.products(columns, columns)
+            total = gram.sum(axis=0)
+            if family.paired:
+                pairs = np.arange(len(columns)).reshape(-1, 2)
+                precision = total[pairs[:, :, None], pairs[:, None, :]] / scale
+            else:
+                precision = np.einsum('pc,cd,pd->p', family.weights, total, family.weights) / scale
+            found.append(_Scanned(family, columns, gram, precision))
+        return found
+
+    @property
+    def families(self) -> list[Family]:
+        """All families that are searched."""
+        return [scanned.family for scanned in self._scanned]
+
+    def family_block(self, family: Family) -> Block:
+        """Return all columns of a family as one block: any curve along its variable."""
+        return self.regression.transformed_block({self.d: self.series.transform(family.columns)})
+
+    def price(self, family: Family, drives: int = 1) -> float:
+        """Return the price of a pattern of a family: that it is unknown, where, and which."""
+        return self.prices.of_pattern(max(len(self._scanned), 1) * family.rivals,
+                                      max(len(family.patterns), 1), drives)
+
+    def candidate(self, family: Family, pattern: Pattern, rows: Array) -> UnknownCandidate:
+        """Return a pattern with its columns (1 or 2, M at the series' samples)."""
+        full = np.zeros((len(rows), len(self.regression.residuals)))
+        full[:, self.series.index] = rows
+        block = self.regression.transformed_block({self.d: self.series.transform(rows)})
+        return UnknownCandidate(family, pattern, {self.d: full}, {self.d: block},
+                                self.price(family))
+
+    def on_more_drives(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
+        """Return the candidate on all drives on which it pays, if all share its variable."""
+        residuals = self.regression.residuals
+        shared = candidate.family.variable in ('time', 'frequency') or (
+            residuals.variables.get(candidate.family.variable, np.zeros((0, 0))).ndim == 1)
+        if not shared or candidate.pattern.kind.startswith('directed'):
+            return candidate
+        rows, parts, gains = dict(candidate.rows), dict(candidate.parts), {}
+        for d in self.regression.drives:
+            if d not in parts:
+                block = self.regression.block({d: candidate.rows[self.d]})
+                gains[d] = block, self.regression.gain(fit, block)
+        for d in sorted(gains, key=lambda d: -gains[d][1]):
+            block, gain = gains[d]
+            more = self.price(candidate.family, len(parts) + 1) - self.price(
+                candidate.family, len(parts))
+            if gain > more:
+                rows[d], parts[d] = candidate.rows[self.d], block
+        order = sorted(parts)
+        return UnknownCandidate(candidate.family, candidate.pattern, {d: rows[d] for d in order},
+                                {d: parts[d] for d in order},
+                                self.price(candidate.family, len(parts)))
+
+    def proposals(self, fit: JointFit, count: int, always: bool = False,
+                  ) -> list[tuple[UnknownCandidate, float]]:
+        """Return the best patterns of different variables with their gains less their prices.
+
+        Parameters
+        ----------
+        fit : JointFit
+            At whose noise.
+        count : int
+        always : bool
+            Beyond `count`, those for which there is a plain word: a constant, friction.
+        """
+        weights = self.regression.weights(fit, self.d)
+        index, felt = self.regression.local(fit, self.d)
+        series = self.series
+        factor = series.spread(weights)
+        active = np.concatenate([self.regression.base[self.d][:-1],
+                                 *(block.rows[self.d] for block in felt)]).astype(np.float32)
+        rest = self.regression.remaining(fit, self.d) * factor
+        covariance = fit.covariance[np.ix_(index, index)]
+        active_weighted = active * factor.astype(np.float32)
+        scored: list[tuple[float, _Scanned, int]] = []
+        for scanned in self._scanned:
+            family = scanned.family
+            side = scanned.columns @ rest.astype(np.float32)
+            known = (scanned.columns @ active_weighted.T).astype(float)
+            S = np.tensordot(weights, scanned.gram, 1) - known @ covariance @ known.T
+            if family.paired:
+                pairs = np.arange(len(side)).reshape(-1, 2)
+                gains = term_gains(S[pairs[:, :, None], pairs[:, None, :]],
+                                   side[pairs].astype(float), scanned.precision, False)
+            else:
+                own = np.einsum('pc,cd,pd->p', family.weights, S, family.weights)
+                own = np.maximum(own, 0.0) + scanned.precision
+                gains = (family.weights @ side) ** 2 / own - np.log(own / scanned.precision)
+            best = int(np.argmax(gains))
+            scored.append((float(gains[best]) - self.price(family), scanned, best))
+        scored.sort(key=lambda one: -one[0])
+        found = []
+        for rank, (score, scanned, best) in enumerate(scored):
+            family = scanned.family
+            if rank >= count and not (always and family.is_plain):
+                continue
+            found.append((self.candidate(family, family.patterns[best],
+                                         family.pattern_columns(best)), score))
+        line = self.line(fit)
+        if line is not None:
+            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.price))
+        return sorted(found, key=lambda one: -one[1])
+
+    def line(self, fit: JointFit) -> UnknownCandidate | None:
+        """Return the strongest spectral line of what a fit leaves."""
+        longest = max(self.series.stretches, key=lambda part: part.stop - part.start)
+        white = self.regression.whitened(fit, self.d, self._remaining(fit))[longest]
+        n, period = len(white), self.residuals.period
+        if n < 16 * LOWEST_LINE:
+            return None
+        power = np.abs(np.asarray(fft.rfft(white, OVERSAMPLING * n))) ** 2
+        first = int(np.ceil(LOWEST_LINE * OVERSAMPLING))
+        frequency = (first + int(np.argmax(power[first:-1]))) / (OVERSAMPLING * n * period)
+        time = self.residuals.time[longest]
+        step = 1 / (OVERSAMPLING * n * period)
+        for _ in range(4):
+            trial = frequency + step * np.linspace(-1, 1, 11)
+            heights = np.abs(np.exp(-2j * np.pi * trial[:, None] * time) @ white)
+            frequency = float(trial[int(np.argmax(heights))])
+            step /= 5
+        phase = 2 * np.pi * frequency * self.residuals.time
+        pattern = Pattern('line', scale=frequency)
+        rows = np.stack((np.cos(phase), np.sin(phase)))
+        # As many frequencies as the stretch resolves were tried.
+        family = Family('frequency', rows, np.zeros((0, 0)), (pattern,), rivals=n // 2,
+                        paired=True)
+        return self.candidate(family, pattern, rows)
+
+    def _remaining(self, fit: JointFit) -> Array:
+        return self.series.inverse(self.regression.remaining(fit, self.d))
+
+    def refined(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
+        """Return a range with its limits moved to where they gain most at the noise of a fit.
+
+        Parameters
+        ----------
+        candidate : UnknownCandidate
+        fit : JointFit
+            Without the candidate.
+        """
+        pattern, family = candidate.pattern, candidate.family
+        if pattern.kind == 'line':
+            return self._line_refined(candidate, fit)
+        if pattern.kind not in ('range', 'directed_range') or pattern.limits is None:
+            return candidate
+        speed = family.variable.startswith('velocity') and pattern.kind == 'directed_range'
+        values = self.values(family.variable)
+        values = np.abs(values) if speed else values
+        sign = self.values('direction') if pattern.kind == 'directed_range' else 1.0
+        index, felt = self.regression.local(fit, self.d)
+        root = np.sqrt(self.series.spread(self.regression.weights(fit, self.d)))
+        active = np.concatenate([self.regression.base[self.d][:-1],
+                                 *(block.rows[self.d] for block in felt)]) * root
+        rest = self.regression.remaining(fit, self.d) * root
+        covariance = fit.covariance[np.ix_(index, index)]
+        limits = list(pattern.limits)
+        outer = (float(values.min()), float(values.max()))
+        best = -np.inf
+        for end, width in ((end, width) for width in LIMIT_STEPS for end in (0, 1)):
+            if limits[end] == outer[end]:
+                continue
+            trials = trial_limits(limits[end], outer, family.edges, width)
+            low = np.where(end == 0, trials, limits[0])
+            high = np.where(end == 1, trials, limits[1])
+            rows = np.asarray(((values >= low[:, None]) & (values <= high[:, None])) * sign,
+                              dtype=float)
+            # A handful of samples is an incident, not a range.
+            held = np.abs(rows).sum(axis=1) >= LEAST_SHARE * len(values)
+            x = self.series.transform(rows) * root
+            known = x @ active.T
+            own = np.einsum('ij,ij->i', x, x) - np.einsum('ip,pq,iq->i', known, covariance, known)
+            gains = np.where(held, (x @ rest) ** 2 / np.maximum(own, 1e-9), -np.inf)
+            top = int(np.argmax(gains))
+            if gains[top] > best:
+                best, limits[end] = float(gains[top]), float(trials[top])
+        moved = replace(pattern, limits=(limits[0], limits[1]))
+        rows = np.asarray((values >= limits[0]) & (values <= limits[1]), dtype=float) * sign
+        return self.candidate(family, moved, rows[None])
+
+    def _line_refined(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
+        """Return a line after Gauss-Newton steps in its frequency."""
+        frequency, time = candidate.pattern.scale, self.residuals.time
+        root = np.sqrt(self.series.spread(self.regression.weights(fit, self.d)))
+        rest = self.regression.remaining(fit, self.d) * root
+        middle = time - time.mean()
+        for _ in range(FREQUENCY_STEPS):
+            wave = np.stack((np.cos(2 * np.pi * frequency * time),
+                             np.sin(2 * np.pi * frequency * time)))
+            a, b = np.linalg.lstsq((self.series.transform(wave) * root).T, rest, rcond=None)[0]
+            slope = 2 * np.pi * middle * (b * wave[0] - a * wave[1])
+            rows = self.series.transform(np.concatenate((wave, slope[None]))) * root
+            step = np.linalg.lstsq(rows.T, rest, rcond=None)[0][2]
+            frequency += float(np.clip(step, -0.25 / np.ptp(time), 0.25 / np.ptp(time)))
+        phase = 2 * np.pi * frequency * time
+        rows = np.stack((np.cos(phase), np.sin(phase)))
+        return self.candidate(candidate.family, Pattern('line', scale=frequency), rows)
+
+    def values(self, variable: str) -> Array:
+        """Return a variable by its name in the interface, also one of another drive, (n,)."""
+        name, _, other = variable.partition(' of ')
+        drive = self.residuals.drives.index(other) if other else self.d
+        values = self.residuals.variable(name, drive)
+        assert values is not None
+        return values
+
+
+def best_patterns(libraries: Sequence[PatternLibrary], fit: JointFit, count: int,
+                  ) -> list[UnknownCandidate]:
+    """Return the best patterns of any drive at the noise of a fit, their limits refined."""
+    proposed = each(lambda library: library.proposals(fit, count), libraries)
+    found = [(candidate, gain, library) for library, offers in zip(
+        libraries, proposed, strict=True) for candidate, gain in offers]
+    found.sort(key=lambda one: -one[1])
+    return [library.on_more_drives(library.refined(candidate, fit), fit)
+            for candidate, gain, library in found[:count] if gain > 0]

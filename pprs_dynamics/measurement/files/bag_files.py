@@ -1,0 +1,269 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""rosbag2 recordings of sensor_msgs/JointState, MCAP or sqlite3, a directory or a bare file."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.measurement.files.joint_state_cdr import serialised
+from pprs_dynamics.measurement.files.message_blocks import JointStateBlocks
+from pprs_dynamics.measurement.files.samples import (
+    Finding,
+    Indices,
+    Progress,
+    Samples,
+    counted,
+    whole_epoch,
+)
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+    from rosbags.rosbag2 import Reader
+
+MESSAGE_TYPE = 'sensor_msgs/msg/JointState'
+TOPIC_END = 'joint_states'
+# First bytes of a bare storage file, and the suffix by which rosbags knows it.
+MAGIC = {b'\x89MCAP': '.mcap', b'SQLite format 3\x00': '.db3'}
+STORAGE = {'.mcap': 'MCAP', '.db3': 'SQLITE3'}
+# Messages handled at a time: a few megabytes of bytes and objects.
+BLOCK = 8192
+
+
+def storage_suffix(path: Path) -> str | None:
+    """Return '.mcap' or '.db3' by a file's first bytes, None for anything else."""
+    with path.open('rb') as file:
+        start = file.read(16)
+    return next((suffix for magic, suffix in MAGIC.items() if start.startswith(magic)), None)
+
+
+def read_bag(
+    path: Path, drives: tuple[str, ...], topic: str | None = None,
+    progress: Progress | None = None,
+) -> Samples:
+    """Read a bag directory, or a bare .mcap or .db3 file.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it is damaged, holds no such topic or several, or lacks a drive.
+    MissingLibraryError
+        Where rosbags is not installed.
+    """
+    storage, findings = _storage_of(path)
+    _check_lengths(path, storage)
+    with _opened(path, storage) as reader:
+        connections = _chosen(path, reader, topic)
+        name = connections[0].topic
+        blocks = JointStateBlocks(drives)
+        total = sum(connection.msgcount for connection in connections)
+        messages, done = _messages(path, reader, connections), 0
+        while block := list(islice(messages, BLOCK)):
+            blocks.add([data for _, data in block], [stamp for stamp, _ in block])
+            done += len(block)
+            if progress is not None:
+                progress(done, max(total, done))
+    if not done:
+        raise UnreadableFileError(path, f'{name} holds no messages')
+    if not blocks.samples:
+        _tell_missing(path, name, drives, blocks)
+    stamps, received, position, velocity, effort = blocks.arrays()
+    if not np.any(stamps):
+        findings.append(Finding(
+            'receive_times', len(stamps), 'the stamps in all message headers are 0'))
+        stamps = received
+    findings += _ignored(name, done, drives, blocks)
+    epoch = whole_epoch(stamps / 1e9)
+    return Samples(
+        drives, (stamps - epoch * 10**9) / 1e9, position,
+        None if np.all(np.isnan(velocity)) else velocity, effort, epoch,
+        f'rosbag2, {name}', tuple(findings))
+
+
+def write_bag(path: Path, samples: Samples, topic: str) -> None:
+    """Write a bare .mcap or .db3 file by the suffix, or else a bag directory with MCAP.
+
+    Stamps are rounded to 1 ns; they stand in the headers.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be written, or its times are before 0.
+    MissingLibraryError
+        Where rosbags is not installed.
+    """
+    stamps = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
+    if len(stamps) and (stamps.min() < 0 or stamps.max() >= 2**31 * 10**9):
+        raise UnreadableFileError(
+            path, f'cannot be written: ROS stamps run from 0 to {2**31} s, but the time is '
+            f'{samples.epoch + samples.time.min():.6g} to '
+            f'{samples.epoch + samples.time.max():.6g} s')
+    suffix = path.suffix if path.suffix in STORAGE else ''
+    try:
+        if not suffix:
+            _write_directory(path, samples, stamps, topic, '.mcap')
+            return
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix='.pprs_') as folder:
+            _write_directory(Path(folder) / 'bag', samples, stamps, topic, suffix)
+            (Path(folder) / 'bag' / f'bag{suffix}').replace(path)
+    except OSError as error:
+        raise UnreadableFileError(
+            path, f'cannot be written: {error.strerror or error}') from None
+
+
+def _write_directory(
+    path: Path, samples: Samples, stamps: Indices, topic: str, suffix: str,
+) -> None:
+    _require_rosbags('writing rosbag2 files')
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    if path.exists():
+        raise UnreadableFileError(path, 'exists already, and bags are never overwritten')
+    # A bag is read in the order of recording: it must not follow a clock that is set back.
+    recorded = np.maximum.accumulate(stamps)
+    with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
+        connection = writer.add_connection(
+            topic, MESSAGE_TYPE, typestore=get_typestore(Stores.ROS2_KILTED))
+        for start in range(0, len(stamps), BLOCK):
+            part = slice(start, start + BLOCK)
+            velocity = None if samples.velocity is None else samples.velocity[part]
+            rows = serialised(samples.drives, stamps[part], samples.position[part], velocity,
+                              samples.effort[part])
+            for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
+                writer.write(connection, stamp, row.tobytes())
+
+
+def _require_rosbags(purpose: str) -> None:
+    try:
+        import rosbags.rosbag2  # noqa: F401
+    except ImportError:
+        raise MissingLibraryError('rosbags', purpose, 'bags') from None
+
+
+def _storage_of(path: Path) -> tuple[Path, list[Finding]]:
+    """Return what rosbags can open: a directory with metadata, or a file with its suffix."""
+    if not path.is_dir():
+        suffix = storage_suffix(path)
+        if suffix is not None and path.suffix != suffix:
+            raise UnreadableFileError(
+                path, f'its content is a {suffix} file of rosbag2: its name must end so')
+        return path, []
+    if (path / 'metadata.yaml').is_file():
+        return path, []
+    found = sorted(file for file in path.iterdir() if file.suffix in STORAGE)
+    if len(found) != 1:
+        raise UnreadableFileError(
+            path, 'not a rosbag2 directory: there is no metadata.yaml'
+            + (f', and {len(found)} storage files without it have no order' if found else ''))
+    return found[0], [Finding('no_metadata', 1, 'the bag has no metadata.yaml')]
+
+
+def _check_lengths(path: Path, storage: Path) -> None:
+    """Refuse databases shorter than they say: SQLite itself reads zeros where they end."""
+    for file in storage.glob('*.db3') if storage.is_dir() else [storage]:
+        with file.open('rb') as data:
+            head = data.read(32)
+        if head.startswith(b'SQLite format 3') and len(head) == 32:
+            # A page size of 1 stands for 65536, which two bytes cannot hold.
+            page, pages = int.from_bytes(head[16:18]), int.from_bytes(head[28:32])
+            length = pages * (page if page > 1 else 2**16)
+            if file.stat().st_size < length:
+                raise UnreadableFileError(
+                    path, f'it is truncated: {file.stat().st_size} bytes of {length}')
+
+
+@contextmanager
+def _opened(path: Path, storage: Path) -> Iterator[Reader]:
+    _require_rosbags('reading rosbag2 files')
+    from rosbags.rosbag2 import Reader
+
+    # Damaged bytes surface in rosbags as errors of any kind, from struct's to sqlite's.
+    try:
+        reader = Reader(storage)
+        reader.open()
+    except Exception as error:
+        raise UnreadableFileError(path, _damaged(error)) from None
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+def _messages(
+    path: Path, reader: Reader, connections: list[Connection],
+) -> Iterator[tuple[int, bytes]]:
+    try:
+        for _, stamp, data in reader.messages(connections):
+            yield stamp, data
+    except Exception as error:
+        raise UnreadableFileError(path, _damaged(error)) from None
+
+
+def _damaged(error: Exception) -> str:
+    reason = ' '.join(str(error).split()) or type(error).__name__
+    return ('cannot be read as rosbag2, it is truncated, damaged or something else '
+            f'({reason[:160]})')
+
+
+def _chosen(path: Path, reader: Reader, topic: str | None) -> list[Connection]:
+    """Return the connections of the one topic to be read."""
+    states = [item for item in reader.connections if item.msgtype == MESSAGE_TYPE]
+    topics = sorted({item.topic for item in states})
+    if topic is not None:
+        matching = [name for name in topics if name.strip('/') == topic.strip('/')]
+        if not matching:
+            raise UnreadableFileError(
+                path, f'there is no sensor_msgs/JointState on {topic}'
+                + (f', but on {", ".join(topics)}' if topics else ''))
+    else:
+        matching = [name for name in topics if name.endswith(TOPIC_END)]
+        # Topics that were announced and stayed silent are no choice.
+        filled = {item.topic for item in states if item.msgcount}
+        matching = [name for name in matching if name in filled] or matching
+        if not matching:
+            raise UnreadableFileError(
+                path, f'there is no sensor_msgs/JointState on a topic ending in {TOPIC_END}'
+                + (f'; choose one of {", ".join(topics)} with topic' if topics else ''))
+    if len(matching) > 1:
+        raise UnreadableFileError(
+            path, f'there are joint states on {", ".join(matching)}: choose one with topic')
+    return [item for item in states if item.topic == matching[0]]
+
+
+def _tell_missing(
+    path: Path, topic: str, drives: tuple[str, ...], blocks: JointStateBlocks,
+) -> None:
+    missing = [drive for drive in drives if drive not in blocks.names]
+    if missing:
+        raise UnreadableFileError(
+            path, f'{topic} lacks {", ".join(missing)}; it holds '
+            + (', '.join(sorted(blocks.names)) or 'no names'))
+    raise UnreadableFileError(
+        path, f'no single message on {topic} holds positions of all of {", ".join(drives)}')
+
+
+def _ignored(
+    topic: str, messages: int, drives: tuple[str, ...], blocks: JointStateBlocks,
+) -> list[Finding]:
+    findings = []
+    others = sorted(blocks.names - set(drives))
+    if others:
+        findings.append(Finding('ignored_joints', len(others),
+                                f'{topic} also holds {", ".join(others)}'))
+    skipped = messages - blocks.samples
+    if skipped:
+        findings.append(Finding(
+            'incomplete_messages', skipped,
+            f'{counted(skipped, "message")} of {messages} on {topic} '
+            f'without positions of all of {", ".join(drives)}'))
+    return findings

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Judging samples: every defect is found, told, and treated by the policy in `samples.POLICY`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pprs_dynamics.measurement.files import signals, stamps
+from pprs_dynamics.measurement.files.samples import (
+    MOST_SPANS,
+    Finding,
+    Indices,
+    Mask,
+    Samples,
+    counted,
+    when,
+)
+
+# What a differentiating filter needs at least; shorter segments are nothing but edges.
+SHORTEST_SEGMENT = 20
+# Below these a recording is told to be short: too few samples for statistics of a model's error.
+FEW_SAMPLES = 100
+SHORT_TIME = 1.0
+# Median steps beyond this [s] cannot follow a robot; likely milliseconds taken for seconds.
+SLOW_STEP = 0.1
+
+
+class Judgement:
+    """Samples on their way to a recording: what is kept, where it is split, what was found.
+
+    Parameters
+    ----------
+    samples : Samples
+        As read.
+
+    Attributes
+    ----------
+    samples : Samples
+        What is left.
+    segments : tuple of slice
+        Stretches without reset, jump, gap or change of rate, of at least 20 samples.
+    findings : list of Finding
+    """
+
+    def __init__(self, samples: Samples) -> None:
+        self.samples = samples
+        self.findings = list(samples.findings)
+        self.segments: tuple[slice, ...] = ()
+        self._starts: Indices = np.zeros(1, dtype=np.int64)
+        self._drop_non_finite()
+        if not len(self.samples.time):
+            return
+        self._order()
+        self._judge_positions()
+        self._judge_spacing()
+        self._judge_efforts_and_velocities()
+        self._judge_constant_values()
+        self._cut_segments()
+
+    def _tell(self, kind: str, count: int, what: str, places: Iterable[tuple[int, int]] = (),
+              drives: Iterable[str] = (), least: int = 1) -> None:
+        """Add a finding with places as (first, last) samples, if there is anything to tell."""
+        if count < least:
+            return
+        time = self.samples.time
+        spans = tuple((float(time[first]), float(time[last])) for first, last in places)
+        where = f' {when(spans)}' if spans else ''
+        self.findings.append(
+            Finding(kind, count, what + where, spans[:MOST_SPANS], tuple(drives)))
+
+    def _keep(self, mask: Mask) -> None:
+        """Drop samples, and move the starts of stretches with them."""
+        if np.all(mask):
+            return
+        before = np.concatenate(([0], np.cumsum(mask)))
+        self.samples = self.samples.take(mask)
+        starts = np.unique(before[self._starts])
+        self._starts = starts[starts < max(len(self.samples.time), 1)]
+
+    def _split(self, firsts: Indices) -> None:
+        self._starts = np.union1d(self._starts, firsts.astype(np.int64))
+
+    def _drop_non_finite(self) -> None:
+        bad_time = ~np.isfinite(self.samples.time)
+        self._tell('non_finite_time', int(bad_time.sum()),
+                   f'{counted(int(bad_time.sum()), "sample")} without a finite time')
+        self._keep(~bad_time)
+        bad = ~np.isfinite(self.samples.position)
+        rows = np.any(bad, axis=1)
+        drives = self._named(np.any(bad, axis=0))
+        count = int(rows.sum())
+        self._tell('non_finite_position', count,
+                   f'{counted(count, "sample")} without a finite position of {", ".join(drives)}',
+                   _places(rows), drives)
+        self._keep(~rows)
+
+    def _order(self) -> None:
+        time = self.samples.time
+        resets = stamps.clock_resets(time)
+        if len(resets):
+            first = int(resets[0])
+            self._tell('clock_reset', len(resets),
+                       f'the clock is set back {counted(len(resets), "time")}, first from '
+                       f'{time[first - 1]:.6g} s to {time[first]:.6g} s,',
+                       [(int(k), int(k)) for k in resets])
+        self._split(resets)
+        late = stamps.late_samples(time, self._starts)
+        self._tell('unordered_stamps', int(late.sum()),
+                   f'{counted(int(late.sum()), "stamp")} out of order', _places(late))
+        if np.any(late):
+            self.samples = self.samples.take(stamps.sorted_order(time, self._starts))
+        same = stamps.duplicates(self.samples.time)
+        self._tell('duplicate_stamps', int(same.sum()),
+                   f'{counted(int(same.sum()), "sample")} with the stamp of another',
+                   _places(same))
+        self._keep(~same)
+
+    def _judge_positions(self) -> None:
+        found = signals.find_jumps(self.samples)
+        for drive, name in enumerate(self.samples.drives):
+            jumps = [(first, size) for first, k, size in found.jumps if k == drive]
+            size = max((size for _, size in jumps), key=abs, default=0.0)
+            self._tell('position_jump', len(jumps),
+                       f'the position of {name} jumps {counted(len(jumps), "time")}, by up to '
+                       f'{size:.4g} {self.samples.unit_of(drive, "m")},',
+                       [(first, first) for first, _ in jumps], [name])
+        self._split(np.array([first for first, _, _ in found.jumps], dtype=np.int64))
+        drives = [self.samples.drives[drive] for drive in sorted(found.spike_drives)]
+        count = int(found.spikes.sum())
+        self._tell('position_spike', count,
+                   f'{counted(count, "sample")} with a spike in the position of '
+                   f'{", ".join(drives)}', _places(found.spikes), drives)
+        self._keep(~found.spikes)
+
+    def _judge_spacing(self) -> None:
+        time = self.samples.time
+        changes = stamps.rate_changes(time, self._starts)
+        if changes:
+            _, before, after = changes[0]
+            self._tell('changing_rate', len(changes),
+                       f'the rate changes {counted(len(changes), "time")}, first from '
+                       f'{1 / before:.4g} Hz to {1 / after:.4g} Hz,',
+                       [(first, first) for first, _, _ in changes])
+        self._split(np.array([first for first, _, _ in changes], dtype=np.int64))
+        every_gap, every_lost, lost_count = [], [], 0
+        for part in stamps.stretches(self._starts, len(time)):
+            gap, lost, count = stamps.gaps(time, part)
+            every_gap += gap.tolist()
+            every_lost += lost.tolist()
+            lost_count += count
+        missing = sum(time[k] - time[k - 1] for k in every_gap)
+        self._tell('gap', len(every_gap),
+                   f'{counted(len(every_gap), "gap")} of {missing:.4g} s in all',
+                   [(k - 1, k) for k in every_gap])
+        self._tell('lost_samples', lost_count, f'{counted(lost_count, "sample")} lost',
+                   [(k - 1, k) for k in every_lost])
+        self._split(np.array(every_gap, dtype=np.int64))
+        self._judge_regularity()
+
+    def _judge_regularity(self) -> None:
+        time = self.samples.time
+        irregular, slow = [], []
+        for part in stamps.stretches(self._starts, len(time)):
+            if part.stop - part.start < SHORTEST_SEGMENT:
+                continue
+            low, step, high = stamps.spread(time, part)
+            if high - low > stamps.IRREGULAR_SPREAD * step:
+                irregular.append((part.start, part.stop - 1, low, high))
+            if step > SLOW_STEP:
+                slow.append((part.start, part.stop - 1, step))
+        if irregular:
+            low, high = min(item[2] for item in irregular), max(item[3] for item in irregular)
+            self._tell('irregular_steps', len(irregular),
+                       f'steps between stamps vary from {1e3 * low:.3g} to {1e3 * high:.3g} ms',
+                       [item[:2] for item in irregular])
+        if slow:
+            self._tell('slow_rate', len(slow),
+                       f'there is only one sample in {max(item[2] for item in slow):.4g} s',
+                       [item[:2] for item in slow])
+
+    def _judge_efforts_and_velocities(self) -> None:
+        effort = self.samples.effort
+        infinite = np.isinf(effort)
+        if np.any(infinite):
+            effort[infinite] = np.nan
+        self._tell_missing('effort_not_measured', effort, 'effort')
+        velocity = self.samples.velocity
+        if velocity is None:
+            self._tell('missing_velocity', len(effort), 'no velocities are recorded')
+            return
+        infinite = np.isinf(velocity)
+        if np.any(infinite):
+            velocity[infinite] = np.nan
+        self._tell_missing('missing_velocity', velocity, 'velocity')
+
+    def _tell_missing(self, kind: str, values: NDArray[np.float64], quantity: str) -> None:
+        missing = np.isnan(values)
+        counts = missing.sum(axis=0)
+        drives = self._named(counts > 0)
+        share = [f'{name} ({_percent(int(count), len(values))})'
+                 for name, count in zip(self.samples.drives, counts, strict=True) if count]
+        self._tell(kind, int(counts.sum()), f'no {quantity} of {", ".join(share)}',
+                   _places(np.any(missing, axis=1)), drives)
+
+    def _judge_constant_values(self) -> None:
+        samples = self.samples
+        runs = signals.frozen_runs(samples, self._starts)
+        count = sum(last - first for first, last in runs)
+        self._tell('frozen_samples', count,
+                   f'{counted(count, "sample")} repeating every value of the one before', runs)
+        for drive, name in enumerate(samples.drives):
+            moves = not signals.is_constant(samples.position[:, drive])
+            if not moves:
+                self._tell('constant_position', 1,
+                           f'the position of {name} is {samples.position[0, drive]:.6g} '
+                           f'{samples.unit_of(drive, "m")} throughout', drives=[name])
+            velocity = None if samples.velocity is None else samples.velocity[:, drive]
+            if moves and velocity is not None and signals.is_constant(velocity):
+                self._tell('constant_velocity', 1,
+                           f'the velocity of {name} is {velocity[np.isfinite(velocity)][0]:.6g} '
+                           f'{samples.unit_of(drive, "m/s")} throughout, while it moves',
+                           drives=[name])
+            effort = samples.effort[:, drive]
+            if signals.is_constant(effort):
+                self._tell('constant_effort', 1,
+                           f'the effort of {name} is {effort[np.isfinite(effort)][0]:.6g} '
+                           f'{samples.unit_of(drive, "N")} throughout', drives=[name])
+                continue
+            runs = signals.stuck_efforts(samples, self._starts, drive)
+            self._tell('constant_effort', len(runs),
+                       f'the effort of {name} does not change while it moves', runs, [name])
+
+    def _cut_segments(self) -> None:
+        time = self.samples.time
+        parts = list(stamps.stretches(self._starts, len(time)))
+        short = [part for part in parts if part.stop - part.start < SHORTEST_SEGMENT]
+        self.segments = tuple(
+            part for part in parts if part.stop - part.start >= SHORTEST_SEGMENT)
+        count = sum(part.stop - part.start for part in short)
+        self._tell('short_segment', len(short),
+                   f'{counted(len(short), "segment")} of fewer than {SHORTEST_SEGMENT} samples, '
+                   f'{counted(count, "sample")} in all,',
+                   [(part.start, part.stop - 1) for part in short])
+        used = sum(part.stop - part.start for part in self.segments)
+        duration = float(sum(time[part.stop - 1] - time[part.start] for part in self.segments))
+        if used < FEW_SAMPLES or duration < SHORT_TIME:
+            self._tell('too_short', 1, f'the segments hold only {counted(used, "sample")} '
+                                       f'in {duration:.3g} s')
+
+    def _named(self, mask: Mask) -> list[str]:
+        return [name for name, true in zip(self.samples.drives, mask, strict=True) if true]
+
+
+def _places(mask: Mask) -> list[tuple[int, int]]:
+    """Return the runs of a mask as (first, last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _percent(count: int, total: int) -> str:
+    return 'all' if count == total else f'{100 * count / total:.3g} % of the samples'

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""CSV files of platform poses: `time,x,y,z,qx,qy,qz,qw` and, optionally, twists.
+
+Twists are `vx,vy,vz,wx,wy,wz,ax,ay,az,alx,aly,alz`: velocity, angular velocity, acceleration
+and angular acceleration of o in `base`. Without them a spline through the poses gives them.
+"""
+
+from __future__ import annotations
+
+import csv
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+
+POSE_COLUMNS = ('time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+TWIST_COLUMNS = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz', 'ax', 'ay', 'az', 'alx', 'aly', 'alz')
+
+
+def read_poses(path: str | PathLike[str], rate: float | None = None) -> PlatformMotion:
+    """Read a CSV of poses, columns in any order.
+
+    Parameters
+    ----------
+    path : path
+    rate : float, optional
+        Resample to this rate [Hz]. A file with twists must have it already: its twists are
+        taken as they are, and nothing in between is invented.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be read, a column is missing or unknown, or a cell is not a number.
+    MotionError
+        Where the poses are no motion: non-finite, off unit length, times not increasing.
+    """
+    try:
+        with Path(path).open(encoding='utf-8-sig', newline='') as file:
+            rows = list(csv.reader(file))
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    except (UnicodeDecodeError, csv.Error):
+        raise UnreadableFileError(path, 'not a CSV text file') from None
+    rows = [row for row in rows if any(cell.strip() for cell in row)]
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    columns = _columns(path, header)
+    numbers = np.empty((len(rows) - 1, len(header)))
+    for line, row in enumerate(rows[1:], start=2):
+        try:
+            numbers[line - 2] = [float(cell) for cell in row]
+        except ValueError:
+            raise UnreadableFileError(
+                path, f'row {line} must hold {len(header)} numbers, but is {",".join(row)[:80]!r}',
+            ) from None
+    if not len(numbers):
+        raise UnreadableFileError(path, 'no poses below the header')
+
+    def take(*names: str) -> np.ndarray:
+        return numbers[:, [header.index(name) for name in names]]
+
+    time, position, orientation = take('time')[:, 0], take('x', 'y', 'z'), take(*POSE_COLUMNS[4:])
+    try:
+        if columns == POSE_COLUMNS:
+            motion = PlatformMotion.from_poses(time, position, orientation)
+            return motion if rate is None else motion.resampled(rate)
+        v, omega, a, epsilon = (take(*TWIST_COLUMNS[k:k + 3]) for k in (0, 3, 6, 9))
+        motion = PlatformMotion(position, orientation, v, omega, a, epsilon, time)
+    except MotionError as error:
+        raise MotionError(f'{path}: {error.quantity}', error.found, error.rule,
+                          error.kind) from None
+    if rate is not None and len(motion) > 1 and not np.allclose(
+            np.diff(time) * rate, 1.0, rtol=0, atol=1e-6):
+        raise UnreadableFileError(
+            path, f'its twists belong to {1 / np.median(np.diff(time)):.6g} Hz, evenly spaced, but '
+            f'{rate:g} Hz are wanted: choose that rate, or leave the twists out')
+    return motion
+
+
+def write_poses(path: str | PathLike[str], motion: PlatformMotion) -> None:
+    """Write a motion with times as CSV, exact to the last digit."""
+    if motion.time is None:
+        raise MotionError('time', 'it is absent', 'be known to be written', 'time')
+    table = np.column_stack((
+        motion.time, motion.position, motion.orientation, motion.linear_velocity,
+        motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
+    try:
+        with Path(path).open('w', encoding='utf-8', newline='') as file:
+            writer = csv.writer(file)
+            writer.writerow(POSE_COLUMNS + TWIST_COLUMNS)
+            writer.writerows(table.tolist())
+    except OSError as error:
+        raise UnreadableFileError(path, f'cannot be written: {error.strerror}') from None
+
+
+def _columns(path: object, header: list[str]) -> tuple[str, ...]:
+    missing = [name for name in POSE_COLUMNS if name not in header]
+    if missing:
+        raise UnreadableFileError(
+            path, f'not a file of poses: the header must hold {",".join(POSE_COLUMNS)}, '
+            f'but {missing[0]} is missing')
+    unknown = [name for name in header if name not in POSE_COLUMNS + TWIST_COLUMNS]
+    if unknown or len(set(header)) < len(header):
+        name = unknown[0] if unknown else max(header, key=header.count)
+        raise UnreadableFileError(path, f'the column {name!r} is unknown or stands twice')
+    twists = [name for name in TWIST_COLUMNS if name in header]
+    if twists and len(twists) < len(TWIST_COLUMNS):
+        raise UnreadableFileError(
+            path, f'of the columns {",".join(TWIST_COLUMNS)} all or none must be there')
+    return POSE_COLUMNS + tuple(twists)

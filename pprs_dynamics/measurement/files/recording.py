@@ -1,0 +1,315 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording of the robot: what its drives did and what they needed, whatever file it is in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
+from pprs_dynamics.measurement.files.csv_files import read_csv, write_csv
+from pprs_dynamics.measurement.files.defects import Judgement
+from pprs_dynamics.measurement.files.samples import Finding, Progress, Samples, counted
+from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.system.plain_text import displayed
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Measured motion and effort of D drives.
+
+    Parameters
+    ----------
+    name : str
+        For people: the file's name, as `displayed`.
+    drives : tuple of D str
+    time : (N,) array
+        [s], counted from `epoch`; strictly increasing within each segment.
+    position : (N, D) array
+        [m], finite.
+    velocity : (N, D) array or None
+        As recorded [m/s], NaN where it is not; None where there is none at all.
+    effort : (N, D) array
+        What the drives applied [N]; NaN where it was not measured.
+    findings : tuple of Finding
+        Every defect, and what was done about it.
+    segments : tuple of slice
+        Stretches to be treated each for itself. Samples outside of them are not to be used.
+    epoch : int
+        Whole seconds that `time` counts from: 0 for clocks that start near 0.
+    source : str
+        Format and topic.
+    gain : (D,) array or None
+        By which recorded currents were multiplied [N m/A, N/A]; NaN for drives whose efforts were
+        recorded, None where all were.
+
+    Raises
+    ------
+    MotionError
+        For arrays whose shapes do not fit together.
+    """
+
+    name: str
+    drives: tuple[str, ...]
+    time: Array
+    position: Array
+    velocity: Array | None
+    effort: Array
+    findings: tuple[Finding, ...] = ()
+    segments: tuple[slice, ...] = field(default=())
+    epoch: int = 0
+    source: str = ''
+    gain: Array | None = None
+
+    def __post_init__(self) -> None:
+        shape = (len(self.time), len(self.drives))
+        for quantity, values in (('position', self.position), ('velocity', self.velocity),
+                                 ('effort', self.effort)):
+            if values is not None and values.shape != shape:
+                raise MotionError(quantity, f'its shape is {values.shape}', f'be {shape}', 'shape')
+
+    @classmethod
+    def from_arrays(
+        cls, name: str, time: Array, position: Array, velocity: Array | None = None,
+        effort: Array | None = None, drives: tuple[str, ...] = DRIVES,
+    ) -> Recording:
+        """Judge arrays as a file's content would be.
+
+        Parameters
+        ----------
+        name : str
+        time : (N,) array
+            [s].
+        position, velocity, effort : (N, D) arrays
+            Copied; the last two may be absent.
+        drives : tuple of D str
+
+        Raises
+        ------
+        MotionError
+            For arrays whose shapes do not fit together, or without a single finite sample.
+        """
+        time, position = np.array(time, dtype=float), np.array(position, dtype=float)
+        efforts = np.full(position.shape, np.nan) if effort is None else np.array(effort, float)
+        velocities = None if velocity is None else np.array(velocity, float)
+        # Checks the shapes before anything computes with them.
+        cls(name, drives, time, position, velocities, efforts)
+        recording = _judged(name, Samples(drives, time, position, velocities, efforts))
+        if not len(recording.time):
+            raise MotionError('position', 'no sample is finite', 'be finite', 'finite')
+        return recording
+
+    @property
+    def samples(self) -> Samples:
+        """The arrays alone."""
+        return Samples(self.drives, self.time, self.position, self.velocity, self.effort,
+                       self.epoch, self.source)
+
+
+@dataclass(frozen=True)
+class DriveRange:
+    """What one drive did.
+
+    Parameters
+    ----------
+    position, effort : (lowest, highest)
+        [m], [N]; the latter None where it was never measured.
+    velocity : (lowest, highest) or None
+        As recorded [m/s].
+    measured : float
+        Share of the samples with an effort, 0 to 1.
+    """
+
+    position: tuple[float, float]
+    velocity: tuple[float, float] | None
+    effort: tuple[float, float] | None
+    measured: float
+
+
+@dataclass(frozen=True)
+class SegmentSummary:
+    """One segment: its times [s], samples, and rate [Hz] from the median step."""
+
+    start: float
+    end: float
+    samples: int
+    rate: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What is in a recording.
+
+    Parameters
+    ----------
+    name, source : str
+    samples : int
+        All that were kept.
+    used : int
+        Those in segments.
+    epoch : int
+        [s].
+    start, end : float
+        First and last time [s].
+    duration : float
+        Of all segments together [s].
+    rate : float
+        Samples per second in the segments, from the median step; NaN without segments.
+    segments : tuple of SegmentSummary
+    drives : dict of DriveRange
+    findings : tuple of Finding
+    """
+
+    name: str
+    source: str
+    samples: int
+    used: int
+    epoch: int
+    start: float
+    end: float
+    duration: float
+    rate: float
+    segments: tuple[SegmentSummary, ...]
+    drives: dict[str, DriveRange]
+    findings: tuple[Finding, ...]
+
+
+def read_recording(
+    path: str | PathLike[str], drives: tuple[str, ...] = DRIVES, topic: str | None = None,
+    progress: Progress | None = None, gain: Sequence[float] | None = None,
+    in_amperes: bool = False, units: tuple[DriveUnits, ...] = (),
+) -> Recording:
+    """Read a rosbag2 directory, a bare .mcap or .db3 file, or a CSV: the content decides.
+
+    Parameters
+    ----------
+    path : path
+    drives : tuple of str
+        Taken by name, in any order, among any others; ('axis',) for a single axis.
+    topic : str, optional
+        Of sensor_msgs/JointState, or prefix of CSV columns; needed where there are several.
+    progress : callable, optional
+        Called with (done, total) now and then.
+    gain : (D,) sequence, optional
+        Effort per ampere, for what was recorded as a current.
+    in_amperes : bool
+        Whether efforts are currents, too; columns named `current` always are.
+    units : tuple of DriveUnits, optional
+        For what is found wrong; of drives that push by default.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where the file is missing, damaged, of another kind, or lacks a drive; and for currents
+        without a gain.
+    MissingLibraryError
+        For a bag, where rosbags is not installed.
+    """
+    path = Path(path)
+    try:
+        # A name that promises a bag is read as one, for the reason why it is none.
+        is_bag = path.is_dir() or storage_suffix(path) or path.suffix in ('.mcap', '.db3')
+        if not path.is_dir() and not path.stat().st_size:
+            raise UnreadableFileError(path, 'the file is empty')
+        reader = read_bag if is_bag else read_csv
+        samples = reader(path, tuple(drives), topic, progress)
+    except OSError as error:
+        if isinstance(error, UnreadableFileError):
+            raise
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    samples, applied = _as_efforts(path, samples, gain, in_amperes)
+    recording = replace(_judged(displayed(path.name), replace(samples, units=units)), gain=applied)
+    if not len(recording.time):
+        raise UnreadableFileError(
+            path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '
+            'finite positions of all drives')
+    return recording
+
+
+def read_for(model: ForceModel, path: str | PathLike[str], topic: str | None = None,
+             progress: Progress | None = None) -> Recording:
+    """Read a recording of a model's drives, efforts by its gains; see `read_recording`."""
+    return read_recording(path, model.drives, topic, progress, model.gain,
+                          model.efforts_in_amperes, model.units)
+
+
+def _as_efforts(path: Path, samples: Samples, gain: Sequence[float] | None, in_amperes: bool,
+                ) -> tuple[Samples, Array | None]:
+    """Return samples with currents times the gain, and the gain where it was applied."""
+    currents = np.array(samples.in_amperes or [False] * len(samples.drives)) | in_amperes
+    if not np.any(currents):
+        return samples, None
+    if gain is None:
+        names = ', '.join(np.array(samples.drives)[currents])
+        raise UnreadableFileError(path, f'there are currents of {names}, but only the model of an '
+                                  'arm has a gain, by which they become efforts')
+    applied: Array = np.where(currents, np.asarray(gain), np.nan)
+    efforts = np.where(currents, samples.effort * np.asarray(gain), samples.effort)
+    return replace(samples, effort=efforts, in_amperes=()), applied
+
+
+def write_recording(
+    path: str | PathLike[str], recording: Recording, topic: str = '/joint_states',
+) -> None:
+    """Write a recording as .csv, bare .mcap, bare .db3, or, any other name, as a bag directory.
+
+    CSV keeps every digit, but not `epoch`; bags keep stamps to 1 ns. Files are replaced,
+    directories are not.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be written.
+    MissingLibraryError
+        For a bag, where rosbags is not installed.
+    """
+    path = Path(path)
+    if path.suffix == '.csv':
+        write_csv(path, recording.samples)
+    else:
+        write_bag(path, recording.samples, topic)
+
+
+def describe(recording: Recording) -> Summary:
+    """Return what is in a recording: rates, duration, ranges, findings."""
+    time = recording.time
+    segments = tuple(
+        SegmentSummary(float(time[part.start]), float(time[part.stop - 1]),
+                       part.stop - part.start, float(1 / np.median(np.diff(time[part]))))
+        for part in recording.segments)
+    steps = [np.diff(time[part]) for part in recording.segments]
+    ranges = {}
+    for k, drive in enumerate(recording.drives):
+        position, effort = _range(recording.position[:, k]), recording.effort[:, k]
+        assert position is not None
+        ranges[drive] = DriveRange(
+            position, None if recording.velocity is None else _range(recording.velocity[:, k]),
+            _range(effort), float(np.mean(np.isfinite(effort))))
+    return Summary(
+        recording.name, recording.source, len(time), sum(part.samples for part in segments),
+        recording.epoch, float(time.min()), float(time.max()),
+        sum(part.end - part.start for part in segments),
+        float(1 / np.median(np.concatenate(steps))) if steps else float('nan'),
+        segments, ranges, recording.findings)
+
+
+def _judged(name: str, samples: Samples) -> Recording:
+    judged = Judgement(samples)
+    kept = judged.samples
+    return Recording(name, kept.drives, kept.time, kept.position, kept.velocity, kept.effort,
+                     tuple(judged.findings), judged.segments, kept.epoch, kept.source)
+
+
+def _range(values: Array) -> tuple[float, float] | None:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else None

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a file of joint states holds before it is judged, and what is said about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.units import DriveUnits
+
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Progress = Callable[[int, int], None]
+
+# Stamps beyond this [s] count from an epoch: as floats they would lose more than 0.1 ns.
+EPOCH_STAMP = 1e6
+# A finding names at most this many places; its count is always complete.
+MOST_SPANS = 100
+
+# Everything that can be found, and what is done about it. Nothing else is ever changed.
+POLICY = {
+    'no_metadata': 'its only storage file is read',
+    'ignored_columns': 'they are ignored',
+    'ignored_joints': 'they are ignored',
+    'incomplete_messages': 'those messages are ignored',
+    'receive_times': 'the times at which the messages were recorded are used',
+    'non_finite_time': 'those samples are dropped',
+    'non_finite_position': 'those samples are dropped',
+    'clock_reset': 'the recording is split there',
+    'unordered_stamps': 'they are sorted in',
+    'duplicate_stamps': 'the first sample of each stamp is kept',
+    'position_spike': 'those samples are dropped',
+    'position_jump': 'the recording is split there',
+    'changing_rate': 'the recording is split there',
+    'gap': 'the recording is split there',
+    'lost_samples': 'they stay within one segment, to be interpolated',
+    'irregular_steps': 'the stamps are taken as true',
+    'slow_rate': 'the stamps are taken as seconds',
+    'effort_not_measured': 'the motion is kept and these efforts count as not measured',
+    'missing_velocity': 'velocities must come from the positions',
+    'constant_position': 'it is kept',
+    'constant_velocity': 'it is kept',
+    'constant_effort': 'it is kept',
+    'frozen_samples': 'they are kept',
+    'short_segment': 'those segments are not used',
+    'too_short': 'it is kept',
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a recording that its user should know.
+
+    Parameters
+    ----------
+    kind : str
+        A key of `POLICY`.
+    count : int
+        How many samples, places, columns, ... it concerns.
+    what : str
+        What was found, as a clause.
+    spans : tuple of (start, end)
+        Where, in the recording's time [s]; the first 100 places. Empty where it has no place.
+    drives : tuple of str
+        The drives concerned; empty where it concerns all.
+    """
+
+    kind: str
+    count: int
+    what: str
+    spans: tuple[tuple[float, float], ...] = ()
+    drives: tuple[str, ...] = ()
+
+    @property
+    def action(self) -> str:
+        """What was done about it, as a clause."""
+        return POLICY[self.kind]
+
+    @property
+    def text(self) -> str:
+        """The finding as one sentence."""
+        return f'{self.what}; {self.action}'
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Joint states in the order of their file, with all its defects.
+
+    Parameters
+    ----------
+    drives : tuple of str
+        Names of the D drives.
+    time : (N,) array
+        [s], after `epoch`.
+    position : (N, D) array
+        [m].
+    velocity : (N, D) array or None
+        [m/s], NaN where there is none.
+    effort : (N, D) array
+        [N], NaN where there is none.
+    epoch : int
+        Whole seconds that `time` counts from.
+    source : str
+        Format and topic, for people.
+    findings : tuple of Finding
+        What the reader of the file has to tell.
+    in_amperes : tuple of D bool
+        Drives whose `effort` is a current [A]; () for none.
+    units : tuple of D DriveUnits
+        () where all drives push.
+    """
+
+    drives: tuple[str, ...]
+    time: Array
+    position: Array
+    velocity: Array | None
+    effort: Array
+    epoch: int = 0
+    source: str = ''
+    findings: tuple[Finding, ...] = field(default=())
+    in_amperes: tuple[bool, ...] = ()
+    units: tuple[DriveUnits, ...] = ()
+
+    def unit_of(self, drive: int, unit: str) -> str:
+        """Return the unit of a drive's quantity; see `DriveUnits.of`."""
+        return self.units[drive].of(unit) if self.units else unit
+
+    def take(self, index: Indices | Mask) -> Samples:
+        """Return the samples of an index or mask."""
+        return replace(
+            self, time=self.time[index], position=self.position[index],
+            velocity=None if self.velocity is None else self.velocity[index],
+            effort=self.effort[index])
+
+
+def whole_epoch(seconds: Array) -> int:
+    """Return the whole seconds that stamps, (N,) [s], are best counted from.
+
+    0 for a clock that starts near 0. The median decides, so that single stamps of another clock
+    (0 before it was set) do not.
+    """
+    finite = seconds[np.isfinite(seconds)]
+    if not len(finite) or abs(middle := float(np.median(finite))) < EPOCH_STAMP:
+        return 0
+    return int(np.floor(finite[np.abs(finite - middle) < EPOCH_STAMP].min()))
+
+
+def counted(count: int, noun: str) -> str:
+    """Return '1 sample', '2 samples'."""
+    return f'{count} {noun}' + ('' if count == 1 else 's')
+
+
+def when(spans: tuple[tuple[float, float], ...]) -> str:
+    """Return 'at 1.5 s' or 'between 1.5 s and 2 s'."""
+    first, last = min(span[0] for span in spans), max(span[1] for span in spans)
+    if first == last:
+        return f'at {first:.6g} s'
+    return f'between {first:.6g} s and {last:.6g} s'

@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Suspicious positions, velocities and efforts: spikes, jumps, frozen and constant values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.samples import Indices, Mask, Samples
+from pprs_dynamics.measurement.files.stamps import stretches
+
+# A step of position this many times faster than 99 % of all, and than its own surroundings, is
+# no motion: real motion gains speed over several samples.
+JUMP_RATIO = 10.0
+# Steps to either side that count as surroundings; their median survives two jumps among them.
+SURROUNDINGS = 5
+# A jump that is undone within this many samples is a spike; the remainder may be this part.
+SPIKE_SAMPLES = 3
+SPIKE_REMAINDER = 0.1
+# Sensors with any noise do not repeat all their values for so long [s], nor in so many samples.
+FROZEN_TIME = 0.1
+FROZEN_SAMPLES = 10
+# An effort that stays the same for so long [s] while its drive visits this many positions.
+STUCK_TIME = 0.5
+STUCK_POSITIONS = 10
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Steps of position that are no motion.
+
+    Parameters
+    ----------
+    spikes : (N,) mask
+        Samples that lie apart from both their sides.
+    jumps : list of (sample, drive, size)
+        The first sample after each lasting jump [m].
+    spike_drives : set of int
+        Drives with spikes.
+    """
+
+    spikes: Mask
+    jumps: list[tuple[int, int, float]]
+    spike_drives: set[int]
+
+
+def find_jumps(samples: Samples) -> Jumps:
+    """Return spikes and jumps of all drives; where the clock was set back there is none."""
+    count = len(samples.time)
+    found = Jumps(np.zeros(count, dtype=bool), [], set())
+    steps = np.diff(samples.time)
+    for drive in range(len(samples.drives)):
+        moved = np.diff(samples.position[:, drive])
+        fast = _too_fast(moved, steps)
+        at = 0
+        while at < len(fast):
+            first = fast[at]
+            # Later steps that return to where this one left.
+            back = next((k for k in fast[at + 1:at + 1 + SPIKE_SAMPLES]
+                         if k - first <= SPIKE_SAMPLES
+                         and abs(moved[first:k + 1].sum()) < SPIKE_REMAINDER * abs(moved[first])),
+                        None)
+            if back is None:
+                found.jumps.append((int(first) + 1, drive, float(moved[first])))
+                at += 1
+            else:
+                found.spikes[first + 1:back + 1] = True
+                found.spike_drives.add(drive)
+                at = int(np.searchsorted(fast, back)) + 1
+    found.jumps.sort()
+    return found
+
+
+def frozen_runs(samples: Samples, starts: Indices) -> list[tuple[int, int]]:
+    """Return (first, last) samples between which every value of every drive is repeated.
+
+    Only where some effort is measured: positions alone stay the same whenever a robot rests.
+    """
+    same = _repeats(samples.position) & _repeats(samples.effort)
+    if samples.velocity is not None:
+        same &= _repeats(samples.velocity)
+    same &= np.any(np.isfinite(samples.effort), axis=1)[1:]
+    return _runs(samples.time, same, starts, FROZEN_TIME, FROZEN_SAMPLES)
+
+
+def stuck_efforts(samples: Samples, starts: Indices, drive: int) -> list[tuple[int, int]]:
+    """Return (first, last) samples between which a drive moves and its effort stays the same."""
+    effort = samples.effort[:, drive]
+    same = effort[1:] == effort[:-1]
+    runs = _runs(samples.time, same, starts, STUCK_TIME, FROZEN_SAMPLES)
+    return [(first, last) for first, last in runs
+            if len(np.unique(samples.position[first:last + 1, drive])) > STUCK_POSITIONS]
+
+
+def is_constant(values: Array) -> bool:
+    """Return whether measured values, (N,), are there and all the same."""
+    known = values[np.isfinite(values)]
+    return len(known) > 1 and bool(np.all(known == known[0]))
+
+
+def _too_fast(moved: Array, steps: Array) -> Indices:
+    """Return the steps of a drive that no motion explains."""
+    nothing = np.array([], dtype=np.int64)
+    if not len(moved):
+        return nothing
+    # Where the clock was set back nothing is known about the speed.
+    with np.errstate(over='ignore'):
+        speed = np.abs(moved) / np.where(steps > 0, steps, np.inf)
+    moving = speed[speed > 0]
+    if not len(moving):
+        return nothing
+    # Lower: of few steps the 99 % point would be the jump itself.
+    usual = float(np.quantile(moving, 0.99, method='lower'))
+    if len(moving) == 1:
+        usual = 0.0
+    suspects = np.flatnonzero(speed > JUMP_RATIO * usual)
+    padded = np.pad(speed, SURROUNDINGS, mode='reflect') if len(speed) > SURROUNDINGS else speed
+    return np.array([k for k in suspects.tolist()
+                     if speed[k] > JUMP_RATIO * np.median(padded[k:k + 2 * SURROUNDINGS + 1])],
+                    dtype=np.int64)
+
+
+def _repeats(values: Array) -> Mask:
+    """Return which samples, from the second on, repeat all of the one before, NaN as NaN."""
+    later, earlier = values[1:], values[:-1]
+    same: Mask = np.all((later == earlier) | (np.isnan(later) & np.isnan(earlier)), axis=1)
+    return same
+
+
+def _runs(
+    time: Array, same: Mask, starts: Indices, least_time: float, least_samples: int,
+) -> list[tuple[int, int]]:
+    """Return (first, last) samples of runs of repeats that last, within stretches."""
+    runs = []
+    for part in stretches(starts, len(time)):
+        inner = same[part.start:part.stop - 1].astype(np.int8)
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], inner, [0])).astype(np.int8)))
+        for first, last in zip(edges[::2] + part.start, edges[1::2] + part.start, strict=True):
+            if time[last] - time[first] >= least_time and last - first >= least_samples:
+                runs.append((int(first), int(last)))
+    return runs

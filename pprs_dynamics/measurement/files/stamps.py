@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Order and spacing of stamps: resets, disorder, duplicates, rates, gaps, lost samples.
+
+Each function looks at times, (N,), within `starts`: the first samples of the stretches that are
+already known to be apart. Thresholds are relative to the stretch's own median step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.samples import Indices, Mask
+
+# A stamp that goes back is late if the clock is ahead again within this many samples and it is
+# late by less than this [s]; otherwise the clock was set back. Sorting the latter would mix two
+# stretches of motion.
+MOST_LATE_SAMPLES = 10
+MOST_LATE_TIME = 1.0
+# With fewer samples than this from one setting back to the next, on average, no stretch of motion
+# is left between them: the rows were shuffled, and are all sorted.
+LEAST_BETWEEN_RESETS = 50
+# Longer than this many median steps: samples are missing. Below 2, which is one lost sample, and
+# above what jitter makes.
+LOST_STEPS = 1.5
+# Longer than this many median steps and longer than this time [s]: nothing is known in between.
+# A cubic through 20 ms of a 3 Hz motion of 50 mm errs by (2 pi 3 0.02)^4/384 50 mm = 3 um, about
+# the resolution of an encoder; longer gaps cannot be interpolated.
+GAP_STEPS = 2.5
+GAP_TIME = 0.02
+# Medians of this many steps are compared; a rate that lasts less than three of them, or differs
+# by less than this, has not changed.
+RATE_BLOCK = 100
+RATE_CHANGE = 0.2
+# Differences of stamps that are floats may be this much off, relatively.
+STAMP_ROUNDING = 1e-6
+# The middle 90 % of the steps spread over more than this part of the median: irregular.
+IRREGULAR_SPREAD = 0.5
+
+
+def stretches(starts: Indices, count: int) -> Iterator[slice]:
+    """Yield the stretches between starts as slices."""
+    for first, end in zip(starts, [*starts[1:], count], strict=True):
+        yield slice(int(first), int(end))
+
+
+def clock_resets(time: Array) -> Indices:
+    """Return the first sample after each setting back of the clock; none in shuffled rows."""
+    resets: list[int] = []
+    highest, seen = -np.inf, 0
+    for k in np.flatnonzero(np.diff(time) < 0).tolist():
+        highest = max(highest, float(time[seen:k + 1].max()))
+        seen = k + 1
+        ahead = time[k + 1:k + 2 + MOST_LATE_SAMPLES]
+        catches_up = bool(np.any(ahead >= highest)) or len(time) <= k + 2 + MOST_LATE_SAMPLES
+        if not catches_up or highest - float(ahead[0]) > MOST_LATE_TIME:
+            resets.append(k + 1)
+            highest = -np.inf
+        if len(resets) > max(2, len(time) // LEAST_BETWEEN_RESETS):
+            return np.array([], dtype=np.int64)
+    return np.array(resets, dtype=np.int64)
+
+
+def late_samples(time: Array, starts: Indices) -> Mask:
+    """Return which stamps lie before an earlier sample's of the same stretch."""
+    late = np.zeros(len(time), dtype=bool)
+    for part in stretches(starts, len(time)):
+        late[part] = time[part] < np.maximum.accumulate(time[part])
+    return late
+
+
+def sorted_order(time: Array, starts: Indices) -> Indices:
+    """Return the order that sorts each stretch, equal stamps in the order of the file."""
+    return np.concatenate([part.start + np.argsort(time[part], kind='stable')
+                           for part in stretches(starts, len(time))])
+
+
+def duplicates(time: Array) -> Mask:
+    """Return which stamps equal the one before, within sorted stretches.
+
+    Where the clock was set back two stamps side by side differ by definition.
+    """
+    return np.concatenate(([False], np.diff(time) == 0))
+
+
+def rate_changes(time: Array, starts: Indices) -> list[tuple[int, float, float]]:
+    """Return (first sample of the new rate, median step before, after) [s]."""
+    changes = []
+    for part in stretches(starts, len(time)):
+        steps = np.diff(time[part])
+        blocks = len(steps) // RATE_BLOCK
+        if blocks < 3:
+            continue
+        medians = _smoothed(np.median(
+            steps[:blocks * RATE_BLOCK].reshape(blocks, RATE_BLOCK), axis=1))
+        level = float(medians[0])
+        for block in range(1, blocks):
+            new = float(medians[block])
+            if abs(np.log(new / level)) <= np.log1p(RATE_CHANGE):
+                continue
+            # The change lies near this block: where the most steps fit the rate of their side.
+            first = max(0, block - 3) * RATE_BLOCK
+            near = steps[first:(block + 3) * RATE_BLOCK]
+            fits_new = (np.abs(near - new) < np.abs(near - level)).astype(int)
+            score = np.cumsum(1 - 2 * fits_new)
+            changes.append((part.start + first + int(np.argmax(score)) + 1, level, new))
+            level = new
+    return changes
+
+
+def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
+    """Return the steps of a stretch that are gaps, those with lost samples, and how many lost.
+
+    A step is named by its second sample. A long step that a short neighbour makes up for is a
+    late stamp, not a lost sample.
+    """
+    steps = np.diff(time[part])
+    if len(steps) < 2:
+        nothing = np.array([], dtype=np.int64)
+        return nothing, nothing, 0
+    step = float(np.median(steps))
+    gap = steps > max(GAP_STEPS * step, GAP_TIME) * (1 + STAMP_ROUNDING)
+    padded = np.concatenate(([step], steps, [step]))
+    not_made_up = np.minimum(padded[:-2], padded[2:]) + steps > (LOST_STEPS + 1) * step
+    lost = (steps > LOST_STEPS * step) & not_made_up & ~gap
+    count = int(np.sum(np.rint(steps[lost] / step) - 1))
+    return part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost), count
+
+
+def spread(time: Array, part: slice) -> tuple[float, float, float]:
+    """Return the 5 %, 50 % and 95 % points of the steps of a stretch [s].
+
+    A step over lost samples counts by how much it differs from a whole number of steps.
+    """
+    steps = np.diff(time[part])
+    middle = float(np.median(steps))
+    whole = np.maximum(np.rint(steps / middle), 1)
+    low, high = np.quantile(steps - (whole - 1) * middle, (0.05, 0.95))
+    return float(low), middle, float(high)
+
+
+def _smoothed(medians: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the running median over five blocks, which a lasting change of three survives."""
+    padded = np.concatenate((medians[[0, 0]], medians, medians[[-1, -1]]))
+    smooth: NDArray[np.float64] = np.median(
+        np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    return smooth

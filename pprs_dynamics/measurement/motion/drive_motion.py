@@ -1,0 +1,237 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The smooth motion of the drives at the samples of a recording, and which samples make a block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MotionError
+from pprs_dynamics.measurement.motion.bandwidth import motion_bandwidth
+from pprs_dynamics.measurement.motion.differentiation import (
+    SHORTEST_WINDOW,
+    LocalPolynomial,
+    Smoothing,
+    Stretch,
+    better_recorded,
+    choose_smoothing,
+    representative,
+)
+from pprs_dynamics.measurement.motion.sampling_grid import SamplingGrid, find_grid
+from pprs_dynamics.measurement.motion.treatment import block_duration, block_length
+
+# Where fewer blocks than this share of the measured samples' have an effort in every sample,
+# efforts come less often than positions, and blocks are single samples.
+SPARSE_EFFORTS = 0.5
+
+
+class Measured(Protocol):
+    """What a recording must have; see `Recording`."""
+
+    @property
+    def drives(self) -> tuple[str, ...]: ...
+    @property
+    def time(self) -> Array: ...
+    @property
+    def position(self) -> Array: ...
+    @property
+    def velocity(self) -> Array | None: ...
+    @property
+    def effort(self) -> Array: ...
+    @property
+    def segments(self) -> tuple[slice, ...]: ...
+
+
+@dataclass(frozen=True)
+class DriveMotion:
+    """N samples in one or more segments, without edges; drives (N, D).
+
+    Parameters
+    ----------
+    position, velocity, acceleration : (N, D) arrays
+        Smoothed [m, m/s, m/s^2].
+    index : (N,) int array
+        The samples' places in the recording.
+    segments : tuple of slice
+        Of the N samples.
+    block_starts : (M,) int array
+        First sample of every block.
+    block : int
+        Samples per block, in the longest segment.
+    smoothing : Smoothing
+    from_recorded : (2, D) bool array
+        Drives whose velocity, and those whose acceleration, come from recorded velocities.
+    notes : tuple of str
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    index: np.ndarray
+    segments: tuple[slice, ...]
+    block_starts: np.ndarray
+    block: int
+    smoothing: Smoothing
+    from_recorded: np.ndarray
+    notes: tuple[str, ...]
+
+
+def smooth_drives(recording: Measured, window: float | None = None,
+                  blocks_per_period: float = 0.0, unit: str = 'm') -> DriveMotion:
+    """Return the motion of a recording's drives, with one window for all of them.
+
+    Parameters
+    ----------
+    recording : Recording
+        Or anything with its arrays and segments.
+    window : float, optional
+        Duration of the window [s], instead of the choice from the data.
+    blocks_per_period : float
+        See `block_duration`.
+    unit : str
+        Of positions, for the notes.
+
+    Raises
+    ------
+    MotionError
+        Where no segment is long enough.
+    """
+    segments = [part for part in recording.segments
+                if part.stop - part.start > 2 * SHORTEST_WINDOW]
+    if not segments:
+        raise MotionError(
+            'recording', f'its {len(recording.segments)} segments have at most '
+            f'{max((s.stop - s.start for s in recording.segments), default=0)} samples',
+            f'have more than {2 * SHORTEST_WINDOW} without a gap', 'shape')
+    grids, told = _grids(recording, segments)
+    stretches = representative([_stretch(recording, part, grid)
+                                for part, grid in zip(segments, grids, strict=True)])
+    smoothing = choose_smoothing(stretches, window, unit)
+    recorded = better_recorded(stretches, smoothing)
+    notes = [smoothing.text, *told, *_velocity_notes(recording, recorded)]
+
+    parts: list[tuple[Array, Array, Array]] = []
+    used: list[SamplingGrid] = []
+    block_starts: list[np.ndarray] = []
+    index: list[np.ndarray] = []
+    count = 0
+    duration = block_duration(motion_bandwidth(stretches, smoothing) if blocks_per_period
+                              else 0.0, blocks_per_period)
+    block = _block(recording, segments, grids, duration, notes)
+    for part, grid in zip(segments, grids, strict=True):
+        filter_ = smoothing.polynomial(grid.step)
+        kept, starts = _blocks(grid, filter_.half, block or block_length(grid.step, duration))
+        if len(starts):
+            parts.append(_drive_motion(recording, part, grid, filter_, kept, recorded))
+            block_starts.append(starts + count)
+            count += kept.stop - kept.start
+            index.append(np.arange(part.start + kept.start, part.start + kept.stop))
+            used.append(grid)
+    if not index:
+        raise MotionError(
+            'recording', f'its longest segment has {max(s.stop - s.start for s in segments)} '
+            'samples', f'have more than {filter_.window}, one smoothing window', 'shape')
+    ends = np.cumsum([len(samples) for samples in index]).tolist()
+    spans = tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
+    longest = used[int(np.argmax([len(samples) for samples in index]))]
+    q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return DriveMotion(
+        q, q_dot, q_ddot, np.concatenate(index), spans, np.concatenate(block_starts),
+        block or block_length(longest.step, duration), smoothing, recorded, tuple(notes))
+
+
+def _grids(
+    recording: Measured, segments: Sequence[slice],
+) -> tuple[list[SamplingGrid], list[str]]:
+    grids, sayings = [], []
+    for part in segments:
+        grid, told = find_grid(recording.time[part], recording.position[part])
+        grids.append(grid)
+        if told:
+            sayings.append(f'from {recording.time[part.start]:.6g} s: {told}')
+    most = 5
+    if len(sayings) > most:
+        sayings[most:] = [f'{len(sayings) - most} more segments have such stamps']
+    return grids, sayings
+
+
+def _stretch(recording: Measured, part: slice, grid: SamplingGrid) -> Stretch:
+    velocity = None
+    if recording.velocity is not None:
+        # A drive with a velocity that is missing anywhere is not considered; a spline through
+        # NaN would take the others with it.
+        known = recording.velocity[part]
+        complete = np.isfinite(known).all(axis=0)
+        velocity = grid.at_steps(np.where(complete, known, 0.0))
+        velocity = np.where(complete, velocity, np.nan)
+    return Stretch(grid.at_steps(recording.position[part]), grid.step, velocity)
+
+
+def _velocity_notes(recording: Measured, recorded: np.ndarray) -> list[str]:
+    if recording.velocity is None or np.all(np.isnan(recording.velocity)):
+        return []
+    notes = []
+    for quantity, better in zip(('velocities', 'accelerations'), recorded, strict=True):
+        names = ', '.join(drive for drive, yes in zip(recording.drives, better, strict=True) if yes)
+        if names:
+            notes.append(f'{quantity} of {names} come from recorded velocities: they have less '
+                         'than half the mean squared error of differentiated positions')
+    return notes or ['recorded velocities are not used: they are not clearly better than '
+                     'differentiated positions']
+
+
+def _block(
+    recording: Measured, segments: Sequence[slice], grids: Sequence[SamplingGrid],
+    duration: float, notes: list[str],
+) -> int | None:
+    """Return 1 where efforts are too sparse for blocks, else None."""
+    measured = whole = 0
+    for part, grid in zip(segments, grids, strict=True):
+        known = np.isfinite(recording.effort[part])
+        block = block_length(grid.step, duration)
+        measured += int(known.sum())
+        count = len(known) // block * block
+        whole += block * int(known[:count].reshape(-1, block, known.shape[1]).all(axis=1).sum())
+    if measured and whole < SPARSE_EFFORTS * measured:
+        notes.append('efforts come less often than positions: single samples are compared, '
+                     'without a mean')
+        return 1
+    block = block_length(grids[0].step, duration)
+    notes.append(f'effort and model are both averaged over blocks of {block} samples; a block '
+                 'with a missing effort does not count')
+    return None
+
+
+def _blocks(grid: SamplingGrid, edge: int, block: int) -> tuple[slice, np.ndarray]:
+    """Return the samples of whole blocks, and the first of each block counted from there."""
+    kept = grid.inside(edge)
+    if kept.stop - kept.start < block:
+        return kept, np.array([], dtype=np.int64)
+    # Blocks are of equal time: one in which a sample is lost has one less. A stamp that is
+    # early by rounding still belongs to its own block.
+    number = np.floor((grid.places[kept] - grid.places[kept.start]) / block + 1e-6)
+    starts = np.flatnonzero(np.diff(number, prepend=-1.0))
+    if len(number) - starts[-1] < block:
+        kept, starts = slice(kept.start, kept.start + int(starts[-1])), starts[:-1]
+    return kept, starts
+
+
+def _drive_motion(
+    recording: Measured, part: slice, grid: SamplingGrid, filter_: LocalPolynomial, kept: slice,
+    recorded: np.ndarray,
+) -> tuple[Array, Array, Array]:
+    """Return smoothed position, velocity and acceleration at the kept samples of a segment."""
+    rates = list(filter_.differentiated(grid.at_steps(recording.position[part])))
+    for derivative, better in enumerate(recorded):
+        if np.any(better):
+            assert recording.velocity is not None
+            velocity = grid.at_steps(recording.velocity[part][:, better])
+            rates[derivative + 1][:, better] = filter_.filtered(velocity, derivative)
+    q, q_dot, q_ddot = (grid.at_samples(values, filter_.half, kept) for values in rates)
+    return q, q_dot, q_ddot

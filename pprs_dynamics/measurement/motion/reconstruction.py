@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""From measured drive positions to the motion of what they move, at every sample of a recording.
+
+Per segment: equal steps, smoothed position, velocity and acceleration of the drives, and, for a
+3-PPRS, forward kinematics that follows the branch, and the platform's twist and acceleration
+through the Jacobian. Effort is only cut to the same samples. `Reconstruction.treat` is for both
+sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MotionError
+from pprs_dynamics.measurement.files.samples import Progress
+from pprs_dynamics.measurement.motion.differentiation import Smoothing
+from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, Measured, smooth_drives
+from pprs_dynamics.measurement.motion.followed_motion import CHUNK, Motion, kinematics_of
+from pprs_dynamics.measurement.motion.rests import find_rests
+from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.three_pprs.robot import Geometry
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Consecutive whole blocks of one segment.
+
+    Parameters
+    ----------
+    motion : PlatformMotion or JointMotion
+        With times.
+    samples, blocks : slice
+        Its place in the reconstruction, before and after treatment.
+    is_start : bool
+        True where a segment starts: effects with memory start afresh.
+    treat : Treatment
+        For these samples alone.
+    """
+
+    motion: Motion
+    samples: slice
+    blocks: slice
+    is_start: bool
+    treat: Treatment
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """N samples of motion and effort in one or more segments, and M blocks of them.
+
+    Parameters
+    ----------
+    time : (N,) array
+        [s].
+    position, velocity, acceleration : (N, D) arrays
+        Of the drives, smoothed [m, m/s, m/s^2].
+    motion : PlatformMotion or JointMotion
+        Without times, which need not increase from segment to segment; `chunks` has them.
+    effort : (N, D) array
+        As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
+    index : (N,) int array
+        The samples' places in the recording.
+    segments : tuple of slice
+        Of the N samples.
+    treat : Treatment
+        What effort and model both get: values (N, k) -> (M, k).
+    smoothing : Smoothing
+    block : int
+        Samples per block, in the longest segment.
+    from_recorded : (2, D) bool array
+        Drives whose velocity, and those whose acceleration, come from recorded velocities.
+    near_branch : (N,) bool array
+        See `ForwardKinematics`.
+    jumps : (J,) int array
+        Samples before which the pose jumps.
+    gain : (D,) array
+        By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
+    dropped : int
+        Samples of the recording's segments that are not here: edges and short segments.
+    notes : tuple of str
+        What was done and found, in words.
+    start : float
+        Time of the recording's first sample, which may be dropped here [s].
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    motion: Motion
+    effort: Array
+    index: np.ndarray
+    segments: tuple[slice, ...]
+    treat: Treatment
+    smoothing: Smoothing
+    block: int
+    from_recorded: np.ndarray
+    near_branch: np.ndarray
+    jumps: np.ndarray
+    dropped: int
+    notes: tuple[str, ...]
+    start: float
+    gain: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def recorded_share(self, model: ForceModel) -> Array:
+        """Return by what a model's efforts are multiplied to be those of the recording, (D,).
+
+        1, but for currents that another gain than the model's made efforts of.
+        """
+        if model.gain is None:
+            return np.ones_like(self.gain)
+        return np.where(np.isfinite(self.gain), self.gain / np.asarray(model.gain), 1.0)
+
+    def chunks(self, samples: int = CHUNK) -> Iterator[Chunk]:
+        """Yield whole blocks of at most about `samples` samples, segment by segment."""
+        starts = self.treat.starts
+        for segment in self.segments:
+            first = int(np.searchsorted(starts, segment.start))
+            end = int(np.searchsorted(starts, segment.stop))
+            while first < end:
+                last = int(np.searchsorted(starts, starts[first] + samples, side='right')) - 1
+                last = min(max(last, first + 1), end)
+                stop = int(starts[last]) if last < len(starts) else len(self)
+                rows = slice(int(starts[first]), stop)
+                yield Chunk(self.motion[rows].with_time(self.time[rows]), rows,
+                            slice(first, last), rows.start == segment.start,
+                            self.treat.blocks(first, last))
+                first = last
+
+
+def reconstruct(
+    model: ForceModel | Geometry, recording: Measured, progress: Progress | None = None,
+    window: float | None = None,
+) -> Reconstruction:
+    """Return the motion and effort behind a recording.
+
+    Parameters
+    ----------
+    model : ForceModel or Geometry
+        Whose kinematics to use.
+    recording : Recording
+        Or anything with its arrays and segments.
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+    window : float, optional
+        Duration of the smoothing window [s], instead of the choice from the data.
+
+    Raises
+    ------
+    MotionError
+        Where no segment is long enough, or the drives are not the model's.
+    ConvergenceError
+        Where drive positions do not close the mechanism.
+    """
+    kinematics = kinematics_of(model)
+    if tuple(recording.drives) != kinematics.drives:
+        order = ', in this order' if len(kinematics.drives) > 1 else ''
+        raise MotionError('drives', f'they are {", ".join(recording.drives)}',
+                          f'be {", ".join(kinematics.drives)}{order}', 'shape')
+    if isinstance(model, ForceModel):
+        unit = 'rad' if all(one.turns for one in model.units) else 'm'
+        drives = smooth_drives(recording, window, model.blocks_per_period, unit)
+    else:
+        drives = smooth_drives(recording, window)
+    if isinstance(model, ForceModel) and np.any(model.position_error):
+        drives = replace(drives, position=drives.position - model.position_error)
+    time, total = recording.time[drives.index], len(drives.index)
+    effort = _efforts(model, recording)[drives.index]
+    followed = kinematics.follow(time, drives, progress)
+    dropped = sum(part.stop - part.start for part in recording.segments) - total
+    notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
+             f'{len(drives.segments)} segments, what fills no block, and segments too short',
+             *followed.notes(time)]
+    rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
+    if np.any(rests):
+        shares = (f'{name} {share:.0%}' for name, share in zip(
+            kinematics.drives, rests.mean(axis=0), strict=True) if share >= 0.005)
+        notes.append('efforts of drives that stand do not count, static friction holds any: '
+                     + (', '.join(shares) or 'less than 0.5% of the time'))
+    return Reconstruction(
+        time, drives.position, drives.velocity, drives.acceleration, followed.motion,
+        effort, drives.index, drives.segments,
+        Treatment(drives.block_starts, total), drives.smoothing, drives.block,
+        drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
+        float(recording.time[0]), _applied_gain(recording))
+
+
+def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Reconstruction:
+    """Return the same reconstruction with the drives' zeros elsewhere.
+
+    Smoothing and blocks do not depend on them.
+
+    Parameters
+    ----------
+    found : Reconstruction
+    model : ForceModel
+        Whose kinematics to use.
+    shift : (D,) array
+        By which positions are less now [m].
+
+    Raises
+    ------
+    ConvergenceError
+        Where drive positions do not close the mechanism.
+    """
+    drives = DriveMotion(found.position - shift, found.velocity, found.acceleration, found.index,
+                         found.segments, found.treat.starts, found.block, found.smoothing,
+                         found.from_recorded, ())
+    followed = kinematics_of(model).follow(found.time, drives)
+    return replace(found, position=drives.position, motion=followed.motion,
+                   near_branch=followed.near_branch, jumps=followed.jumps)
+
+
+def _applied_gain(recording: Measured) -> Array:
+    """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
+    gain: Array | None = getattr(recording, 'gain', None)
+    return np.full(len(recording.drives), np.nan) if gain is None else gain
+
+
+def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
+    """Return the efforts of a recording, NaN where a drive stands."""
+    effort = recording.effort
+    if isinstance(model, ForceModel) and model.rest_speed:
+        effort = effort.copy()
+        for part in recording.segments:
+            step = float(np.median(np.diff(recording.time[part])))
+            effort[part][find_rests(recording.position[part], step, model.rest_speed)] = np.nan
+    return effort
+
+
+def treated_forces(
+    model: ForceModel, reconstruction: Reconstruction, progress: Progress | None = None,
+    more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
+) -> dict[str, Array]:
+    """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
+
+    Effects with memory run through each segment and start afresh in the next.
+
+    Parameters
+    ----------
+    model : ForceModel
+    reconstruction : Reconstruction
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+    more : callable, optional
+        Gives further quantities of the same evaluation, from what `drive_forces` of the model
+        returns, to be treated, (N, k) each, by name.
+
+    Raises
+    ------
+    WorkspaceError, SingularityError
+        See `DriveModel.drive_forces`.
+    """
+    treated: dict[str, Array] = {}
+    share = reconstruction.recorded_share(model)
+    state = model.initial_state(reconstruction.start)
+    for chunk in reconstruction.chunks():
+        if chunk.is_start:
+            state = model.initial_state(reconstruction.start)
+        forces = model.measured(model.drive_forces(chunk.motion, state), state)
+        efforts = {name: values * share
+                   for name, values in {**forces.parts, 'total': forces.total}.items()}
+        for name, values in {**efforts, **more(forces)}.items():
+            if name not in treated:
+                treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
+            treated[name][chunk.blocks] = chunk.treat(values)
+        if progress is not None:
+            progress(chunk.samples.stop, len(reconstruction))
+    return treated

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where drives stand: their efforts are whatever static friction leaves, and tell nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from pprs_dynamics.arrays import Array
+
+SHORTEST_REST = 0.5  # [s]; reversals of a motion are over sooner
+
+
+def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[np.bool_]:
+    """Return where each drive stands, (N, D).
+
+    Parameters
+    ----------
+    position : (N, D) array
+        Of one segment [rad, m].
+    step : float
+        Between samples [s].
+    speed : float
+        A drive stands that moves less than this, in the mean over `SHORTEST_REST` [rad/s, m/s].
+    """
+    window = max(2, round(SHORTEST_REST / step))
+    if len(position) < window:
+        return np.zeros(position.shape, dtype=bool)
+    span = (maximum_filter1d(position, window, axis=0, mode='nearest')
+            - minimum_filter1d(position, window, axis=0, mode='nearest'))
+    # Every sample of such a window stands, not its middle alone.
+    rests: np.typing.NDArray[np.bool_] = maximum_filter1d(
+        span < speed * SHORTEST_REST, window, axis=0, mode='nearest')
+    return rests

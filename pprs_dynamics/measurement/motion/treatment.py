@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The one operation that measured effort and modelled forces both get: means of blocks.
+
+Samples of effort are noisy and correlated; means of 0.01 s keep all that moves below some 20 Hz
+and a fifth of the samples. The mean is linear and the same for both sides of a comparison. Were
+only one of them filtered, each reversal of a drive would leave a difference that looks like
+friction.
+
+Arms move ten times as slowly as a parallel robot, and their currents hold the ripple of motor and
+gear: blocks follow the motion there, as the model says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+
+BLOCK_DURATION, LONGEST_BLOCK = 0.01, 0.05  # [s]
+
+
+def block_duration(bandwidth: float, blocks_per_period: float) -> float:
+    """Return how long blocks are [s].
+
+    Parameters
+    ----------
+    bandwidth : float
+        Of the motion [Hz].
+    blocks_per_period : float
+        Of a motion at that frequency; 0 where blocks are of `BLOCK_DURATION` whatever moves.
+    """
+    if not blocks_per_period:
+        return BLOCK_DURATION
+    return min(max(1 / (blocks_per_period * bandwidth), BLOCK_DURATION), LONGEST_BLOCK)
+
+
+def block_length(step: float, duration: float = BLOCK_DURATION) -> int:
+    """Return how many samples, `step` apart [s], make a block of a duration [s]."""
+    return max(1, round(duration / step))
+
+
+class Treatment:
+    """Means over blocks of consecutive samples.
+
+    Parameters
+    ----------
+    starts : (M,) int array
+        First sample of every block; a block ends where the next begins.
+    samples : int
+        N, all of which lie in blocks.
+    """
+
+    def __init__(self, starts: np.ndarray, samples: int) -> None:
+        self.starts, self.samples = starts, samples
+        self._counts = np.diff(np.append(starts, samples))
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def __call__(self, values: Array) -> Array:
+        """Return the block means of values (N, ...), (M, ...).
+
+        A block with a NaN has none: a measurement that is missing is not made up.
+        """
+        values = np.asarray(values, dtype=float)
+        if len(values) != self.samples:
+            raise ValueError(f'{len(values)} samples for a treatment of {self.samples}')
+        sums = np.add.reduceat(values, self.starts, axis=0)
+        means: Array = sums / self._counts.reshape((-1,) + (1,) * (values.ndim - 1))
+        return means
+
+    def blocks(self, first: int, last: int) -> Treatment:
+        """Return the treatment of blocks first..last-1 alone, for their samples alone."""
+        end = self.starts[last] if last < len(self) else self.samples
+        start = self.starts[first]
+        return Treatment(self.starts[first:last] - start, int(end - start))

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Measured efforts against the model while they come in."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
+from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
+
+# Stamps to see before their step is known; more than a late first message or two.
+STAMPS_TO_LEARN = 50
+
+
+class Compared(NamedTuple):
+    """n samples of model against measurement.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps as they came [s].
+    model, residual : (n, D) arrays
+        The model's effort, and measured minus model [N, N m]; the latter NaN where not measured,
+        and where a joint of an arm stands.
+    """
+
+    time: Array
+    model: Array
+    residual: Array
+
+
+class LiveComparison:
+    """Takes joint states one by one, and gives model and residual for those it can judge.
+
+    Answers lag by half the smoothing window: acceleration needs samples from both sides. They
+    are computed many at a time, which costs hardly more than one.
+
+    Parameters
+    ----------
+    model : DriveModel or ArmModel
+    window : float
+        Duration of the smoothing window [s].
+    span : float
+        Duration over which the running error is taken [s].
+    """
+
+    def __init__(self, model: DriveModel | ArmModel, window: float, span: float) -> None:
+        self._window, self._span = window, span
+        self._stamps: list[float] = []
+        self._live: LiveReconstruction | None = None
+        self._waiting: list[LiveSample] = []
+        self._recent: deque[tuple[float, Array]] = deque()
+        self.use_model(model)
+
+    def use_model(self, model: DriveModel | ArmModel) -> None:
+        """Compare with another model from the next sample on; the running error starts afresh."""
+        self._model = model
+        self._state = model.initial_state()
+        self._seed: PlatformMotion | None = None
+        self._recent.clear()
+
+    @property
+    def lag(self) -> float:
+        """By how much answers come late [s]; NaN before the step is known."""
+        if self._live is None:
+            return float('nan')
+        polynomial = self._live.polynomial
+        return polynomial.half * polynomial.step
+
+    @property
+    def gaps(self) -> int:
+        """How often the stream was interrupted."""
+        return 0 if self._live is None else self._live.gaps
+
+    def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
+        """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
+        if self._live is None:
+            self._learn(time)
+        if self._live is not None:
+            sample = self._live.push(time, position, np.asarray(effort) / self._model.amperes)
+            if sample is not None:
+                self._waiting.append(sample)
+
+    def evaluate(self) -> Compared | None:
+        """Return the samples that have become judgeable since the last call, None for none.
+
+        Raises
+        ------
+        PprsError
+            Where the model cannot follow the motion; these samples are given up.
+        """
+        samples, self._waiting = self._waiting, []
+        if not samples:
+            return None
+        starts = [k for k, sample in enumerate(samples) if sample.is_start]
+        model_effort = []
+        try:
+            for first, last in zip([0, *starts], [*starts, len(samples)], strict=True):
+                if first == last:
+                    continue
+                if first in starts:
+                    self._state, self._seed = self._model.initial_state(), None
+                model_effort.append(self._forces(samples[first:last]))
+        except PprsError:
+            self._seed = None
+            raise
+        time = np.array([sample.time for sample in samples])
+        model = np.concatenate(model_effort)
+        residual = np.stack([sample.effort for sample in samples]) - model
+        if self._model.rest_speed:
+            # Where a joint stands, its gear holds any torque within its static friction.
+            moving = np.abs([sample.velocity for sample in samples]) >= self._model.rest_speed
+            residual = np.where(moving, residual, np.nan)
+        for moment, error in zip(time, residual, strict=True):
+            self._recent.append((moment, error))
+        while self._recent and self._recent[0][0] < time[-1] - self._span:
+            self._recent.popleft()
+        return Compared(time, model, residual)
+
+    def running_error(self) -> Array:
+        """Return the root of the mean squared residual of the last span, (D,); NaN: none."""
+        none = np.full(len(self._model.drives), np.nan)
+        if not self._recent:
+            return none
+        squares = np.stack([error for _, error in self._recent]) ** 2
+        known = np.isfinite(squares)
+        total, count = np.where(known, squares, 0.0).sum(axis=0), known.sum(axis=0)
+        rms: Array = np.sqrt(np.divide(total, count, out=none, where=count > 0))
+        return rms
+
+    def _learn(self, time: float) -> None:
+        if self._stamps and not time > self._stamps[-1]:
+            self._stamps.clear()
+        self._stamps.append(time)
+        if len(self._stamps) < STAMPS_TO_LEARN:
+            return
+        step = float(np.median(np.diff(self._stamps)))
+        samples = max(7, 2 * round(self._window / step / 2) + 1)
+        self._live = LiveReconstruction(LocalPolynomial(samples, step))
+
+    def _forces(self, samples: list[LiveSample]) -> Array:
+        model: Any = self._model
+        motion = self._followed(
+            np.stack([sample.position for sample in samples]) - model.position_error,
+            np.stack([sample.velocity for sample in samples]),
+            np.stack([sample.acceleration for sample in samples]))
+        forces = model.drive_forces(
+            motion.with_time([sample.time for sample in samples]), self._state)
+        total: Array = model.measured(forces, self._state).total
+        return total
+
+    def _followed(self, position: Array, velocity: Array, acceleration: Array) -> Any:
+        """Return what the drives move."""
+        if isinstance(self._model, ArmModel):
+            return JointMotion(position, velocity, acceleration)
+        found = solve_forward_motion(
+            self._model.robot.geometry, position, velocity, acceleration, self._seed)
+        self._seed = found.motion[-1:]
+        return found.motion

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""From a model and recordings to residuals: both sides on the same motion, treated alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.reconstruction import (
+    Reconstruction,
+    reconstruct,
+    treated_forces,
+)
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+MOTION = ('position', 'velocity', 'acceleration')
+# Of the names in a table: variables that each drive has for itself, and those that all share.
+OWN, SHARED = 'own ', 'shared '
+# Between recordings [s], so that times of all together increase.
+PAUSE = 1.0
+
+
+def measure_residuals(
+    model: ForceModel, recordings: Sequence[Recording],
+    progress: Callable[[float, float], None] | None = None,
+) -> tuple[Residuals, tuple[str, ...]]:
+    """Return measured and modelled efforts of recordings side by side, and how, in words.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : sequence of Recording
+        One after the other, with a pause between; each segment stays one of its own.
+    progress : callable, optional
+        Called with (done, total) now and then.
+
+    Raises
+    ------
+    MotionError
+        Where a recording is too short.
+    ConvergenceError, WorkspaceError, SingularityError
+        Where the model cannot follow a recording.
+    ResidualsError
+        Where no effort was measured.
+    """
+    tables: list[dict[str, Array]] = []
+    notes: list[str] = []
+    total = 2.0 * sum(len(recording.time) for recording in recordings)
+    done = 0.0
+    for recording in recordings:
+        def report(samples: float, _: float, before: float = done) -> None:
+            if progress is not None:
+                progress(before + samples, total)
+
+        reconstruction = reconstruct(model, recording, report)
+        done += len(recording.time)
+
+        def report_model(samples: float, _: float, before: float = done) -> None:
+            if progress is not None:
+                progress(before + samples, total)
+
+        tables.append(treated_table(model, reconstruction, report_model))
+        done += len(recording.time)
+        notes += reconstruction.notes
+        # Motion at full rate takes several times the room of all that follows.
+        del reconstruction
+    return join_tables(model, tables), tuple(notes)
+
+
+def treated_table(
+    model: ForceModel, reconstruction: Reconstruction,
+    progress: Callable[[int, int], None] | None = None,
+    more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
+) -> dict[str, Array]:
+    """Return all that a comparison needs of one recording, treated, by name.
+
+    Parameters
+    ----------
+    model : ForceModel
+    reconstruction : Reconstruction
+    progress : callable, optional
+    more : callable, optional
+        Gives further quantities to be treated, see `treated_forces`.
+    """
+    def variables(forces: Any) -> dict[str, Array]:
+        found = model.variables(forces.mechanism)
+        return {(OWN if values.ndim > 1 else SHARED) + name: values.reshape(len(values), -1)
+                for name, values in found.items()}
+
+    treat = reconstruction.treat
+    table = treated_forces(model, reconstruction, progress,
+                           lambda forces: {**variables(forces), **more(forces)})
+    table['measured'] = treat(reconstruction.effort)
+    table['time'] = treat(reconstruction.time[:, None])[:, 0]
+    for name in MOTION:
+        table[OWN + name] = treat(getattr(reconstruction, name))
+    edges = [segment.start for segment in reconstruction.segments]
+    table['segment'] = np.searchsorted(edges, treat.starts, side='right').astype(float) - 1
+    return table
+
+
+def join_tables(model: ForceModel, tables: list[dict[str, Array]]) -> Residuals:
+    """Return the residuals of a model on recordings one after the other, from their tables."""
+    start, segments = 0.0, 0.0
+    for table in tables:
+        table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
+        table['segment'] = table['segment'] + segments
+        start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
+    joined = (tables[0] if len(tables) == 1 else
+              {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
+    variables = {name: joined.pop(OWN + name) for name in MOTION}
+    for name in list(joined):
+        if name.startswith(OWN):
+            variables[name.removeprefix(OWN)] = joined.pop(name)
+        elif name.startswith(SHARED):
+            variables[name.removeprefix(SHARED)] = joined.pop(name)[:, 0]
+    time, segment = joined.pop('time'), joined.pop('segment').astype(int)
+    measured, total = joined.pop('measured'), joined.pop('total')
+    steps = np.diff(time)[np.diff(segment) == 0]
+    return Residuals(model.drives, time, segment, measured, total, joined, variables,
+                     float(np.median(steps)), model.units)

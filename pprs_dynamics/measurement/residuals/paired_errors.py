@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Two models on the same recordings, block by block, under noise that is correlated in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+
+BLOCKS = 10
+LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
+
+
+def rms(residuals: Residuals) -> float:
+    """Return the root of the mean squared error, over samples and drives [N]."""
+    return float(np.sqrt(np.nanmean(residuals.error ** 2)))
+
+
+def rms_by_drive(residuals: Residuals) -> dict[str, float]:
+    """Return the root of the mean squared error of every drive that was measured [N]."""
+    return {drive: float(np.sqrt(np.nanmean(residuals.error[:, d] ** 2)))
+            for d, drive in enumerate(residuals.drives)
+            if np.isfinite(residuals.error[:, d]).any()}
+
+
+def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseSpectrum]) -> Array:
+    """Return what a model takes off the whitened squared error of each block, (B,).
+
+    Parameters
+    ----------
+    before, after : Residuals
+        Of two models on the same recordings.
+    noises : mapping of str to NoiseSpectrum
+        By drive.
+    """
+    edges = np.linspace(0, len(before), BLOCKS + 1)
+    bands = FrequencyBands.for_residuals(before)
+    gains = np.zeros(BLOCKS)
+    for d, name in enumerate(before.drives):
+        for sign, residuals in ((1, before), (-1, after)):
+            series = DriveSeries(residuals, d, bands)
+            if name not in noises or series.known.sum() < LEAST_SAMPLES:
+                continue
+            root = np.sqrt(noises[name].power(series.frequency))
+            squares = series.inverse(series.transform(series.error) / root) ** 2 * series.known
+            block = np.searchsorted(edges, series.index, side='right') - 1
+            gains += sign * np.bincount(block, squares, BLOCKS)
+    return gains
+
+
+def certainty(gains: Array) -> float:
+    """Return the mean gain of a block in its standard errors."""
+    error = float(gains.std(ddof=1)) / len(gains) ** 0.5
+    mean = float(gains.mean())
+    return mean / error if error > 0 else float(np.sign(mean)) * np.inf

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a figure of the error needs: means over bins with their uncertainty, and the spectrum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.measurement.residuals.bins import BINS, bin_edges
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Mean error of a drive over bins of a variable.
+
+    Parameters
+    ----------
+    edges : (K + 1,) array
+        Of the bins, in the variable's SI unit.
+    mean, uncertainty : (K,) array
+        Mean error and its standard deviation under the correlated noise [N]; NaN where a bin
+        holds nothing.
+    rms : (K,) array
+        [N].
+    samples : (K,) int array
+    """
+
+    edges: Array
+    mean: Array
+    uncertainty: Array
+    rms: Array
+    samples: np.typing.NDArray[np.int_]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Power spectrum of a drive's error beside that of its noise model.
+
+    Parameters
+    ----------
+    frequency : (F,) array
+        [Hz].
+    power, background : (F,) array
+        One-sided [N^2/Hz]; the background is the noise model's.
+    """
+
+    frequency: Array
+    power: Array
+    background: Array
+
+
+def error_profile(
+    residuals: Residuals, drive: int, variable: str, noise: NoiseSpectrum, bins: int = BINS,
+) -> Profile | None:
+    """Return the mean error over bins of a variable, or None where it is unknown or constant.
+
+    Parameters
+    ----------
+    noise : NoiseSpectrum
+        Of the drive.
+    """
+    error, values = residuals.error[:, drive], residuals.variable(variable, drive)
+    if values is None or np.ptp(values) == 0:
+        return None
+    edges = bin_edges(values, bins)
+    count = len(edges) - 1
+    place = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, count - 1)
+    known = np.isfinite(error)
+    mean, spread, rms = (np.full(count, np.nan) for _ in range(3))
+    samples = np.zeros(count, dtype=int)
+    covariance = noise.covariance(len(error), residuals.period)
+    for k in range(count):
+        held = known & (place == k)
+        samples[k] = held.sum()
+        if samples[k]:
+            mean[k] = error[held].mean()
+            rms[k] = np.sqrt(np.mean(error[held] ** 2))
+            spread[k] = np.sqrt(_variance_of_mean(held, covariance))
+    return Profile(edges, mean, spread, rms, samples)
+
+
+def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Spectrum:
+    """Return the spectrum of the drive's error, averaged over its stretches, Hann window."""
+    from scipy.signal import welch
+
+    series = DriveSeries(residuals, drive, FrequencyBands.for_residuals(residuals))
+    longest = max(part.stop - part.start for part in series.stretches)
+    size = max(min(longest, 4096), min(longest, 16))
+    powers, weights = [], []
+    for part in series.stretches:
+        if part.stop - part.start >= size:
+            frequency, power = welch(series.error[part], 1 / residuals.period, nperseg=size,
+                                     detrend=False)
+            powers.append(power)
+            weights.append(part.stop - part.start)
+    return Spectrum(frequency, np.average(powers, axis=0, weights=weights),
+                    2 * noise.period * noise.power(frequency))
+
+
+def _variance_of_mean(held: np.typing.NDArray[np.bool_], covariance: Array) -> float:
+    """Return the variance of the mean over the marked samples of stationary noise."""
+    n = len(held)
+    power = np.abs(np.fft.rfft(held.astype(float), 2 * n)) ** 2
+    pairs = np.fft.irfft(power, 2 * n)[:n]
+    total = pairs[0] * covariance[0] + 2 * float(pairs[1:] @ covariance[1:])
+    return float(max(total, 0.0) / held.sum() ** 2)
+

@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Measured and modelled efforts side by side, with the variables the error may depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.mechanism.units import DriveUnits, common_effort
+
+# A gap of a few samples is bridged by a straight line; over more, noise is a new stretch.
+LONGEST_BRIDGE = 10
+
+
+class ResidualsError(PprsError, ValueError):
+    """Arrays that do not make a comparison.
+
+    Parameters
+    ----------
+    quantity, found, rule : str
+        What is wrong, what was found, and what is required ("it must ...").
+    """
+
+    def __init__(self, quantity: str, found: str, rule: str) -> None:
+        self.quantity, self.found, self.rule = quantity, found, rule
+        super().__init__(f'{quantity}: {found}, must {rule}')
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """M samples of D drives: effort measured and effort of the model, after one treatment.
+
+    Parameters
+    ----------
+    drives : tuple of str
+        Names, D of them.
+    time : (M,) array
+        [s].
+    segment : (M,) int array
+        Samples of one number follow each other without a gap; noise starts anew in the next.
+    measured : (M, D) array
+        Effort [N]; NaN where it was not measured.
+    model : (M, D) array
+        Effort of the model [N].
+    parts : mapping of str to (M, D) array
+        Shares of `model` [N], e.g. rigid_body.
+    variables : mapping of str to (M,) or (M, D) array
+        What the error may depend on, under the names of the interface, in SI units:
+        per drive position, velocity, acceleration, load, rod_angle and direction (sgn of the
+        velocity; derived from it where absent); common to all platform_x and so on.
+    period : float
+        Time between samples [s].
+    units : tuple of DriveUnits
+        Of the drives; drives that push where they are not given.
+
+    Raises
+    ------
+    ResidualsError
+        For a wrong shape, a non-finite model or variable, or nothing measured.
+    """
+
+    drives: tuple[str, ...]
+    time: Array
+    segment: np.typing.NDArray[np.int_]
+    measured: Array
+    model: Array
+    parts: Mapping[str, Array] = field(default_factory=dict)
+    variables: Mapping[str, Array] = field(default_factory=dict)
+    period: float = 0.01
+    units: tuple[DriveUnits, ...] = ()
+
+    def __post_init__(self) -> None:
+        samples, width = len(self.time), len(self.drives)
+        table = {'measured': self.measured, 'model': self.model,
+                 **{f'parts[{name!r}]': part for name, part in self.parts.items()}}
+        for name, array in table.items():
+            _require(array.shape == (samples, width), name, f'its shape is {array.shape}',
+                     f'be ({samples}, {width}), samples by drives')
+        for name, array in self.variables.items():
+            _require(array.shape in ((samples,), (samples, width)), f'variables[{name!r}]',
+                     f'its shape is {array.shape}', f'be ({samples},) or ({samples}, {width})')
+        _require(self.segment.shape == (samples,), 'segment', f'its shape is {self.segment.shape}',
+                 f'be ({samples},)')
+        for name, array in {**table, **self.variables, 'time': self.time}.items():
+            _require(name == 'measured' or bool(np.isfinite(array).all()), name,
+                     'it holds a number that is not finite', 'be finite')
+        _require(bool(np.isfinite(self.measured).any()), 'measured', 'no effort was measured',
+                 'hold at least one number')
+        _require(self.period > 0, 'period', f'it is {self.period}', 'be greater than 0 s')
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def unit(self) -> str:
+        """Unit of efforts and errors over all drives."""
+        return common_effort(self.units)
+
+    def units_of(self, drive: str) -> DriveUnits:
+        """Return the units of a drive's quantities."""
+        return self.units[self.drives.index(drive)] if self.units else DriveUnits()
+
+    @property
+    def error(self) -> Array:
+        """Measured minus model [N], (M, D); NaN where not measured."""
+        return self.measured - self.model
+
+    def variable(self, name: str, drive: int) -> Array | None:
+        """Return a variable as that drive sees it, (M,), or None where it is unknown."""
+        if name == 'time':
+            return self.time
+        if name == 'direction' and name not in self.variables:
+            velocity = self.variable('velocity', drive)
+            return None if velocity is None else np.sign(velocity)
+        array = self.variables.get(name)
+        return array if array is None or array.ndim == 1 else array[:, drive]
+
+    def stretches(self, drive: int) -> list[slice]:
+        """Return where the drive was measured without a gap longer than a bridge."""
+        return find_stretches(self.measured[:, drive], self.segment)
+
+    def thinned(self, samples: int) -> Residuals:
+        """Return means over blocks of equal length, of at most about `samples` samples.
+
+        Efforts, parts and variables are averaged alike. Samples that do not fill a block at
+        the end of a segment are left out; a block without a measurement stays NaN.
+        """
+        factor = -(-len(self) // samples)
+        if factor <= 1:
+            return self
+        parts = [slice(part.start, part.stop - (part.stop - part.start) % factor)
+                 for part in _runs(self.segment)]
+
+        def mean(array: Array) -> Array:
+            return np.concatenate([
+                array[part].reshape(-1, factor, *array.shape[1:]).mean(axis=1)
+                for part in parts])
+
+        known = np.isfinite(self.measured)
+        share = mean(known.astype(float))
+        total = mean(np.where(known, self.measured, 0.0))
+        # A mean over half a block is compared with the model's over the whole one; with fewer
+        # measurements the two would not be of the same time.
+        measured = np.where(share > 0.5, total / np.maximum(share, 0.5), np.nan)
+        segment = np.concatenate([self.segment[part][::factor] for part in parts])
+        return Residuals(
+            self.drives, mean(self.time), segment, measured, mean(self.model),
+            {name: mean(part) for name, part in self.parts.items()},
+            {name: mean(array) for name, array in self.variables.items()}, self.period * factor,
+            self.units)
+
+
+def find_stretches(
+    values: Array, segment: np.typing.NDArray[np.int_], longest_bridge: int = LONGEST_BRIDGE,
+) -> list[slice]:
+    """Return stretches of one segment that start and end known, with only short gaps inside."""
+    stretches = []
+    for part in _runs(segment):
+        known = part.start + np.flatnonzero(np.isfinite(values[part]))
+        if len(known):
+            cuts = np.flatnonzero(np.diff(known) > longest_bridge + 1)
+            begins = np.concatenate(([known[0]], known[cuts + 1]))
+            ends = np.concatenate((known[cuts], [known[-1]])) + 1
+            stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
+    return stretches
+
+
+def bridged(values: Array, known: np.typing.NDArray[np.bool_]) -> Array:
+    """Return (..., n) values in which straight lines replace what is not known.
+
+    Applied to an error and to the columns that are to explain it alike, so that a bridge makes
+    no error of its own.
+    """
+    if known.all():
+        return values
+    at, missing = np.flatnonzero(known), np.flatnonzero(~known)
+    right = np.searchsorted(at, missing)
+    before, after = at[right - 1], at[right]
+    share = (missing - before) / (after - before)
+    result = values.copy()
+    result[..., missing] = values[..., before] * (1 - share) + values[..., after] * share
+    return result
+
+
+def _runs(segment: np.typing.NDArray[np.int_]) -> list[slice]:
+    cuts = np.flatnonzero(np.diff(segment)) + 1
+    edges = [0, *cuts.tolist(), len(segment)]
+    return [slice(a, b) for a, b in pairwise(edges) if b > a]
+
+
+def _require(condition: bool, quantity: str, found: str, rule: str) -> None:
+    if not condition:
+        raise ResidualsError(quantity, found, rule)

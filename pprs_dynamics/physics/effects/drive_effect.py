@@ -1,0 +1,214 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects that act in single drives, each with its own parameters."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
+from pprs_dynamics.physics.three_pprs.robot import AXIS
+from pprs_dynamics.physics.three_pprs.state import DriveStates
+
+
+@dataclass(frozen=True)
+class DriveSamples:
+    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn."""
+
+    time: Array | None
+    position: Array
+    velocity: Array
+    acceleration: Array
+    direction: Array
+    guide_load: Array
+    memory: Any = None
+
+    @classmethod
+    def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
+        """Return the samples of one drive of a state."""
+        return cls(state.time, state.position[:, drive], state.velocity[:, drive],
+                   state.acceleration[:, drive], state.direction[:, drive],
+                   state.guide_load[:, drive], memory)
+
+
+@dataclass(frozen=True)
+class DriveRange:
+    """Range that a recording covers, from which grids of shape parameters are made.
+
+    Parameters
+    ----------
+    duration, step : float
+        Of the recording, and between samples [s].
+    stroke : float
+        Between the lowest and the highest position [m].
+    top_speed : float
+        [m/s]
+    gear_ratio : float
+        Turns of the motor per turn of the drive; 1 where no gear is known.
+    """
+
+    duration: float
+    step: float
+    stroke: float
+    top_speed: float
+    gear_ratio: float = 1.0
+
+
+class DriveEffect(CatalogueEffect):
+    """An effect that acts in drives, each with its own parameters.
+
+    Its force is linear in the coefficients: the sum of coefficient times column. What is not
+    linear (`shape`) enters the columns.
+    """
+
+    acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
+
+    def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
+        self.drives = {drive: dict(values) for drive, values in drives.items()}
+
+    @classmethod
+    @abstractmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return one (N,) column per coefficient, for one drive.
+
+        An effect with memory finds it in `drive.memory` and advances it to the last sample.
+        """
+
+    @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return how real forms depart from this one: per deviation, a change of each column.
+
+        They take part in every fit of the effect, in proportion to its force, with coefficients
+        of unit prior, so that they can neither make an effect nor hide another.
+        """
+        return ()
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return the shape parameters to try first; they are refined between them."""
+        return ({},)
+
+    @classmethod
+    def alternatives(cls, shape: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
+        """Return other shapes that are easily taken for this one, to be tried as well."""
+        return ()
+
+    @classmethod
+    def averaged(cls, drive: DriveSamples, period: float,
+                 shapes: Sequence[Mapping[str, float]]) -> Array | None:
+        """Return columns of `scanned` for many shapes from means over `period`, (S, k, N).
+
+        None where columns of means do not give means of columns: then every sample is used.
+        """
+        return None
+
+    @classmethod
+    def drive_memory(cls) -> Any:
+        """Return a fresh memory of one drive, or None for an effect without one."""
+        return None
+
+    @classmethod
+    def begin(cls, memory: Any, time: float) -> None:
+        """Tell a fresh memory of one drive when the recording began [s]; by default nothing.
+
+        The first samples that are evaluated may be later, since derivatives need a window.
+        """
+
+    def initial_memory(self, start: float | None = None) -> Any:
+        """Return a fresh memory per drive, or None for an effect without one."""
+        if self.drive_memory() is None:
+            return None
+        memory = {drive: self.drive_memory() for drive in self.drives}
+        if start is not None:
+            for of_drive in memory.values():
+                self.begin(of_drive, start)
+        return memory
+
+    def check_memory(self, memories: Mapping[str, Any]) -> None:
+        """Raise ModelError where memories, by effect, are not those of these drives."""
+        super().check_memory(memories)
+        memory = memories[self.name]
+        if memory is not None and set(memory) != set(self.drives):
+            raise ModelError('state', sorted(memory), f'come from a model with this very '
+                             f'{self.name}')
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N], (N, D)."""
+        force = np.zeros_like(state.velocity)
+        for name, values in self.drives.items():
+            index = state.drives.index(name)
+            samples = DriveSamples.of(state, index, None if memory is None else memory[name])
+            columns = self.columns(samples, **{p.name: values[p.name] for p in self.shape})
+            coefficients = self.to_coefficients(values)
+            for coefficient, column in zip(self.coefficients, columns, strict=True):
+                force[:, index] += coefficients[coefficient.name] * column
+        return force
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from `{drive: {parameter: value}}`."""
+        prefix = f'effects.{cls.name}'
+        if not isinstance(values, Mapping) or not values:
+            raise ModelError(prefix, values, 'map drives to parameters, e.g. lift_1: '
+                             f'{{{names(cls.parameters)}}}')
+        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
+                    for drive, block in values.items()})
+
+    def to_file(self) -> dict[str, Any]:
+        """Return `{drive: {parameter: value}}`."""
+        return {drive: dict(values) for drive, values in self.drives.items()}
+
+
+class MeasurementEffect(DriveEffect):
+    """Systematic error of a drive's sensors. It never enters a command."""
+
+    is_measurement = True
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return no force: the drive does not feel its sensors."""
+        return tuple(np.zeros_like(drive.velocity) for _ in cls.coefficients)
+
+    @classmethod
+    def sensor_columns(cls, effort: Array, time: Array | None, /, **shape: float,
+                       ) -> tuple[Array, ...]:
+        """Return what the sensor adds to an effort per coefficient, (N,) each.
+
+        An effect without coefficients gives one column: what its shape says.
+
+        Parameters
+        ----------
+        effort : (N,) array
+            Of one drive, as the sensor would see it without the effect [N].
+        time : (N,) array or None
+            [s]
+        """
+        columns = []
+        for unit in cls.coefficients or (None,):
+            given = {c.name: float(c is unit) for c in cls.coefficients}
+            effect = cls({AXIS: {**cls.from_coefficients(given), **shape}})
+            columns.append(effect.sensed(effort[:, None], time, (AXIS,))[:, 0] - effort)
+        return tuple(columns)
+
+    @classmethod
+    def shifts_positions(cls) -> bool:
+        """Return whether measured positions are not the true ones: all drives feel that."""
+        unit = cls({AXIS: {p.name: p.scale for p in cls.parameters}})
+        return bool(np.any(unit.position_error((AXIS,))))
+
+    def position_error(self, drives: Sequence[str]) -> Array:
+        """Return the errors of measured positions [m], to be subtracted, (D,)."""
+        return np.zeros(len(drives))
+
+    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
+               memory: Any = None) -> Array:
+        """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
+        return effort

@@ -1,0 +1,274 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Base of all effects: a share of the drive forces, with parameters declared once."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.physics.three_pprs.state import MechanismState
+
+# Kinds of models.
+PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect; files, ROS descriptors, tables and labels all read this.
+
+    Parameters
+    ----------
+    name, symbol, unit, description : str
+    lower, upper : float
+        Bounds, both allowed.
+    default : float, optional
+        Value where a model file is silent; required in the file without one.
+    scale : float
+        A size at which it matters, for numerical derivatives.
+    is_angle : bool
+        True for a phase: its size says nothing about how strong the effect is.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    description: str
+    lower: float
+    upper: float
+    default: float | None = None
+    scale: float = 1.0
+    is_angle: bool = False
+
+    @property
+    def is_relative(self) -> bool:
+        """True where it is positive by nature, so that it is moved by factors."""
+        return self.lower > 0
+
+    def moved(self, value: float, amount: float) -> float:
+        """Return the value after an amount of movement: a logarithm, or a multiple of `scale`."""
+        return value * math.exp(amount) if self.is_relative else value + self.scale * amount
+
+    def amount(self, spread: float, value: float) -> float:
+        """Return a small difference from a value [unit] as an amount of movement."""
+        return spread / (abs(value) if self.is_relative else self.scale)
+
+    def spread(self, amount: float, value: float) -> float:
+        """Return an amount of movement as a difference from a value [unit]."""
+        return amount * (abs(value) if self.is_relative else self.scale)
+
+    def check(self, key: str, value: Any) -> float:
+        """Return `value` as a float within the bounds, or raise ModelError naming `key`."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ModelError(key, value, f'be a number ({self.description} [{self.unit}])')
+        # Bounds are finite, so that what lies within is, too.
+        if not self.lower <= value <= self.upper:
+            raise ModelError(key, value, f'be between {self.lower:g} and {self.upper:g} '
+                             f'({self.description} [{self.unit}])')
+        return float(value)
+
+
+class Effect(ABC):
+    """A share of the drive forces. Positive is what the drive must apply more.
+
+    Class attributes
+    ----------------
+    name : str
+        Name in files, topics and reports.
+
+    Attributes
+    ----------
+    is_measurement : bool
+        True where it describes what the sensor says, not what the drive must do: it enters
+        comparisons and the monitor, never a command.
+    """
+
+    name: ClassVar[str]
+    is_measurement: bool = False
+
+    @abstractmethod
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N], (N, 6).
+
+        Parameters
+        ----------
+        state : MechanismState
+        memory : object, optional
+            What `initial_memory` returned, advanced in place to the last sample.
+        """
+
+    def initial_memory(self, start: float | None = None) -> Any:
+        """Return a fresh memory, or None for an effect without one.
+
+        Parameters
+        ----------
+        start : float, optional
+            When the recording began [s]; else the first sample counts as the start.
+        """
+        return None
+
+    def check_memory(self, memories: Mapping[str, Any]) -> None:
+        """Raise ModelError where memories, by effect, were not made for this one."""
+        if self.name not in memories:
+            raise ModelError('state', sorted(memories),
+                             f'come from a model with this very {self.name}')
+
+
+@dataclass(frozen=True)
+class Card:
+    """Description of an effect for users.
+
+    Parameters
+    ----------
+    equation : str
+    looks_like : str
+        How it shows in the residual.
+    causes : str
+        What usually causes it.
+    confirm : str
+        How to confirm it on the machine.
+    reference : str
+    """
+
+    equation: str
+    looks_like: str
+    causes: str
+    confirm: str
+    reference: str
+
+
+class CatalogueEffect(Effect):
+    """An effect that a model file may add under `effects`, with values for its parameters.
+
+    What is fitted is linear in `coefficients`, which are the linear parameters unless a subclass
+    says how the one follows from the other, and not linear in `shape`.
+
+    Class attributes
+    ----------------
+    card, arm_card : Card
+        The latter where an arm needs other words.
+    acts_in : set of {'platform', 'axis', 'arm'}
+        The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
+    linear, shape : tuple of Parameter
+    parameters : tuple of Parameter
+        Both.
+    coefficients : tuple of Parameter
+    variants : tuple of tuple of str
+        Sets of coefficients that are tried, the others being zero; by default all at once.
+    scanned : tuple of str
+        Coefficients with which shapes are searched; by default all.
+    unphysical_below : mapping of str to float
+        Parameters that make the force unphysical below that value (negative friction).
+    may_be_measurement : bool
+        True where a model file may declare it a sensor's, in `effects.measured`.
+    is_friction : bool
+        True for friction: of a drive that stands it tells nothing, any constant force looks like
+        it, and it may not give power back.
+    bends_columns : bool
+        True where the effect changes how others show, or holds in its linear form nearby only: a
+        delay, a shifted zero, gravity that turns. Sets of effects with and without it are then
+        compared around models of their own.
+    idealised : bool
+        False where the form is exact: inertia, gravity, geometry, a factor. Real friction,
+        springs and cords are only nearly of the form that they have here.
+    shows_at_reversals : bool
+        True where the effect shows most where friction turns over, so that friction which does so
+        otherwise than modelled looks like it.
+    """
+
+    card: ClassVar[Card]
+    arm_card: ClassVar[Card | None] = None
+    acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
+    linear: ClassVar[tuple[Parameter, ...]]
+    shape: ClassVar[tuple[Parameter, ...]] = ()
+    parameters: ClassVar[tuple[Parameter, ...]]
+    coefficients: ClassVar[tuple[Parameter, ...]]
+    variants: ClassVar[tuple[tuple[str, ...], ...]]
+    scanned: ClassVar[tuple[str, ...]]
+    unphysical_below: ClassVar[Mapping[str, float]] = {}
+    may_be_measurement: ClassVar[bool] = False
+    is_friction: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = False
+    idealised: ClassVar[bool] = True
+    shows_at_reversals: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        if hasattr(cls, 'linear'):
+            cls.parameters = cls.linear + cls.shape
+            if 'coefficients' not in vars(cls):
+                cls.coefficients = cls.linear
+            if 'variants' not in vars(cls):
+                cls.variants = (tuple(c.name for c in cls.coefficients),)
+            if 'scanned' not in vars(cls):
+                cls.scanned = tuple(c.name for c in cls.coefficients)
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    @classmethod
+    @abstractmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from its block in a model file, or raise ModelError.
+
+        With `complete` false, values may be missing and the result only says that those given
+        are right: a node gets an effect's parameters one by one before it becomes active.
+        """
+
+    @abstractmethod
+    def to_file(self) -> dict[str, Any]:
+        """Return the block from which `from_file` makes this effect."""
+
+    @classmethod
+    def card_in(cls, kind: str) -> Card:
+        """Return the description for a kind of model."""
+        return cls.arm_card if kind == ARM and cls.arm_card is not None else cls.card
+
+    @classmethod
+    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the coefficients that belong to parameters."""
+        return {c.name: values[c.name] if c.default is None else values.get(c.name, c.default)
+                for c in cls.coefficients}
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """Return the linear parameters that belong to coefficients."""
+        return dict(coefficients)
+
+    @classmethod
+    def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:
+        """Return what is claimed with these coefficients; each is priced as a name."""
+        return frozenset({names})
+
+    @classmethod
+    def _checked(cls, prefix: str, values: Any, complete: bool) -> dict[str, float]:
+        if not isinstance(values, Mapping):
+            raise ModelError(prefix, values, f'map {names(cls.parameters)} to numbers')
+        known = {parameter.name: parameter for parameter in cls.parameters}
+        for name in values:
+            if name not in known:
+                raise UnknownNameError('key', f'{prefix}.{name}',
+                                       [f'{prefix}.{parameter}' for parameter in known])
+        checked = {}
+        for name, parameter in known.items():
+            if name not in values and parameter.default is None:
+                if not complete:
+                    continue
+                raise ModelError(f'{prefix}.{name}', MISSING,
+                                 f'be given ({parameter.description} [{parameter.unit}])')
+            value = values.get(name, parameter.default)
+            checked[name] = parameter.check(f'{prefix}.{name}', value)
+        return checked
+
+
+def names(parameters: tuple[Parameter, ...]) -> str:
+    """Return the names of parameters, for a sentence."""
+    return ', '.join(parameter.name for parameter in parameters)

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Friction and constant force of drives that carry no load in guides: an axis, an arm's joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.three_pprs.state import DriveStates
+
+
+@dataclass(frozen=True)
+class AxisFriction(Effect):
+    """Viscous friction and dry friction that no load changes: F_v q_dot + F_c sgn(q_dot).
+
+    Parameters
+    ----------
+    viscous : float or (D,) tuple
+        F_v, of all drives or of each [N s/m, N m s/rad].
+    coulomb : float or (D,) tuple
+        F_c [N, N m].
+    """
+
+    name: ClassVar[str] = 'active_friction'
+    viscous: float | tuple[float, ...]
+    coulomb: float | tuple[float, ...]
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the drives' forces, (N, D) [N, N m]."""
+        force: Array = (np.asarray(self.viscous) * state.velocity
+                        + np.asarray(self.coulomb) * state.direction)
+        return force
+
+    def dry(self, guide_load: Array) -> Array:
+        """Return the dry friction in full motion [N], in the shape of the guide's load."""
+        return np.full_like(guide_load, np.asarray(self.coulomb))
+
+
+@dataclass(frozen=True)
+class AxisOffset(Effect):
+    """A constant force: preload, cable chain, or what the amplifier adds.
+
+    Parameters
+    ----------
+    value : float or (D,) tuple
+        [N, N m]
+    """
+
+    name: ClassVar[str] = 'offset'
+    value: float | tuple[float, ...]
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the drives' forces, (N, D) [N, N m]."""
+        return np.full_like(state.velocity, np.asarray(self.value))

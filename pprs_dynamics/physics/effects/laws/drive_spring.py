@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A spring between a drive and the base: k (q - q_0).
+
+It is linear in the stiffness k and the force at q = 0, -k q_0, so that is what is fitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+
+FARTHEST = 1000.0  # [m], of the relaxed position: from there a spring is a constant force
+
+
+class DriveSpring(DriveEffect):
+    """Force in proportion to position: cable chain, counterbalance, bellows."""
+
+    name: ClassVar[str] = 'drive_spring'
+    linear = (
+        Parameter('stiffness', 'k', 'N/m', 'force per position', -1e6, 1e6, scale=10.0),
+        Parameter('position', 'q_0', 'm', 'position at which it is relaxed', -FARTHEST, FARTHEST,
+                  scale=0.05))
+    coefficients = (
+        linear[0],
+        Parameter('force', '-k q_0', 'N', 'force at position 0', -1e9, 1e9, scale=0.5))
+    card = Card(
+        'k (q - q_0)',
+        'a straight line over position, the same on the way there and back, at any speed',
+        'a cable chain or hose that bends, a spring or gas counterbalance, a bellows; a negative '
+        'k is a cable that hangs more the farther the drive goes',
+        'stop the drive at some positions and read the effort (from both sides, for the '
+        'friction); uncouple the cable chain or counterbalance and repeat',
+        'Jubien and Gautier, Global identification of spring balancer, dynamic parameters and '
+        'drive gains of heavy industrial robots, IROS, 2013')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (q, 1)."""
+        return (drive.position, np.ones_like(drive.position))
+
+    @classmethod
+    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the stiffness and -k q_0."""
+        return {'stiffness': values['stiffness'],
+                'force': -values['stiffness'] * values['position']}
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """Return k and q_0 = -force / k.
+
+        A force with next to no stiffness becomes the softest spring that reaches it from
+        the farthest position allowed.
+        """
+        k, force = coefficients['stiffness'], coefficients['force']
+        k = math.copysign(max(abs(k), abs(force) / FARTHEST), k)
+        position = 0.0 - force / k if k else 0.0
+        return {'stiffness': k, 'position': max(-FARTHEST, min(FARTHEST, position))}

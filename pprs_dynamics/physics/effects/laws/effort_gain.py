@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A measured effort that is scaled: (1 + g) F.
+
+References
+----------
+M. Gautier, S. Briot, Global identification of joint drive gains and dynamic parameters of
+robots, J. Dynamic Systems, Measurement, and Control 136 (2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+
+
+class EffortGain(MeasurementEffect):
+    """A drive constant (force per current) that is not what the amplifier thinks."""
+
+    name: ClassVar[str] = 'effort_gain'
+    idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
+    linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -0.9, 9.0,
+                        scale=0.05),)
+    card = Card(
+        'measured effort = (1 + g) F',
+        'an error that looks like the effort itself: the same share of weight, inertia and '
+        'friction alike',
+        'a force constant from a data sheet, a weakened magnet, the pitch or efficiency of a '
+        'screw entered wrongly',
+        'hang a known mass on the drive, or load it against a load cell, and compare',
+        'Gautier and Briot, Global identification of joint drive gains and dynamic parameters '
+        'of robots, 2014')
+
+    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
+               memory: Any = None) -> Array:
+        """Return (1 + g) F."""
+        scaled = effort.copy()
+        for name, values in self.drives.items():
+            scaled[:, drives.index(name)] *= 1 + values['gain']
+        return scaled

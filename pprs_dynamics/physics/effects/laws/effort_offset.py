@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A constant force on a drive, whatever it does: F_0."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+
+
+class EffortOffset(DriveEffect):
+    """Constant force: a counterbalance, a hanging cable, a biased amplifier."""
+
+    name: ClassVar[str] = 'effort_offset'
+    may_be_measurement: ClassVar[bool] = True
+    linear = (Parameter('force', 'F_0', 'N', 'constant force', -1e6, 1e6, scale=0.5),)
+    card = Card(
+        'F_0',
+        'the same error at every position, speed and direction, at rest as well',
+        'zero of the force or current sensor, bias of the amplifier, a counterbalance or a '
+        'hanging cable, a slide that is not level (then all drives show it: base_tilt)',
+        'read the effort with the drive uncoupled or the amplifier disabled: what is left is the '
+        "sensor's; else hang the cable or counterbalance off and repeat",
+        'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
+        'on the offset of motor currents')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (1,)."""
+        return (np.ones_like(drive.velocity),)

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A drive whose zero is off: its encoder says q + z where the drive stands at q.
+
+References
+----------
+J.-P. Merlet, Parallel Robots, 2nd ed., 2006, chapter on calibration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+
+
+class HomingError(MeasurementEffect):
+    """The whole mechanism stands elsewhere than its encoders say."""
+
+    name: ClassVar[str] = 'homing_error'
+    # No force of an axis depends on its zero.
+    acts_in = frozenset({PLATFORM, ARM})
+    idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
+    linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
+                        scale=0.001),)
+    card = Card(
+        'measured position = q + z',
+        'a slowly changing error on several drives at once, largest where the rods lean most: '
+        'weight and inertia are shared out among the drives by the wrong pose',
+        'a homing switch that moved, a lost encoder count, an index pulse one turn away, a '
+        'drive mounted a little aside',
+        'home the drive again and repeat; check the zero with a gauge block',
+        'Merlet, Parallel Robots, 2006')
+    arm_card = Card(
+        'measured position = q + z',
+        'an error of this joint and of those before it, that depends on the pose: the weight '
+        'pulls in another direction than the model thinks',
+        'an encoder that lost counts, a joint put together one tooth aside, zeros of another arm',
+        'move to the zero marks of the arm; measure an angle with a level',
+        'Merlet, Parallel Robots, 2006')
+
+    def position_error(self, drives: Sequence[str]) -> Array:
+        """Return z of each drive [m], (D,)."""
+        return np.array([self.drives.get(name, {}).get('zero', 0.0) for name in drives])

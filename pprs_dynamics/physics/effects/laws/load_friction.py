@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A friction coefficient of the guide that is not the model's: dmu N sgn(q_dot)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.open_exponent import other_exponent
+
+# Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
+# power 2/3 of the load (Johnson, Contact Mechanics, 1985), that of rolling with up to 4/3.
+
+
+class LoadFriction(DriveEffect):
+    """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
+
+    name: ClassVar[str] = 'load_friction'
+    # The load of an axis's guide is constant, so that this is coulomb_friction there.
+    acts_in = frozenset({PLATFORM, ARM})
+    is_friction: ClassVar[bool] = True
+    linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
+                        -100.0, 100.0, scale=0.02),)
+    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
+    card = Card(
+        'dmu N sgn(q_dot), N the load of the guide',
+        'a step at each reversal, like coulomb_friction, but higher where the guide carries more: '
+        'with payload, at full reach, while the platform accelerates',
+        'a friction coefficient from a catalogue, dry, worn or dirty guides; plain guides where '
+        'rolling ones were assumed',
+        'run the drive slowly to and fro without payload, then with it: the step at reversal must '
+        'grow with the load (if it does not: coulomb_friction); clean and lubricate, and repeat',
+        'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
+        'depending on load and velocity, IROS, 2010')
+    arm_card = Card(
+        'dmu |tau| sgn(q_dot), tau the torque of the joint without friction',
+        'a step at each reversal that is higher where the joint carries more weight or accelerates '
+        'more',
+        'every gear has it: teeth and bearings of a harmonic or planetary gear rub in proportion '
+        'to what they transmit; more than before means wear or lack of grease',
+        'move one joint slowly to and fro, with the arm hanging down and stretched out: the step '
+        'at reversal must grow with the weight',
+        'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
+        'depending on load and velocity, IROS, 2010')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (N sgn q_dot,)."""
+        return (drive.guide_load * drive.direction,)
+
+    @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return what another exponent of the load adds: 2/3 in Hertzian contacts."""
+        return (tuple(other_exponent(drive.guide_load, one) for one in cls.columns(drive)),)

@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A payload heavier or lighter than the model's, in the same place.
+
+References
+----------
+J. Swevers, W. Verdonck, J. De Schutter, Dynamic model identification for industrial robots,
+IEEE Control Systems Magazine 27 (2007), on payload identification.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pprs_dynamics.physics.effects.altered_masses import with_payload
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.arm import Arm
+from pprs_dynamics.physics.three_pprs.robot import Robot
+
+
+class PayloadMass(BodyEffect):
+    """Mass more as a point: at the platform's centre of mass, at the origin of an arm's tool."""
+
+    name: ClassVar[str] = 'payload_mass'
+    acts_in = frozenset({PLATFORM, ARM})
+    idealised: ClassVar[bool] = False
+    linear = (Parameter('mass', 'm_+', 'kg', 'mass beyond masses.payload', -1e3, 1e3,
+                        scale=0.1),)
+    card = Card(
+        'M + m -> M + m + m_+, at the centre of mass',
+        'an offset of all three lifts with the sign of the mass, about a third of its weight '
+        'each, and with it errors on all six drives that follow the acceleration of the platform',
+        'another tool or workpiece than the model was told, a hose or cable that hangs on the '
+        'platform, a gripper that was not counted',
+        'weigh the payload; repeat without it, or with a known weight more: the offset must '
+        'change by just that weight. Only accelerations tell it from a constant downward force, '
+        'so move fast',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+    arm_card = Card(
+        'tau -> tau + what moves a mass m_+ at the origin of the tool',
+        'an error of the joints that carry the arm, as large as its weight times its distance from '
+        'each axis, and with it one that follows the accelerations of the tool',
+        'a tool or workpiece that the model was not told of, or one that was taken off; a hose or '
+        'cable that hangs on the wrist',
+        'weigh what hangs on the flange; repeat without it, or with a known weight more. A gain of '
+        'the drives that is wrong by 5 % makes this mass wrong by 5 %',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+
+    def changed(self, robot: Robot | Arm) -> Robot | Arm:
+        """Return the robot with the other payload."""
+        return with_payload(robot, self.values['mass'])

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The centre of mass of platform and payload lies elsewhere than the model says.
+
+References
+----------
+J. Swevers, W. Verdonck, J. De Schutter, Dynamic model identification for industrial robots,
+IEEE Control Systems Magazine 27 (2007), on payload identification.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pprs_dynamics.physics.effects.altered_masses import with_masses
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.three_pprs.robot import Robot
+
+
+class PayloadOffset(BodyEffect):
+    """The centre moved in `platform`, with the inertia about it as it was.
+
+    The forces are quadratic in the offset, by its square in the moment of inertia about o.
+    """
+
+    name: ClassVar[str] = 'payload_offset'
+    idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
+    linear = tuple(
+        Parameter(axis, f'd_{axis}', 'm', f'offset of the centre of mass along {axis} of platform',
+                  -1.0, 1.0, scale=0.003)
+        for axis in 'xyz')
+    variants = (('x', 'y'), ('x', 'y', 'z'))
+    card = Card(
+        'centre of mass -> centre of mass + (d_x, d_y, d_z), in platform',
+        'offsets of the lifts that sum to nothing: one carries more and the others less. A '
+        'height d_z shows only when the platform tilts or accelerates sideways',
+        'a payload clamped off the middle, a tool that reaches out to one side, a mass that was '
+        'measured right and placed wrong',
+        'turn the payload by 180 degrees about the vertical and repeat: the offsets must change '
+        'their sign',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+
+    def changed(self, robot: Robot) -> Robot:
+        """Return the robot with the other centre of mass."""
+        x, y, z = robot.masses.centre
+        d_x, d_y, d_z = (self.values[axis] for axis in 'xyz')
+        return with_masses(robot, centre=(x + d_x, y + d_y, z + d_z))

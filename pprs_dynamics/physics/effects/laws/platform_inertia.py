@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""More moments of inertia of platform and payload than the model says.
+
+References
+----------
+J. Swevers, W. Verdonck, J. De Schutter, Dynamic model identification for industrial robots,
+IEEE Control Systems Magazine 27 (2007), on payload identification.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pprs_dynamics.physics.effects.altered_masses import with_masses
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.three_pprs.robot import Robot
+
+MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
+
+
+class PlatformInertia(BodyEffect):
+    """Inertia more about the centre of mass, without mass."""
+
+    name: ClassVar[str] = 'platform_inertia'
+    idealised: ClassVar[bool] = False
+    linear = (
+        *(Parameter(axes, f'I_{axes}', 'kg m^2', f'moment of inertia beyond {axes} of the model',
+                    -1e3, 1e3, scale=0.005) for axes in MOMENTS),
+        *(Parameter(axes, f'I_{axes}', 'kg m^2', f'tensor element beyond {axes} of the model',
+                    -1e3, 1e3, 0.0, scale=0.005) for axes in PRODUCTS))
+    variants = (MOMENTS, MOMENTS + PRODUCTS)
+    card = Card(
+        '[I] -> [I] + [I_xx I_xy I_xz; I_xy I_yy I_yz; I_xz I_yz I_zz], in platform',
+        'errors that follow the angular acceleration of the platform, and nothing at rest, at '
+        'steady speed or while it keeps its orientation',
+        'a wide or long payload taken as a point, an inertia from a drawing that left out the '
+        'gripper, axes of the tensor mixed up',
+        'turn the platform back and forth about one axis, with its position kept: the error must '
+        'grow with the square of the frequency',
+        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
+
+    def changed(self, robot: Robot) -> Robot:
+        """Return the robot with the other inertia."""
+        inertia = tuple(moment + self.values[p.name] for moment, p in zip(
+            robot.masses.inertia, self.parameters, strict=True))
+        return with_masses(robot, inertia=inertia)

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effort that is measured late, or early: F(t - d).
+
+References
+----------
+G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998,
+on delays of sampling and filtering.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+
+LONGEST, STEP = 0.03, 0.002  # [s], tried; filters and buses of drives delay by less
+# Where the effort changes fast a delay of twice the true one fits worse than none.
+SHORT = (STEP / 8, STEP / 4, STEP / 2)
+
+
+class TimeDelay(MeasurementEffect):
+    """The recorder's effort is not of the recorder's positions' time."""
+
+    name: ClassVar[str] = 'time_delay'
+    bends_columns: ClassVar[bool] = True
+    idealised: ClassVar[bool] = False
+    shows_at_reversals: ClassVar[bool] = True
+    linear = ()
+    shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
+                       scale=0.001),)
+    card = Card(
+        'measured effort(t) = F(t - d)',
+        'an error in proportion to how fast the effort changes: largest where the drive '
+        'reverses or accelerates, with both signs, none while the effort is steady',
+        'a filter on the effort or current signal, a bus cycle between position and effort, '
+        'stamps taken on receipt instead of on measurement',
+        'command a step of force against a stop and look which of effort and position moves '
+        'first; switch the effort filter off and repeat',
+        'Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998')
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return delays from -30 to 30 ms in steps of 2 ms, shorter ones in fractions of it."""
+        late = [*SHORT, *np.arange(STEP, LONGEST + 1e-9, STEP)]
+        return [{'delay': float(d)} for d in (*(-delay for delay in reversed(late)), *late)]
+
+    @classmethod
+    def drive_memory(cls) -> Any:
+        """Return the past: times and efforts that are not yet measured."""
+        return {'time': np.zeros(0), 'effort': np.zeros(0)}
+
+    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
+               memory: Any = None) -> Array:
+        """Return F(t - d) by straight lines between samples; the first sample before it."""
+        if time is None:
+            return effort
+        late = effort.copy()
+        for name, values in self.drives.items():
+            index = drives.index(name)
+            past = self.drive_memory() if memory is None else memory[name]
+            t = np.concatenate((past['time'], time))
+            F = np.concatenate((past['effort'], effort[:, index]))
+            late[:, index] = shifted(t, F, values['delay'])[len(past['time']):]
+            kept = t >= t[-1] - 1.1 * max(values['delay'], 0.0) - 0.01
+            past['time'], past['effort'] = t[kept], F[kept]
+        return late
+
+
+def shifted(time: Array, values: Array, delay: float) -> Array:
+    """Return values(t - delay), (N,); beyond the ends the first and the last slope go on."""
+    wanted = time - delay
+    result: Array = np.interp(wanted, time, values)
+    if len(time) > 1 and delay < 0:
+        after = wanted > time[-1]
+        slope = (values[-1] - values[-2]) / (time[-1] - time[-2])
+        result[after] = values[-1] + slope * (wanted[after] - time[-1])
+    return result

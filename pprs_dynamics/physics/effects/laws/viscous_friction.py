@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Viscous friction of a drive beyond the model's: c q_dot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.open_exponent import other_exponent
+
+DIRECTIONS = 0.1  # share by which real viscous friction differs by direction
+
+
+class ViscousFriction(DriveEffect):
+    """Force in proportion to velocity: lubricant, motor damping, a current loop's back-EMF."""
+
+    name: ClassVar[str] = 'viscous_friction'
+    is_friction: ClassVar[bool] = True
+    linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity', -1e6, 1e6, scale=5.0),)
+    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
+    card = Card(
+        'c q_dot',
+        'a straight line through zero over velocity, the same forwards and backwards; nothing '
+        'at low speed',
+        'stiff or cold grease, too much grease, seals, eddy currents and back-EMF of the motor, '
+        'a damper or cable chain that drags',
+        'run the drive at several constant speeds, both ways: the force must rise in proportion; '
+        'repeat warm, or with other grease: the slope must change',
+        'Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and '
+        'compensation methods for the control of machines with friction, Automatica 30, 1994')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (q_dot,)."""
+        return (drive.velocity,)
+
+    @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return what a difference by direction adds, and thinning with speed."""
+        return ((DIRECTIONS * np.abs(drive.velocity),),
+                (other_exponent(drive.velocity, drive.velocity),))

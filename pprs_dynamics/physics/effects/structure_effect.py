@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects on the platform, in the rods and in the passive joints: one set of parameters each."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, Self
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.physics.three_pprs.state import MechanismState
+
+
+class StructureEffect(CatalogueEffect):
+    """An effect that is not in the drives.
+
+    Parameters
+    ----------
+    values : mapping
+        By name of the parameter.
+    """
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self.values = dict(values)
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from `{parameter: value}`."""
+        return cls(cls._checked(f'effects.{cls.name}', values, complete))
+
+    def to_file(self) -> dict[str, Any]:
+        """Return `{parameter: value}`."""
+        return dict(self.values)
+
+    @classmethod
+    def at(cls, coefficients: Mapping[str, float]) -> Self:
+        """Return the effect with these coefficients; those not given are zero."""
+        every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
+        return cls(cls.from_coefficients(every))
+
+
+class BodyEffect(StructureEffect):
+    """An effect on the rigid body: masses, gravity, forces on the bodies.
+
+    It changes the loads of the guides and joints, too, and with them the friction that follows
+    loads: the model applies it before it evaluates friction.
+    """
+
+    def changed(self, robot: Any) -> Any:
+        """Return the robot, a `Robot` or an `Arm`, with the effect; by default as it was."""
+        return robot
+
+    @classmethod
+    def absent(cls, robot: Any) -> frozenset[str]:
+        """Return the coefficients that a robot has no body for; by default none."""
+        return frozenset()
+
+    def load(self, state: Any) -> StructureLoad | None:
+        """Return a load beside bodies and gravity; None, the default, for none."""
+        return None
+
+    def apply(self, state: Any) -> Any:
+        """Return the state, a `MechanismState` or an `ArmState`, with the effect in its bodies."""
+        return state.loaded(self.changed(state.robot), self.load(state))
+
+    def force(self, state: Any, memory: Any = None) -> Array:
+        """Return the change of the rigid body's drive forces [N, N m], (N, D)."""
+        added: Array = self.apply(state).rigid_force - state.rigid_force
+        return added
+
+
+class PassiveJointEffect(StructureEffect):
+    """Friction in the passive joints: a force on top of the rigid body's."""
+
+    @abstractmethod
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N], (N, 6)."""

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Kernels compiled by Numba, kept on disk; imported only where something is evaluated."""
+
+from __future__ import annotations
+
+import dis
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from itertools import count
+from pathlib import Path
+from types import CellType, CodeType, FunctionType
+from typing import Any
+
+from pprs_dynamics.physics.mechanism import arithmetic
+
+PACKAGE = 'pprs_dynamics'
+REPLACED: dict[Any, Any] = {
+    arithmetic.sqrt: arithmetic.compiled_sqrt,
+    arithmetic.tanh: arithmetic.compiled_tanh,
+    arithmetic.larger: arithmetic.compiled_larger,
+    arithmetic.everywhere: arithmetic.compiled_everywhere,
+}
+PHYSICS = Path(__file__).parents[1]
+
+
+def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
+    """Return the compiler of a kernel's loop, or None without Numba or a place for its cache.
+
+    It takes a kernel and parameters of the form that the kernel takes; the loop takes a row.
+
+    Compiling takes seconds, which pays only where it happens once: in the package's own
+    __pycache__ or the user's cache directory; NUMBA_CACHE_DIR names another one.
+    """
+    try:
+        import numba  # noqa: F401
+    except ImportError:
+        return None
+    try:
+        _compiled_loop(_nothing, ())
+    except RuntimeError:  # no locator available: nowhere to write
+        return None
+    return _compiled_loop
+
+
+def _nothing(p: Any, s: Any) -> bool:
+    return True
+
+
+def _template(row: Any, *tables: Any) -> int:
+    p = read(row)  # type: ignore[name-defined]  # noqa: F821
+    first = -1
+    for s in range(len(tables[0])):
+        if not kernel(p, s, *tables) and first < 0:  # type: ignore[name-defined]  # noqa: F821
+            first = s
+    return first
+
+
+def _compiled_loop(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
+    import numba
+
+    own = {'kernel': _compiled(kernel), 'read': _inlined(_reader(named))}
+    loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
+                        f'{kernel.__name__}_loop')
+    # Numba looks only at the file of the loop when it decides whether what it kept is up to
+    # date; the name tells it of all other files.
+    loop.__qualname__ = f'{kernel.__module__}.{kernel.__name__}_{_digest()}'.replace('.', '_')
+    loop.__module__ = __name__
+    compiled: Callable[..., int] = numba.njit(
+        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True)(loop)
+    return compiled
+
+
+def _reader(named: tuple[Any, ...]) -> Any:
+    """Return a function that makes named tuples of this form from a row of their numbers."""
+    namespace: dict[str, Any] = {}
+    index = count()
+
+    def expression(value: Any) -> str:
+        if not isinstance(value, tuple):
+            return f'row[{next(index)}]'
+        elements = ''.join(f'{expression(element)}, ' for element in value)
+        if type(value) is tuple:
+            return f'({elements})'
+        namespace[type(value).__name__] = type(value)
+        return f'{type(value).__name__}({elements})'
+
+    # Written out: Numba makes named tuples only where all their elements are.
+    exec(f'def read(row):\n    return {expression(named)}', namespace)
+    return namespace['read']
+
+
+@cache
+def _compiled(function: FunctionType) -> Any:
+    """Return a function of this package, and all that it calls, for Numba."""
+    namespace = dict(function.__globals__)
+    for name in _names(function.__code__) & namespace.keys():
+        namespace[name] = _callee(namespace[name])
+    cells = tuple(CellType(_callee(cell.cell_contents)) for cell in function.__closure__ or ())
+    clone = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__,
+                         cells)
+    clone.__module__ = function.__module__
+    return _inlined(clone)
+
+
+def _inlined(function: FunctionType) -> Any:
+    """Return a function that Numba inlines where it is called."""
+    import numba
+
+    # Else their many results are copied through memory: four times slower. Nobody calls them from
+    # Python, and wrappers for that would take half of the compiling.
+    return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
+                      no_cfunc_wrapper=True)(function)
+
+
+def _callee(used: Any) -> Any:
+    """Return a variable for compiled code: compiled, where it is a function of this package."""
+    if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
+        return _compiled(REPLACED.get(used, used))
+    return used
+
+
+def _names(code: CodeType) -> set[str]:
+    """Return the global names that a function and those within it look up."""
+    own = {step.argval for step in dis.get_instructions(code) if step.opname == 'LOAD_GLOBAL'}
+    return own.union(*(_names(constant) for constant in code.co_consts
+                       if isinstance(constant, CodeType)))
+
+
+@cache
+def _digest() -> str:
+    """Return a fingerprint of every file that equations may stand in."""
+    content = hashlib.sha256()
+    for file in sorted(PHYSICS.rglob('*.py')):
+        content.update(file.read_bytes())
+    return content.hexdigest()[:12]

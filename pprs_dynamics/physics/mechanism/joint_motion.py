@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Motion of drives that move what they move by themselves: a single axis, joints of an arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix, checked_times
+from pprs_dynamics.physics.mechanism.pose_spline import spline_through
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """N samples of the motion of D drives.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : (N, D) arrays
+        [m, m/s, m/s^2], and of revolute joints [rad, rad/s, rad/s^2].
+    time : (N,) array, optional
+        [s]
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    time: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, samples: slice) -> Self:
+        return replace(self, position=self.position[samples], velocity=self.velocity[samples],
+                       acceleration=self.acceleration[samples],
+                       time=None if self.time is None else self.time[samples])
+
+    def with_time(self, time: ArrayLike) -> Self:
+        """Return the motion at given times."""
+        return replace(self, time=checked_times(time, len(self)))
+
+    @classmethod
+    def checked(cls, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
+                time: ArrayLike, drives: int) -> Self:
+        """Return the motion of so many drives.
+
+        Raises
+        ------
+        MotionError
+            For a wrong shape, a non-finite number, or times that do not strictly increase.
+        """
+        q = checked_matrix('position', position, drives)
+        v, a = (checked_matrix(name, values, drives, len(q)) for name, values in (
+            ('velocity', velocity), ('acceleration', acceleration)))
+        return cls(q, v, a, checked_times(time, len(q)))
+
+    def held(self) -> Self:
+        """Return the last position, at rest, at time 0."""
+        rest = np.zeros_like(self.position[-1:])
+        return replace(self, position=self.position[-1:], velocity=rest, acceleration=rest,
+                       time=np.zeros(1))
+
+
+def position_spline_derivatives(time: Array, position: Array) -> tuple[Array, Array]:
+    """Return velocities and accelerations of splines through positions, at the positions.
+
+    Parameters
+    ----------
+    time : (N,) array
+        Strictly increasing [s], at least four.
+    position : (N, D) array
+
+    Returns
+    -------
+    velocity, acceleration : (N, D) arrays
+        NaN throughout where positions or times are so far apart that no spline can be computed.
+
+    Raises
+    ------
+    MotionError
+        For positions or times that are none.
+    """
+    places = checked_matrix('position', position, position.shape[1])
+    knots = checked_times(time, len(places))
+    try:
+        # Positions too far apart overflow; the result is then not finite.
+        with np.errstate(all='ignore'):
+            _, velocity, acceleration = spline_through(knots, places, knots)
+        return velocity, acceleration
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        unknown = np.full_like(places, np.nan)
+        return unknown, unknown

@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Motion of the platform: poses, twists and classical accelerations, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MotionError
+from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.motion_checks import (
+    UNIT_LENGTH_TOLERANCE,
+    checked_matrix,
+    checked_times,
+    normalised,
+)
+from pprs_dynamics.physics.mechanism.pose_spline import checked_poses, spline_rows
+from pprs_dynamics.physics.three_pprs.evaluation import evaluate_if_ready
+from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
+from pprs_dynamics.physics.three_pprs.motion_sample import rotation
+
+QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
+              'linear_acceleration', 'angular_acceleration')
+WIDTHS = [3, 4, 3, 3, 3, 3]
+ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
+OTHERS = (0, 1, 2, *range(7, 19))  # columns that are not orientations
+_NO_PARAMETERS = KernelParameters(())
+FLOAT = np.dtype(np.float64)
+MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
+
+
+class PlatformMotion:
+    """N samples of the motion of the platform's origin o, everything in `base`. Not changeable.
+
+    Parameters
+    ----------
+    position : (N, 3) array_like
+        P [m].
+    orientation : (N, 4) array_like
+        Unit quaternions x, y, z, w; normalised when their length is within 1e-3 of 1.
+    linear_velocity, angular_velocity : (N, 3) array_like
+        v of o [m/s] and omega [rad/s].
+    linear_acceleration, angular_acceleration : (N, 3) array_like
+        Classical acceleration a_o of o [m/s^2] and epsilon [rad/s^2].
+    time : (N,) array_like, optional
+        Strictly increasing times [s]; needed by effects with memory.
+
+    Attributes
+    ----------
+    rows : (N, 19) array
+        All of it but the times, in the order of the parameters: what kernels take.
+
+    Raises
+    ------
+    MotionError
+        For a wrong shape, a non-finite number, a quaternion off unit length, or times that do
+        not strictly increase.
+    """
+
+    rows: Array
+    time: Array | None
+
+    def __init__(
+        self, position: ArrayLike, orientation: ArrayLike, linear_velocity: ArrayLike,
+        angular_velocity: ArrayLike, linear_acceleration: ArrayLike,
+        angular_acceleration: ArrayLike, time: ArrayLike | None = None,
+    ) -> None:
+        columns = (position, orientation, linear_velocity, angular_velocity, linear_acceleration,
+                   angular_acceleration)
+        rows = _joined(columns)
+        if rows is None or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, rows) >= 0:
+            rows = _checked(columns)
+        self.__dict__['rows'] = rows
+        self.__dict__['time'] = None if time is None else checked_times(time, len(rows))
+
+    def _set(self, rows: Array, time: Array | None) -> None:
+        self.__dict__['rows'] = rows
+        self.__dict__['time'] = time
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f'a PlatformMotion stays as it is: {name} was to be set')
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, index: Any) -> PlatformMotion:
+        """Return the samples that `index` (slice, mask or indices) selects."""
+        if isinstance(index, (int, np.integer)):
+            index = range(len(self))[index]  # raises IndexError, and ends a loop
+            index = slice(index, index + 1)
+        rows = np.array(self.rows[index])
+        if not len(rows):
+            raise MotionError('position', f'its shape is {(0, 3)}',
+                              'be (N, 3) with N of at least 1', 'shape')
+        selected = object.__new__(PlatformMotion)
+        selected._set(
+            rows, None if self.time is None else checked_times(self.time[index], len(rows)))
+        return selected
+
+    @cached_property
+    def position(self) -> Array:
+        """P [m], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 0:3])
+
+    @cached_property
+    def orientation(self) -> Array:
+        """Unit quaternions x, y, z, w, (N, 4)."""
+        return np.ascontiguousarray(self.rows[:, 3:7])
+
+    @cached_property
+    def linear_velocity(self) -> Array:
+        """Velocity v of o [m/s], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 7:10])
+
+    @cached_property
+    def angular_velocity(self) -> Array:
+        """Angular velocity omega [rad/s], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 10:13])
+
+    @cached_property
+    def linear_acceleration(self) -> Array:
+        """Acceleration a_o of o [m/s^2], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 13:16])
+
+    @cached_property
+    def angular_acceleration(self) -> Array:
+        """Angular acceleration epsilon [rad/s^2], (N, 3)."""
+        return np.ascontiguousarray(self.rows[:, 16:19])
+
+    def is_closed(self) -> bool:
+        """Return whether it ends within 1 mm and 1 mrad of where it starts."""
+        ends = self.orientation[[0, -1]]
+        moved = np.linalg.norm(self.position[-1] - self.position[0])
+        turned = 2 * np.arccos(min(abs(float(ends[0] @ ends[1])), 1.0))
+        return bool(moved < 1e-3 and turned < 1e-3)
+
+    def with_time(self, time: ArrayLike) -> PlatformMotion:
+        """Return the motion with other times [s]."""
+        same = object.__new__(PlatformMotion)
+        same._set(self.rows, checked_times(time, len(self)))
+        return same
+
+    def resampled(self, rate: float) -> PlatformMotion:
+        """Return the motion at a constant rate.
+
+        Where the samples already have that rate they stay as they are, twists included; else a
+        spline through the poses is evaluated, see `from_poses`.
+
+        Parameters
+        ----------
+        rate : float
+            [Hz].
+        """
+        if self.time is None:
+            raise MotionError('time', 'it is absent', 'be known to resample', 'time')
+        if not 0 < rate * (self.time[-1] - self.time[0]) < MOST_SAMPLES:
+            raise MotionError('rate', f'{rate:g} Hz over {self.time[-1] - self.time[0]:g} s',
+                              f'give between 1 and {MOST_SAMPLES:g} samples', 'shape')
+        if len(self) > 1 and np.allclose(np.diff(self.time) * rate, 1.0, rtol=0, atol=1e-6):
+            return self
+        # The last pose belongs to the motion even where rounding puts it just past the grid.
+        count = int((self.time[-1] - self.time[0]) * rate + 1e-9) + 1
+        grid = self.time[0] + np.arange(count) / rate
+        return PlatformMotion.from_poses(
+            self.time, self.position, self.orientation, at=grid).with_time(grid)
+
+    @cached_property
+    def rotation(self) -> Array:
+        """Rotation matrices from `platform` to `base`, (N, 3, 3)."""
+        columns = rotation(*self.orientation.T)
+        return np.stack([np.stack(column, axis=-1) for column in columns], axis=-1)
+
+    @property
+    def tilt(self) -> Array:
+        """Angle between the platform's normal and the vertical [rad], (N,)."""
+        x, y, z, w = self.orientation.T
+        tilt: Array = 2 * np.arctan2(np.hypot(x, y), np.hypot(z, w))
+        return tilt
+
+    @property
+    def turn(self) -> Array:
+        """Rotation about the vertical that remains without the tilt [rad], (N,)."""
+        _, _, z, w = self.orientation.T
+        turn: Array = 2 * np.arctan2(z * np.where(w < 0, -1.0, 1.0), np.abs(w))
+        return turn
+
+    @classmethod
+    def from_rows(cls, rows: Array, time: ArrayLike | None = None) -> PlatformMotion:
+        """Return the motion in a table such as `rows`, an (N, 19) array of floats."""
+        checked = np.array(rows)
+        if not len(rows) or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, checked) >= 0:
+            # The constructor raises the specific error.
+            P, q, v, omega, a, epsilon = np.split(rows, ENDS, axis=1)
+            return cls(P, q, v, omega, a, epsilon, time)
+        motion = object.__new__(cls)
+        motion._set(checked, None if time is None else checked_times(time, len(checked)))
+        return motion
+
+    @classmethod
+    def at_rest(cls, position: ArrayLike, orientation: ArrayLike | None = None) -> PlatformMotion:
+        """Return poses held still.
+
+        Parameters
+        ----------
+        position : (N, 3) or (3,) array_like
+            P [m].
+        orientation : (N, 4) array_like, optional
+            Unit quaternions x, y, z, w; unturned by default.
+        """
+        position = checked_matrix('position', position, 3)
+        zero = np.zeros_like(position)
+        if orientation is None:
+            orientation = np.broadcast_to((0.0, 0.0, 0.0, 1.0), (len(position), 4))
+        return cls(position, orientation, zero, zero, zero, zero)
+
+    def held(self) -> PlatformMotion:
+        """Return the last pose, at rest, at time 0."""
+        return PlatformMotion.at_rest(self.position[-1:], self.orientation[-1:]).with_time([0.0])
+
+    @classmethod
+    def from_poses(
+        cls, time: ArrayLike, position: ArrayLike, orientation: ArrayLike,
+        at: ArrayLike | None = None,
+    ) -> PlatformMotion:
+        """Return the motion of a spline through poses, differentiated analytically.
+
+        See `mechanism.pose_spline`: angular velocity and acceleration are continuous, no Euler
+        angle wraps, and the ends are as good as the middle.
+
+        Parameters
+        ----------
+        time : (N,) array_like
+            Strictly increasing times [s], at least four.
+        position : (N, 3) array_like
+        orientation : (N, 4) array_like
+        at : (K,) array_like, optional
+            Times at which to evaluate [s], in any order; the poses' own by default. The result
+            carries times only without it.
+        """
+        knots, places, turns = checked_poses(time, position, orientation)
+        moments = knots if at is None else np.asarray(at, dtype=float)
+        if not np.all(np.isfinite(moments)):
+            raise MotionError('at', 'a time is not finite', 'be finite', 'finite')
+        rows = spline_rows(knots, places, turns, moments)
+        return cls.from_rows(rows, knots if at is None else None)
+
+
+def _joined(columns: Sequence[Any]) -> Array | None:
+    """Return columns as one table where they are floats of the right shapes, else None."""
+    try:
+        widths = [column.shape[1] for column in columns]
+        rows = np.concatenate(columns, 1)
+    except (AttributeError, IndexError, ValueError):
+        return None
+    right = widths == WIDTHS and type(rows) is np.ndarray and rows.dtype is FLOAT and len(rows)
+    return rows if right else None
+
+
+def _motion_kernel(p: tuple[()], s: Any, rows: Any) -> Any:
+    """Normalise quaternions in place; return whether a sample needs no closer look."""
+    x, y, z, w = rows[s, 3], rows[s, 4], rows[s, 5], rows[s, 6]
+    length = sqrt(x * x + y * y + z * z + w * w)
+    rows[s, 3], rows[s, 4] = x / length, y / length
+    rows[s, 5], rows[s, 6] = z / length, w / length
+    everything = length
+    for column in OTHERS:
+        everything = everything + rows[s, column]
+    # 0 times infinity or NaN is NaN.
+    return (abs(length - 1.0) <= UNIT_LENGTH_TOLERANCE) & (everything * 0.0 == 0.0)
+
+
+def _checked(columns: Sequence[ArrayLike]) -> Array:
+    """Return columns as one table, or raise MotionError."""
+    samples: int | None = None
+    arrays = []
+    for name, value, width in zip(QUANTITIES, columns, WIDTHS, strict=True):
+        arrays.append(checked_matrix(name, value, width, samples))
+        samples = len(arrays[0])
+    arrays[1] = normalised(arrays[1])
+    return np.concatenate(arrays, axis=1)

@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Model of the 3-PPRS: drive forces Q^m of the rigid body, the paper's friction and effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
+from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
+from pprs_dynamics.physics.effects.laws.passive_friction import (
+    IndependentChainsFriction,
+    JointFriction,
+    PassiveFriction,
+    WholeMechanismFriction,
+)
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.model.effects_block import added_effects
+from pprs_dynamics.physics.model.force_model import (
+    RIGID_BODY,
+    ForceModel,
+    Forces,
+    ModelState,
+    total_force,
+)
+from pprs_dynamics.physics.model.keys import KEYS, is_arm, is_axis
+from pprs_dynamics.physics.model.limits import Limits
+from pprs_dynamics.physics.model.one_pass import FORCES, OnePass
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
+from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
+from pprs_dynamics.physics.three_pprs.jacobians import condition_number
+from pprs_dynamics.physics.three_pprs.robot import DRIVES, Geometry, Masses, Robot
+from pprs_dynamics.physics.three_pprs.state import MechanismState, solve_mechanism
+
+__all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
+
+
+@dataclass(frozen=True)
+class DriveForces(Forces):
+    """Drive forces of N samples.
+
+    Parameters
+    ----------
+    total : (N, 6) array
+        What the drives must apply [N], in drive order.
+    parts : dict of (N, 6) arrays
+        `rigid_body`, `active_friction`, `passive_friction` and one per added effect; they sum
+        to `total`.
+    mechanism : MechanismState
+        Drive motion, Jacobians, reactions: what the forces were computed from.
+    """
+
+    mechanism: MechanismState
+
+    @classmethod
+    def of_one_pass(
+        cls, one_pass: OnePass, motion: PlatformMotion, table: Array,
+    ) -> DriveForces:
+        """Return the forces in a table of `OnePass.forces`.
+
+        Of one sample, parts and mechanism would take as long as the calculation: they are made
+        when somebody looks at them.
+        """
+        forces = object.__new__(cls)
+        own = forces.__dict__
+        own['total'], own['_origin'] = table[0], (one_pass, motion, table)
+        return forces
+
+    @cached_property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the drives [m, m/s, m/s^2], (N, 6) each."""
+        if '_origin' in self.__dict__:
+            table = self.__dict__['_origin'][2]
+            if len(table) > FORCES:
+                return tuple(table[FORCES:])
+        return self.mechanism.kinematics.drive_motion
+
+    def __getattr__(self, name: str) -> Any:
+        origin = self.__dict__.get('_origin')
+        if origin is None or name not in ('parts', 'mechanism'):
+            raise AttributeError(f'{type(self).__name__!r} object has no attribute {name!r}')
+        one_pass, motion, table = origin
+        made = _parts(table) if name == 'parts' else one_pass.mechanism(motion, table)
+        return self.__dict__.setdefault(name, made)
+
+
+def _parts(table: Array) -> dict[str, Array]:
+    """Return the parts in a table of `OnePass.forces` by name."""
+    return {RIGID_BODY: table[1], ActiveFriction.name: table[2], PassiveFriction.name: table[3]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveModel(ForceModel):
+    """The inverse dynamic model of a 3-PPRS with friction, Eq. (14): Q^m = sum of parts.
+
+    Parameters
+    ----------
+    robot : Robot
+    limits : Limits
+    equations : {'corrected', 'printed'}
+        'printed' takes (7), (12), (13) to the letter.
+    effects, reversal, values, source
+        See `ForceModel`; the paper's friction comes first.
+    """
+
+    kind: ClassVar[str] = PLATFORM
+    title: ClassVar[str] = 'a 3-PPRS'
+    drives: ClassVar[tuple[str, ...]] = DRIVES
+    keys = KEYS
+
+    robot: Robot
+    limits: Limits
+    equations: str = 'corrected'
+
+    @classmethod
+    def load(cls, path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel:
+        """Read a model file.
+
+        Parameters
+        ----------
+        path : path
+            A file; or, where there is none of that name, one of the package's own, as in
+            'config/paper.yaml'.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where the file does not exist or is not YAML.
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for a single
+            axis, which `AxisModel.load` and `load_model` read.
+        """
+        file = find_file(path)
+        return cls.from_parameters(read_parameters(file), source=str(file))
+
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> DriveModel:
+        """Build the model from flat keys and values, each checked; see `build_model`.
+
+        Raises
+        ------
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for those of
+            a single axis.
+        """
+        with source_of_errors(source):
+            other = next((name for name in parameters if is_axis((name,)) or is_arm((name,))),
+                         None)
+            if other is not None:
+                kind = 'a serial arm' if is_arm((other,)) else 'a single axis'
+                raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
+                                 f'{kind} is for pprs compare, diagnose, adopt, fit and history')
+            values = checked_values(parameters)
+            for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
+                if not values[stroke][0] < values[stroke][1]:
+                    raise ModelError(stroke, values[stroke],
+                                     'be a lower and a higher position [m]')
+            robot = Robot(Geometry(**_group(values, 'geometry.')),
+                          Masses(**_group(values, 'masses.')), values['gravity'])
+            limits = Limits(**_group(values, 'limits.'))
+            effects = (ActiveFriction(**_group(values, 'friction.drives.')),
+                       _passive_friction(values, limits),
+                       *added_effects(parameters, cls, cls.drives))
+            _require_bodies(robot, effects)
+            reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
+            return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
+                       equations=values['equations'], values=values, source=source)
+
+    def mechanism(self, motion: PlatformMotion) -> MechanismState:
+        """Return drive motion, Jacobians and frictionless forces for a platform motion.
+
+        Raises
+        ------
+        WorkspaceError
+            For a pose out of reach.
+        SingularityError
+            For a pose nearer to a singularity than `limits.rod_sine` or
+            `limits.condition_number` allow.
+        """
+        # Very large numbers overflow; users of the result check that it is finite.
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            return solve_mechanism(
+                self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
+                minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
+
+    def drive_forces(
+        self, motion: PlatformMotion, state: ModelState | None = None,
+    ) -> DriveForces:
+        """Return the forces that the drives must apply for a platform motion.
+
+        Parameters
+        ----------
+        motion : PlatformMotion
+        state : ModelState, optional
+            Carries effects with memory from call to call, and is advanced to the last sample;
+            without it every call starts afresh.
+
+        Raises
+        ------
+        WorkspaceError, SingularityError
+            See `mechanism`. Strokes and efforts are not checked here: `limits` does that, so
+            that recordings beyond them can still be compared.
+        EffectError
+            Where an effect of another package fails.
+        """
+        one_pass = self._one_pass
+        table = None if one_pass is None else one_pass.forces(motion)
+        if one_pass is None or table is None:
+            return self.forces_at(self.mechanism(motion), state)
+        added = self.effects[2:]
+        if not added:
+            return DriveForces.of_one_pass(one_pass, motion, table)
+        return self._with_effects(added, _parts(table), one_pass.mechanism(motion, table), state)
+
+    @cached_property
+    def _one_pass(self) -> OnePass | None:
+        """The paper's model in one pass, where no effect changes the bodies that it is of."""
+        match self.effects:
+            case (ActiveFriction() as active, WholeMechanismFriction() as passive, *added):
+                if not any(isinstance(effect, BodyEffect) for effect in added):
+                    return OnePass(self.robot, active, passive, self.limits, self.reversal,
+                                   self.equations == 'printed')
+        return None
+
+    def forces_at(
+        self, mechanism: MechanismState, state: ModelState | None = None,
+    ) -> DriveForces:
+        """Return the forces at a solved state of the mechanism; see `drive_forces`."""
+        parts = {RIGID_BODY: mechanism.rigid_body.force}
+        return self._with_effects(self.effects, parts, mechanism, state)
+
+    def _with_effects(
+        self, effects: tuple[Effect, ...], parts: dict[str, Array], mechanism: MechanismState,
+        state: ModelState | None,
+    ) -> DriveForces:
+        """Return the forces of parts that are there and of effects."""
+        state = self.initial_state() if state is None else state
+        for effect in self.effects:
+            effect.check_memory(state.memories)
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            # Bodies and what acts on them change the loads that friction follows: they go first.
+            for effect in effects:
+                if isinstance(effect, BodyEffect):
+                    loaded = effect.apply(mechanism)
+                    parts[effect.name] = loaded.rigid_body.force - mechanism.rigid_body.force
+                    mechanism = loaded
+            for effect in effects:
+                if not effect.is_measurement and not isinstance(effect, BodyEffect):
+                    parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
+            return DriveForces(total_force(tuple(parts.values())), parts, mechanism)
+
+    def variables(self, state: MechanismState) -> dict[str, Array]:
+        """Return loads of the guides, rod angles, and where the platform is."""
+        motion = state.motion
+        x, y, z = motion.position.T
+        return {'load': state.guide_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
+                'platform_x': x, 'platform_y': y, 'platform_z': z,
+                'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
+
+    def condition_number(self, motion: PlatformMotion) -> Array:
+        """Return the condition number of the drive Jacobian, rotations times r, (N,).
+
+        Unlike `drive_forces` it answers beyond `limits.condition_number` too.
+        """
+        mechanism = solve_mechanism(self.robot, motion, minimum_sine=self.limits.rod_sine)
+        return condition_number(self.robot.geometry, mechanism.jacobians.J)
+
+
+def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the keys and values right below a prefix."""
+    return {name.removeprefix(prefix): value for name, value in values.items()
+            if name.startswith(prefix) and '.' not in name.removeprefix(prefix)}
+
+
+def _passive_friction(values: Mapping[str, Any], limits: Limits) -> PassiveFriction:
+    joints = (JointFriction(**_group(values, 'friction.revolute.')),
+              JointFriction(**_group(values, 'friction.spherical.')))
+    printed = values['equations'] == 'printed'
+    if values['friction.approach'] == WholeMechanismFriction.approach:
+        return WholeMechanismFriction(*joints, printed)
+    return IndependentChainsFriction(*joints, printed, limits.rod_cosine)
+
+
+def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
+    """Return the width that all drives share, or one for each."""
+    common: float = values['friction.reversal_velocity']
+    own: tuple[float, ...] = values['friction.reversal_velocities']
+    return tuple(width or common for width in own) if any(own) else common
+
+
+def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:
+    """Raise ModelError where effects leave bodies that cannot be."""
+    for effect in effects:
+        if isinstance(effect, BodyEffect):
+            robot = effect.changed(robot)
+            if not robot.masses.total > 0 or min(robot.masses.rods) < 0:
+                raise ModelError(f'effects.{effect.name}', effect.to_file(),
+                                 'leave masses greater than 0')

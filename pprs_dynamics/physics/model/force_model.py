@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The base of all models: forces that drives must apply for a motion, as a sum over a list.
+
+The diagnosis works on any of them: it asks a model for its drives, its numbers, its forces and
+what its sensors say, never for what it moves.
+"""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import EffectError
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.physics.model.keys import Key
+from pprs_dynamics.physics.three_pprs.state import DriveStates
+
+RIGID_BODY = 'rigid_body'
+
+
+def total_force(parts: tuple[Any, ...]) -> Any:
+    """Return the drive force Q^m, the sum of its parts, of numbers as of arrays."""
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part                                                   # Eq. (14)
+    return total
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Forces of N samples of D drives.
+
+    Parameters
+    ----------
+    total : (N, D) array
+        What the drives must apply [N], in drive order.
+    parts : dict of (N, D) arrays
+        `rigid_body`, the model's own friction, and one per added effect; they sum to `total`.
+    mechanism : DriveStates
+        What the forces were computed from.
+    """
+
+    total: Array
+    parts: dict[str, Array]
+    mechanism: DriveStates
+
+    @property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the drives, (N, D) each."""
+        state = self.mechanism
+        return state.position, state.velocity, state.acceleration
+
+
+F = TypeVar('F', bound=Forces)
+
+
+class ModelState:
+    """Memory of effects between calls; made by `initial_state` of a model."""
+
+    def __init__(self, memories: dict[str, Any]) -> None:
+        self.memories = memories
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether any effect keeps anything."""
+        return any(memory is not None for memory in self.memories.values())
+
+    def copy(self) -> ModelState:
+        """Return an independent copy, to look ahead without advancing this one.
+
+        Raises
+        ------
+        EffectError
+            Where an effect keeps what cannot be copied.
+        """
+        copied = {}
+        for name, memory in self.memories.items():
+            try:
+                copied[name] = copy.deepcopy(memory)
+            except Exception as error:  # another package's effect may keep anything
+                raise EffectError(name, 'its memory cannot be copied '
+                                  f'({type(error).__name__}: {error})') from error
+        return ModelState(copied)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceModel(ABC):
+    """An inverse dynamic model: motion in, drive forces out.
+
+    Parameters
+    ----------
+    effects : tuple of Effect
+        What acts beside the rigid body; the model's own friction comes first.
+    reversal : Reversal
+    values : mapping
+        The flat keys and values that the model was built from, complete with defaults.
+    source : str
+        The file that it came from, if any.
+
+    Class attributes
+    ----------------
+    kind : {'platform', 'axis', 'arm'}
+        Effects say in which kinds they act.
+    title : str
+        What it is a model of, for a sentence.
+
+    Attributes
+    ----------
+    drives : tuple of D str
+    keys : dict of str to Key
+        Of its files.
+    """
+
+    kind: ClassVar[str]
+    title: ClassVar[str]
+
+    effects: tuple[Effect, ...]
+    reversal: Reversal
+    values: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ''
+
+    @property
+    @abstractmethod
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+
+    @property
+    @abstractmethod
+    def keys(self) -> dict[str, Key]:
+        """Keys of its files, by name."""
+
+    @property
+    def units(self) -> tuple[DriveUnits, ...]:
+        """Units of the drives' quantities."""
+        return (DriveUnits(),) * len(self.drives)
+
+    @property
+    def content(self) -> str:
+        """What the model is built from beside its values: a hash of further files."""
+        return ''
+
+    @property
+    def gain(self) -> tuple[float, ...] | None:
+        """Effort per ampere of each drive; None for a model without."""
+        return None
+
+    @property
+    def gear_ratios(self) -> tuple[float, ...]:
+        """Turns of the motor per turn of each drive; 1 where no gear is known."""
+        return (1.0,) * len(self.drives)
+
+    @property
+    def efforts_in_amperes(self) -> bool:
+        """Whether efforts of recordings are currents."""
+        return False
+
+    @property
+    def amperes(self) -> Array:
+        """What efforts are multiplied by to give those of recordings and commands, (D,)."""
+        if self.gain is not None and self.efforts_in_amperes:
+            return 1 / np.asarray(self.gain)
+        return np.ones(len(self.drives))
+
+    @property
+    def rest_speed(self) -> float:
+        """Speed below which a drive that stays there stands, and its effort tells nothing.
+
+        0 where efforts at rest count as well.
+        """
+        return 0.0
+
+    @property
+    def blocks_per_period(self) -> float:
+        """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
+        return 0.0
+
+    @classmethod
+    def offers(cls, effect: type[CatalogueEffect]) -> bool:
+        """Return whether an effect of the catalogue can act in what this is a model of."""
+        return cls.kind in effect.acts_in
+
+    @abstractmethod
+    def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
+        """Return the forces for a motion of this kind."""
+
+    @abstractmethod
+    def variables(self, state: Any) -> dict[str, Array]:
+        """Return the variables on which an error may depend beside time and the drives' motion.
+
+        By name in the interface: (N, D) where every drive has its own, (N,) where all share it.
+        """
+
+    def initial_state(self, start: float | None = None) -> ModelState:
+        """Return a fresh state for effects with memory.
+
+        Parameters
+        ----------
+        start : float, optional
+            When the recording began [s], where that is before the first sample.
+        """
+        return ModelState({effect.name: effect.initial_memory(start) for effect in self.effects})
+
+    def continued_state(self, model: Self, state: ModelState) -> ModelState:
+        """Return a state that goes on from another model's for the effects that both have.
+
+        The other state must not be used any more: memories are handed over, not copied.
+        """
+        before = {effect.name: effect for effect in model.effects
+                  if isinstance(effect, CatalogueEffect)}
+        continued = self.initial_state()
+        for effect in self.effects:
+            other = before.get(effect.name)
+            # By what files say: attributes of another package's effect may be of any type.
+            if other is not None and isinstance(effect, CatalogueEffect) and (
+                    effect.to_file() == other.to_file()):
+                continued.memories[effect.name] = state.memories[effect.name]
+        return continued
+
+    def sound_at(self, motion: Any) -> Self:
+        """Return the model without those effects of other packages that fail for a motion.
+
+        Raises
+        ------
+        PprsError
+            See `drive_forces`.
+        """
+        model = self
+        while True:
+            try:
+                model.drive_forces(motion)
+            except EffectError as error:
+                model = model.without(error.effect)
+            else:
+                return model
+
+    def without(self, effect: str) -> Self:
+        """Return the model without the effect of that name."""
+        return replace(self, effects=tuple(
+            each for each in self.effects if each.name != effect))
+
+    def measured(self, forces: F, state: ModelState | None = None) -> F:
+        """Return the measured forces where the drives apply `forces`.
+
+        Effects of measurement become parts of their own; without any, `forces` are returned.
+
+        Parameters
+        ----------
+        forces : Forces
+            Consecutive samples with times, of `drive_forces`.
+        state : ModelState, optional
+            As there.
+        """
+        sensors = [effect for effect in self.effects if effect.is_measurement]
+        if not sensors:
+            return forces
+        # Each effect gets the states that its kind of model makes.
+        mechanism: Any = forces.mechanism
+        parts, total = dict(forces.parts), forces.total
+        state = self.initial_state() if state is None else state
+        for effect in sensors:
+            memory = state.memories[effect.name]
+            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
+                     if isinstance(effect, MeasurementEffect)
+                     else total + effect.force(mechanism, memory))
+            parts[effect.name], total = after - total, after
+        return replace(forces, total=total, parts=parts)
+
+    @property
+    def position_error(self) -> Array:
+        """Errors of measured drive positions [m], to be subtracted, (D,)."""
+        errors = [effect.position_error(self.drives) for effect in self.effects
+                  if isinstance(effect, MeasurementEffect)]
+        total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))
+        return total

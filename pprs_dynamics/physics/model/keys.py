@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Every key of a model file, declared once: type, size, unit, rule and description.
+
+The file loader, the nodes' parameter descriptors and the documentation read this table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.three_pprs.robot import ELBOWS
+
+EQUATIONS = ('corrected', 'printed')
+LARGEST = 1e300  # beyond it is no physical quantity, and squares overflow
+APPROACHES = ('whole_mechanism', 'independent_chains')
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a model file.
+
+    Parameters
+    ----------
+    name : str
+        Full dotted name.
+    description : str
+    unit : str
+        Empty for words and pure numbers.
+    size : int or None
+        Length of a list; None for a single value.
+    lower, upper : float
+        Bounds, both allowed.
+    positive : bool
+        True where 0 is not allowed either.
+    choices : tuple of str
+        Words that are allowed, for a key that holds one; () for numbers.
+    is_text : bool
+        True for a name, or a list of names.
+    may_be_empty : bool
+        True for a list that says nothing where it is empty.
+    default : object
+        Value where a file is silent; None where the file must have it.
+    """
+
+    name: str
+    description: str
+    unit: str = ''
+    size: int | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    positive: bool = False
+    choices: tuple[str, ...] = ()
+    is_text: bool = False
+    may_be_empty: bool = False
+    default: Any = None
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it holds numbers, not words."""
+        return not (self.choices or self.is_text)
+
+    @property
+    def rule(self) -> str:
+        """The requirement on a value, completing "must ..."."""
+        if self.choices:
+            return f'be one of {", ".join(self.choices)} ({self.description})'
+        if self.is_text:
+            form = 'be a name' if self.size is None else 'be a list of names'
+            return f'{form} ({self.description})'
+        form = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
+        return self._described(f'{form} {self._bounds}' if self._bounds else form)
+
+    @property
+    def _bounds(self) -> str:
+        bounds = []
+        if self.positive:
+            bounds.append('greater than 0')
+        elif self.lower > -math.inf:
+            bounds.append(f'at least {self.lower:g}')
+        if self.upper < math.inf:
+            bounds.append(f'at most {self.upper:g}')
+        return ' and '.join(bounds)
+
+    def _described(self, rule: str) -> str:
+        unit = f' [{self.unit}]' if self.unit else ''
+        return f'{rule} ({self.description}{unit})'
+
+    def check(self, value: Any) -> Any:
+        """Return the value as a word, a float or a tuple of floats, or raise ModelError."""
+        if self.choices:
+            if not isinstance(value, str) or value not in self.choices:
+                raise ModelError(self.name, value, self.rule)
+            return value
+        if self.size is None:
+            return self._name(value, value) if self.is_text else self._number(value, value)
+        if isinstance(value, (str, bytes)) or not hasattr(value, '__len__'):
+            raise ModelError(self.name, value, self.rule)
+        if len(value) != self.size and not (self.may_be_empty and not len(value)):
+            raise ModelError(self.name, list(value), self.rule)
+        if self.is_text:
+            return tuple(self._name(element, list(value)) for element in value)
+        return tuple(self._number(element, list(value)) for element in value)
+
+    def _name(self, element: Any, value: Any) -> str:
+        if not isinstance(element, str) or not element:
+            raise ModelError(self.name, value, self.rule)
+        return element
+
+    def _number(self, element: Any, value: Any) -> float:
+        if isinstance(element, bool) or not isinstance(element, (int, float)):
+            raise ModelError(self.name, value, self.rule)
+        # Compared before it is converted: a whole number of any length compares.
+        if not -LARGEST <= element <= LARGEST:
+            raise ModelError(self.name, value, self._described('be finite'))
+        if not self.lower <= element <= self.upper or (self.positive and element <= 0):
+            raise ModelError(self.name, value, self._described(f'be {self._bounds}'))
+        return float(element)
+
+
+def _friction(joint: str, where: str, symbol: str) -> tuple[Key, ...]:
+    return (
+        Key(f'friction.{joint}.viscous', f'c_{symbol}, viscous friction in {where}',
+            'N m s/rad', lower=0),
+        Key(f'friction.{joint}.coulomb', f'mu_{symbol}, Coulomb friction in {where}', lower=0),
+        Key(f'friction.{joint}.diameter', f'd_{symbol}, diameter in {where}', 'm', lower=0))
+
+
+KEYS: dict[str, Key] = {key.name: key for key in (
+    Key('equations', "the paper's (7), (12), (13) corrected or to the letter",
+        choices=EQUATIONS),
+    Key('geometry.base_radius', 'R, radius of the base', 'm', positive=True),
+    Key('geometry.platform_radius', 'r, radius of the platform', 'm', positive=True),
+    Key('geometry.rod_length', 'l, length of the guiding rods', 'm', positive=True),
+    Key('geometry.chain_angles', 'delta_i, chains around the base', 'rad', size=3),
+    Key('geometry.platform_angles', "delta'_i, joints around the platform", 'rad', size=3),
+    Key('geometry.elbow', 'branch of the rods', choices=ELBOWS),
+    Key('masses.platform', 'M, mass of the platform', 'kg', lower=0),
+    Key('masses.payload', 'm, mass of the manipulated object', 'kg', lower=0),
+    Key('masses.slides', 'm_1..m_3, masses of the slides', 'kg', size=3, lower=0),
+    Key('masses.lifts', 'm_4..m_6, masses of the lifts', 'kg', size=3, lower=0),
+    Key('masses.rods', 'm_b, masses of the guiding rods', 'kg', size=3, lower=0),
+    Key('masses.centre', 'centre of mass of platform and payload, in platform', 'm', size=3),
+    Key('masses.inertia', 'xx yy zz xy xz yz about that centre, in platform', 'kg m^2', size=6),
+    Key('gravity', 'gravity in base', 'm/s^2', size=3),
+    Key('friction.approach', 'how passive friction reaches the drives', choices=APPROACHES),
+    Key('friction.reversal_velocity', 'width in which sgn turns over in drives', 'm/s',
+        positive=True),
+    Key('friction.reversal_velocities', 'width drive by drive; 0: friction.reversal_velocity',
+        'm/s', size=6, lower=0, default=(0.0,) * 6),
+    Key('friction.reversal_rate', 'width in which sgn turns over in passive joints', 'rad/s',
+        positive=True),
+    Key('friction.drives.viscous', 'c_i, viscous friction of the drives', 'N s/m', size=6,
+        lower=0),
+    Key('friction.drives.coulomb', 'mu of the drives', size=6, lower=0),
+    *_friction('revolute', 'C_i', 'r'),
+    *_friction('spherical', 'A_i', 's'),
+    Key('limits.slide_stroke', 'lowest and highest position of the slides', 'm', size=2,
+        default=(-0.3, 0.3)),
+    Key('limits.lift_stroke', 'lowest and highest position of the lifts', 'm', size=2,
+        default=(-0.1, 0.8)),
+    Key('limits.effort', 'largest absolute force of each drive', 'N', size=6, positive=True,
+        default=(100.0,) * 6),
+    Key('limits.condition_number', 'largest condition number of the drive Jacobian', lower=1,
+        default=20.0),
+    Key('limits.rod_sine', 'smallest |sin u_i|', positive=True, upper=1, default=0.05),
+    Key('limits.rod_cosine', 'smallest |cos u_i| for independent_chains', positive=True,
+        upper=0.5, default=0.05),
+)}
+
+# A single axis: one prismatic drive, as on a bench.
+AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
+    Key('axis.mass', 'M, all that the drive moves, rotor and screw included', 'kg',
+        positive=True),
+    Key('axis.viscous', 'F_v, viscous friction', 'N s/m', lower=0),
+    Key('axis.coulomb', 'F_c, dry friction', 'N', lower=0),
+    Key('axis.offset', 'constant force beside weight and friction', 'N', default=0.0),
+    Key('axis.gravity', 'gravity along the positive direction: -9.81 where that is up', 'm/s^2',
+        default=0.0),
+    Key('friction.reversal_velocity', 'width in which sgn turns over', 'm/s', positive=True),
+)}
+
+
+EFFORT_UNITS = ('N m', 'N', 'A')
+ARM_URDF, ARM_JOINTS, ARM_GAIN = 'arm.urdf', 'arm.joints', 'arm.gain'
+
+
+@cache
+def arm_keys(count: int) -> dict[str, Key]:
+    """Return the keys of a serial arm with that many joints."""
+    zeros, ones = (0.0,) * count, (1.0,) * count
+
+    def joints(name: str, description: str, unit: str = '', **more: Any) -> Key:
+        return Key(name, f'{description}, of each of arm.joints', unit, size=count,
+                   **{'default': zeros, **more})
+
+    def links(name: str, description: str, unit: str, each: int) -> Key:
+        return Key(name, f'{description}; without it, as the URDF says', unit, size=each * count,
+                   may_be_empty=True, default=())
+
+    return {key.name: key for key in (
+        Key(ARM_URDF, "path of the arm's URDF, from the folder of this file", is_text=True),
+        Key('arm.base', 'link that stands', is_text=True),
+        Key('arm.tool', 'link that carries the load', is_text=True),
+        Key(ARM_JOINTS, 'revolute and prismatic joints that are driven', size=count,
+            is_text=True),
+        joints(ARM_GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
+               default=ones),
+        joints('arm.gear_ratio', 'turns of the motor per turn of the joint', '', positive=True,
+               default=ones),
+        Key('arm.effort_unit', 'unit of the efforts of recordings; A: times arm.gain',
+            choices=EFFORT_UNITS, default=EFFORT_UNITS[0]),
+        Key('arm.gravity', 'gravity in the base', 'm/s^2', size=3, default=(0.0, 0.0, -9.81)),
+        joints('arm.armature', 'inertia of the rotor, seen at the joint', 'kg m^2, kg', lower=0),
+        links('links.mass', 'mass of what each joint moves up to the next', 'kg', 1),
+        links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m', 3),
+        links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2', 6),
+        joints('friction.viscous', 'F_v, viscous friction', 'N m s/rad, N s/m', lower=0),
+        joints('friction.coulomb', 'F_c, dry friction', 'N m, N', lower=0),
+        joints('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
+        Key('friction.reversal_velocity', 'width in which sgn turns over', 'rad/s, m/s',
+            positive=True, default=0.01),
+        joints('friction.reversal_velocities',
+               'width in which sgn turns over; 0: friction.reversal_velocity', 'rad/s, m/s',
+               lower=0),
+    )}
+
+
+# Blocks whose keys are not listed one by one.
+ADDED = ('effects.', 'tolerances.', 'history.')
+
+
+def is_axis(names: Iterable[str]) -> bool:
+    """Return whether keys are those of a single axis, not of a 3-PPRS."""
+    return any(name.startswith('axis.') for name in names)
+
+
+def is_arm(names: Iterable[str]) -> bool:
+    """Return whether keys are those of a serial arm."""
+    return any(name.startswith('arm.') for name in names)
+
+
+def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
+    """Return the keys of the kind of model that some keys and values belong to."""
+    if is_arm(parameters):
+        joints = parameters.get(ARM_JOINTS, ())
+        return arm_keys(len(joints) if isinstance(joints, (list, tuple)) and joints else 1)
+    return AXIS_KEYS if is_axis(parameters) else KEYS
+
+
+# Names of all keys of the model, of whatever kind.
+NAMES = frozenset({*KEYS, *AXIS_KEYS, *arm_keys(1)})
+
+
+# Keys of ROS 2 itself and of single nodes, which may stand in the same file.
+NODE_KEYS = frozenset({
+    'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in',
+    'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
+    'window', 'error_span', 'update_rate', 'encoder_resolution', 'effort_noise',
+    'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
+    'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
+    'use_sim_time', 'start_type_description_service'})
+NODE_PREFIXES = ('qos_overrides.',)
+
+
+def as_list(value: Any) -> Any:
+    """Return a tuple as the list that a file holds for it, and any other value as it is."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def set_number(values: dict[str, Any], key: str, element: int | None, number: float) -> None:
+    """Put a number into a model's values, as one element where the key holds several."""
+    values[key] = number if element is None else tuple(
+        number if k == element else old for k, old in enumerate(values[key]))

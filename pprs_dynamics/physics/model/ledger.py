@@ -1,0 +1,223 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The ledger of a model file: the effects added, when, from which data, and their gain.
+
+A step stands under `history.step_NN` in values that ROS 2 parameter files accept, and keeps what
+was there before, so that it can be taken back exactly.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING as NO_DEFAULT
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.physics.model.keys import as_list
+
+BLOCK = 'history'
+_STEP = re.compile(r'step_\d\d+')
+PREVIOUS, ADDED = 'previous', 'added'
+NOT_KNOWN = 1e300  # a standard deviation that is none; ROS 2 files have no better word
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect that was added to a model, or fitted anew.
+
+    Parameters
+    ----------
+    effect : str
+    recordings, sha256 : tuple of str
+        Fitted to, and the hashes of the files.
+    spans : tuple of float
+        First and last time of each [s].
+    held_out_on : {'blocks', 'validation'}
+    error_before, error_after, held_out_before, held_out_after, noise_floor : float
+        [N]
+    date, version : str
+        When, and by which version of the package.
+    forced : bool
+        Whether objections were overridden.
+    parameters : tuple of str
+        drive.parameter, or parameter; then values, standard deviations and units of each.
+    drives : tuple of str
+        On which it sits; none for effects in the structure.
+    measured, drive_errors_before, drive_errors_after : tuples
+        Drives that were measured, and the error on each [N].
+    validation, validation_sha256 : tuple of str
+        Recordings that were not fitted.
+    objections, rivals, calibrated : tuple of str
+        What was overridden; effects that explain the data as well; numbers that moved.
+    previous : mapping
+        Values that the step changed, as they were.
+    added : tuple of str
+        Keys that were not there before.
+    """
+
+    effect: str
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    held_out_on: str
+    noise_floor: float
+    recordings: tuple[str, ...]
+    sha256: tuple[str, ...]
+    spans: tuple[float, ...]
+    date: str
+    version: str
+    forced: bool
+    drives: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    values: tuple[float, ...] = ()
+    std: tuple[float, ...] = ()
+    units: tuple[str, ...] = ()
+    measured: tuple[str, ...] = ()
+    drive_errors_before: tuple[float, ...] = ()
+    drive_errors_after: tuple[float, ...] = ()
+    validation: tuple[str, ...] = ()
+    validation_sha256: tuple[str, ...] = ()
+    objections: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    calibrated: tuple[str, ...] = ()
+    previous: Mapping[str, Any] = field(default_factory=dict)
+    added: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the step for JSON."""
+        data = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        data['drives'] = list(self.drives) or None
+        data['previous'] = {key: list(value) if isinstance(value, tuple) else value
+                            for key, value in self.previous.items()}
+        return {key: list(value) if isinstance(value, tuple) else value
+                for key, value in data.items()}
+
+    def as_values(self, prefix: str) -> dict[str, Any]:
+        """Return flat keys and values of a model file, empty lists left out."""
+        flat: dict[str, Any] = {}
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if entry.name == PREVIOUS:
+                flat.update((f'{prefix}.{PREVIOUS}.{key}', as_list(old))
+                            for key, old in value.items())
+            elif value != ():
+                flat[f'{prefix}.{entry.name}'] = as_list(value)
+        return flat
+
+
+def read_steps(values: Mapping[str, Any]) -> list[Step]:
+    """Return the steps of a model, oldest first.
+
+    Raises
+    ------
+    ModelError
+        For a ledger that holds what it must not.
+    """
+    blocks: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        if key == BLOCK and value in (None, {}):
+            continue
+        block, _, rest = key.partition('.')
+        if block == BLOCK:
+            step, _, name = rest.partition('.')
+            if not _STEP.fullmatch(step) or not name:
+                raise ModelError(key, value, f'stand under {BLOCK}.step_01, step_02, …')
+            blocks.setdefault(step, {})[name] = value
+    ordered = sorted(blocks, key=lambda name: int(name.removeprefix('step_')))
+    for number, name in enumerate(ordered, start=1):
+        if name != step_name(number):
+            raise ModelError(f'{BLOCK}.{step_name(number)}', MISSING,
+                             f'be there before {BLOCK}.{name}')
+    return [_read_step(f'{BLOCK}.{name}', blocks[name]) for name in ordered]
+
+
+def step_name(number: int) -> str:
+    """Return the name of the n-th step, counted from 1."""
+    return f'step_{number:02d}'
+
+
+def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -> dict[str, Any]:
+    """Return the values `after` with a step that leads to them from the values `before`."""
+    changed = {key for key in {*before, *after}
+               if not key.startswith(f'{BLOCK}.') and as_list(before.get(key, MISSING)) != as_list(
+                   after.get(key, MISSING))}
+    gone = changed - after.keys()
+    if gone:
+        raise ValueError(f'a step adds and changes, but {sorted(gone)} would go')
+    kept = Step(**{**{entry.name: getattr(step, entry.name) for entry in fields(step)},
+                   PREVIOUS: {key: before[key] for key in before if key in changed},
+                   ADDED: tuple(key for key in after if key in changed - before.keys())})
+    number = len(read_steps(before)) + 1
+    return {**after, **kept.as_values(f'{BLOCK}.{step_name(number)}')}
+
+
+def without_last_step(values: Mapping[str, Any]) -> tuple[dict[str, Any], Step]:
+    """Return the values as they were before the last step, and that step.
+
+    Raises
+    ------
+    ModelError
+        Where there is none, or where what it added is not there any more.
+    """
+    steps = read_steps(values)
+    if not steps:
+        raise ModelError(BLOCK, MISSING, 'hold a step that can be taken back')
+    last, prefix = steps[-1], f'{BLOCK}.{step_name(len(steps))}.'
+    for key in (*last.added, *last.previous):
+        if key not in values:
+            raise ModelError(key, MISSING, f'be there: {prefix[:-1]} set it, and taking it back '
+                             'would not give the model that was')
+    kept = {key: value for key, value in values.items()
+            if not key.startswith(prefix) and key not in last.added}
+    return {**kept, **last.previous}, last
+
+
+def original_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values with numbers of the robot as they were before the first step.
+
+    Effects stay. What a fit may move within a tolerance is thus counted from what the file said
+    at first, however many fits there were.
+    """
+    original = dict(values)
+    for step in reversed(read_steps(values)):
+        original.update((key, value) for key, value in step.previous.items()
+                        if not key.startswith('effects.'))
+    return original
+
+
+def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
+    found: dict[str, Any] = {
+        PREVIOUS: {name.removeprefix(f'{PREVIOUS}.'): value for name, value in block.items()
+                   if name.startswith(f'{PREVIOUS}.')}}
+    for entry in fields(Step):
+        key = f'{prefix}.{entry.name}'
+        if entry.name == PREVIOUS:
+            continue
+        if entry.name not in block:
+            if entry.default is NO_DEFAULT and entry.default_factory is NO_DEFAULT:
+                raise ModelError(key, MISSING, 'be given')
+            continue
+        found[entry.name] = _checked(key, block[entry.name], str(entry.type))
+    unknown = [name for name in block if name.split('.')[0] not in {f.name for f in fields(Step)}]
+    if unknown:
+        raise UnknownNameError('key', f'{prefix}.{unknown[0]}',
+                               [f'{prefix}.{entry.name}' for entry in fields(Step)])
+    return Step(**found)
+
+
+def _checked(key: str, value: Any, kind: str) -> Any:
+    rules = {'str': 'a word', 'bool': 'true or false', 'float': 'a number'}
+    element = kind.removeprefix('tuple[').removesuffix(', ...]')
+    if kind != element:
+        if isinstance(value, str) or not isinstance(value, Sequence):
+            raise ModelError(key, value, 'be a list')
+        return tuple(_checked(key, item, element) for item in value)
+    right = {'str': isinstance(value, str), 'bool': isinstance(value, bool),
+             'float': isinstance(value, (int, float)) and not isinstance(value, bool)}[element]
+    if not right:
+        raise ModelError(key, value, f'be {rules[element]}')
+    return float(value) if element == 'float' else value

@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What tells one model from every other: the SHA-256 of its values."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.keys import ARM_URDF
+
+
+def fingerprint(model: ForceModel) -> str:
+    """Return the SHA-256 of the values in force, which changes with every parameter."""
+    values: dict[str, Any] = dict(model.values)
+    if model.content:
+        values[ARM_URDF] = model.content  # wherever the file lies
+    return hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()

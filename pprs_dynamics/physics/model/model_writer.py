@@ -1,0 +1,336 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Writer of model files: every key in its place, as ROS 2 and people read them.
+
+A file that exists is edited: what does not change keeps its place and its comments, so that a
+diff against the old one shows what was changed and nothing else. The blocks `effects` and
+`history`, which commands write, are written anew at the end.
+
+A library that keeps comments, ruamel.yaml, formats the whole file anew. Of 15 forms in which a
+model file may be written it changed untouched lines in nine: four spaces of indentation (40
+lines), values in a column, spaces within brackets, lists over several lines, `~`, `.1E-2`, an
+anchor, what follows `---`. It also writes 1e-05, which is a word for YAML 1.1. Hence an editor.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.model.keys import ARM_JOINTS, ARM_URDF, Key, as_list, keys_of
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import (
+    other_nodes,
+    parse_parameters,
+    read_parameters,
+)
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.system.atomic_file import write_text
+
+WRITTEN = ('effects', 'history')  # blocks of commands; the rest is people's
+INDENT = '  '
+DEPTH = 2  # of the keys, below /** and ros__parameters
+COMMENT_COLUMN = 46
+# Words that YAML would take for something else, and those that need no quotes.
+PLAIN = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
+NOT_PLAIN = {'true', 'false', 'yes', 'no', 'on', 'off', 'null', 'y', 'n', 'nan', 'inf'}
+
+
+def write_model(path: str | PathLike[str], values: Mapping[str, Any],
+                base: str | PathLike[str] | None = None) -> None:
+    """Write a model file atomically.
+
+    Parameters
+    ----------
+    path : path
+    values : mapping
+        Flat keys and values, as of `DriveModel.values` or `read_parameters`.
+    base : path, optional
+        The model file that is to be edited; its keys that `values` does not name, as those of
+        nodes, stay.
+
+    Raises
+    ------
+    ModelError
+        For values that are no model, or a path that is the base itself.
+    UnreadableFileError
+        Where a file cannot be read or written.
+    """
+    folder = Path(path).absolute().parent
+    if ARM_URDF in values:
+        # Files say where the URDF is from where they are.
+        urdf = Path(base or path).absolute().parent / values[ARM_URDF]
+        values = {**values, ARM_URDF: os.path.relpath(urdf, folder)}
+    if base is None:
+        write_text(path, format_model(values, str(path)))
+        return
+    refuse_same_file(path, base)
+    write_text(path, edit_model(Path(base).read_text(encoding='utf-8'),
+                                {**kept_parameters(base), **values}, str(path)))
+
+
+def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> None:
+    """Raise ModelError where an output would replace the model it was made from."""
+    if os.path.exists(path) and os.path.samefile(path, base):
+        raise ModelError('--output', str(path), 'be another file than the model: the old one is '
+                         'never touched')
+
+
+def kept_parameters(base: str | PathLike[str]) -> dict[str, Any]:
+    """Return the keys of nodes in a model file, and their values."""
+    parameters = read_parameters(base)
+    keys = keys_of(parameters)
+    return {key: value for key, value in parameters.items()
+            if key not in keys and key.split('.')[0] not in (*WRITTEN, 'tolerances')}
+
+
+def format_model(values: Mapping[str, Any], path: str = '') -> str:
+    """Return a complete model file, its keys in order and with their units.
+
+    Parameters
+    ----------
+    values : mapping
+    path : str
+        Of the file that it is for; paths in values count from its folder.
+
+    Raises
+    ------
+    ModelError
+        For values that are no model.
+    """
+    build_model(values, path)
+    keys = keys_of(values)
+    ordered = {key: values[key] for key in keys if key in values}
+    ordered.update((key, value) for key, value in values.items() if key not in ordered
+                   and not key.startswith(tuple(f'{block}.' for block in WRITTEN)))
+    lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH, keys),
+             *_written_blocks(values)]
+    return _verified('\n'.join(lines) + '\n', values)
+
+
+def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
+    """Return the text of a model file with other values.
+
+    Parameters
+    ----------
+    text : str
+        Of a model file.
+    values : mapping
+        All flat keys and values that it shall hold; keys that it does not hold and that have
+        their default stay out.
+    path : str
+        See `format_model`.
+
+    Raises
+    ------
+    ModelError
+        For values that are no model.
+    """
+    build_model(values, path)
+    old = parse_parameters(text)
+    keys = keys_of(values)
+    wanted = {key: value for key, value in values.items()
+              if key in old or key not in keys or as_list(value) != as_list(keys[key].default)}
+    try:
+        edited = _edited(text, old, wanted)
+        if _same(parse_parameters(edited), wanted):
+            return edited
+    except (_NotEditableError, yaml.YAMLError, ModelError):
+        pass
+    # A file of a form that cannot be edited in place.
+    others = other_nodes(text)
+    return format_model(values, path) + (yaml.safe_dump(others, sort_keys=False) if others else '')
+
+
+class _NotEditableError(Exception):
+    """Values cannot be replaced one by one in a file of this form."""
+
+
+def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    block = _model_block(root)
+    if block.flow_style or not block.value:
+        raise _NotEditableError
+    changes: list[tuple[int, int, str]] = []
+    places = dict(_places(block))
+    lines = text.splitlines(keepends=True)
+    starts = [0]
+    for line in lines:
+        starts.append(starts[-1] + len(line))
+    new = {}
+    for key, value in wanted.items():
+        if key.split('.')[0] in WRITTEN or as_list(old.get(key)) == as_list(value):
+            continue
+        node = places.get(key)
+        if node is None:
+            new[key] = value
+        elif isinstance(node, yaml.CollectionNode) and not node.flow_style:
+            changes.append((node.start_mark.index, starts[_last_line(node) + 1] - 1,
+                            _value(value)))
+        else:
+            changes.append(_replacement(text, node, _value(value)))
+    # The written blocks go, with their lines, and come anew after the last key.
+    end = max(_last_line(node) for key, node in block.value) + 1
+    for key, node in block.value:
+        if key.value.split('.')[0] in WRITTEN:
+            changes.append((starts[key.start_mark.line], starts[_last_line(node) + 1], ''))
+    indent = block.value[0][0].start_mark.column
+    there = {key.value.split('.')[0] for key, _ in block.value}
+    keys = keys_of(wanted)
+    whole = {key: value for key, value in new.items()
+             if key in keys and key.split('.')[0] not in there}
+    shift = ' ' * (indent - DEPTH * len(INDENT))
+    blocks = '\n'.join([
+        *(f'{" " * indent}{key}: {_value(value)}' for key, value in new.items()
+          if key not in whole),
+        *(shift + line for line in _lines(whole, DEPTH, keys)),
+        *_written_blocks(wanted, indent)])
+    if not text.endswith('\n') and end == len(lines):
+        blocks = '\n' + blocks
+    changes.append((starts[end], starts[end], blocks + '\n' * bool(blocks)))
+    for start, stop, change in sorted(changes, key=lambda change: change[:2], reverse=True):
+        text = text[:start] + change + text[stop:]
+    return text
+
+
+def _replacement(text: str, node: yaml.Node, value: str) -> tuple[int, int, str]:
+    """Return where a value stands and what shall, a comment after it in its column."""
+    start, end = node.start_mark.index, node.end_mark.index
+    space = re.compile(r' {2,}(?=#)').match(text, end)
+    if space is None:
+        return start, end, value
+    width = end - start + len(space.group())
+    return start, start + width, value.ljust(width - 2) + '  '
+
+
+def _model_block(root: Any) -> yaml.MappingNode:
+    """Return the mapping of the model's parameters."""
+    for name in ('/**', None):
+        for key, node in root.value:
+            if name in (None, key.value):
+                for inner, block in node.value:
+                    if inner.value == 'ros__parameters' and isinstance(block, yaml.MappingNode):
+                        return block
+    raise _NotEditableError
+
+
+def _places(block: yaml.MappingNode, prefix: str = '') -> Iterator[tuple[str, yaml.Node]]:
+    for key, node in block.value:
+        if isinstance(node, yaml.MappingNode) and node.value:
+            yield from _places(node, f'{prefix}{key.value}.')
+        else:
+            yield prefix + key.value, node
+
+
+def _last_line(node: yaml.Node) -> int:
+    """Return the last line of a value; of a block, not the comments after it."""
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        return _last_line(last[1] if isinstance(last, tuple) else last)
+    mark = node.end_mark
+    return int(mark.line - (mark.column == 0 and mark.line > node.start_mark.line))
+
+
+def _written_blocks(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
+    found = {key: values[key] for block in WRITTEN for key in sorted(
+        (key for key in values if key.startswith(f'{block}.')),
+        key=lambda key: _rank(key, values))}
+    return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
+
+
+def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
+    """Return where a key of the written blocks stands: effects as added, drives in order.
+
+    `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
+    and a node takes no effect whose parameters it does not have.
+    """
+    active, drives = values.get('effects.active') or (), values.get(ARM_JOINTS, DRIVES)
+    block, name, *rest = key.split('.')
+    if block != 'effects':
+        return (2,)
+    if not rest:
+        return (1,)
+    order = active.index(name) if name in active else len(active)
+    return (0, order, list(drives).index(rest[0]) if rest[0] in drives else -1)
+
+
+def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],
+           prefix: str = '') -> list[str]:
+    """Return flat keys as nested lines, each followed by what it is."""
+    found: list[str] = []
+    done = set()
+    for key in values:
+        rest = key.removeprefix(prefix)
+        name = rest.split('.')[0]
+        if name in done:
+            continue
+        done.add(name)
+        start = INDENT * depth + f'{name}:'
+        below = {k: v for k, v in values.items() if k.startswith(f'{prefix}{name}.')}
+        if below:
+            found += [start, *_lines(below, depth + 1, keys, f'{prefix}{name}.')]
+            continue
+        line = f'{start} {_value(values[key])}'
+        comment = _comment(key, keys)
+        found.append(f'{line.ljust(COMMENT_COLUMN)}  # {comment}' if comment else line)
+    return found
+
+
+def _comment(key: str, keys: Mapping[str, Key]) -> str:
+    known = keys.get(key)
+    if known is not None:
+        return known.description + (f' [{known.unit}]' if known.unit else '')
+    block, _, rest = key.partition('.')
+    effect = find_effect(rest.partition('.')[0]) if block == 'effects' else None
+    for parameter in effect.parameters if effect else ():
+        if rest.rpartition('.')[2] == parameter.name:
+            return f'{parameter.symbol}, {parameter.description} [{parameter.unit}]'
+    return ''
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f'[{", ".join(_value(element) for element in value)}]'
+    if isinstance(value, bool):
+        return 'true' if value else 'false'
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, int) or value is None:
+        return 'null' if value is None else str(value)
+    if isinstance(value, str) and PLAIN.fullmatch(value) and value.lower() not in NOT_PLAIN:
+        return value
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    """Return the shortest text that gives this very number, and never a whole one."""
+    if not math.isfinite(value):
+        return '.nan' if math.isnan(value) else '.inf' if value > 0 else '-.inf'
+    text = repr(value)
+    mantissa, e, exponent = text.partition('e')
+    if not e:
+        return text
+    # 1e-05 is a number for ROS 2 and a word for YAML 1.1; 1.0e-05 is a number for both.
+    sign = '' if exponent[0] in '+-' else '+'
+    return f'{mantissa if "." in mantissa else mantissa + ".0"}e{sign}{exponent}'
+
+
+def _verified(text: str, values: Mapping[str, Any]) -> str:
+    found = parse_parameters(text)
+    assert _same(found, values), 'a model file must hold what was written'
+    return text
+
+
+def _same(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+    return {k: as_list(v) for k, v in found.items()} == {k: as_list(v) for k, v in wanted.items()}

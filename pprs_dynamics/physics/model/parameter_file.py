@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""ROS 2 parameter files, in YAML, as flat keys and values of a model."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.physics.model.keys import ADDED, NAMES
+from pprs_dynamics.system.bounded_yaml import parse, read_text
+
+DEFAULT_MODEL = 'config/paper.yaml'
+
+
+def find_file(path: str | PathLike[str]) -> Path:
+    """Return the file itself, or the package's own of that name (e.g. config/paper.yaml).
+
+    Raises
+    ------
+    UnreadableFileError
+        Where there is neither.
+    """
+    given = Path(path)
+    if given.exists() or given.is_absolute():
+        return given
+    package = Path(__file__).resolve().parents[2]
+    # A source tree or an editable install; a `pip install --target`; a prefix or workspace,
+    # four folders above <prefix>/lib/pythonX.Y/site-packages/pprs_dynamics.
+    roots = [package.parent, package.parent / 'share/pprs_dynamics']
+    roots += [prefix / 'share/pprs_dynamics' for prefix in package.parents[2:5]]
+    roots.append(Path(sys.prefix) / 'share/pprs_dynamics')
+    for root in roots:
+        if (root / given).is_file():
+            return root / given
+    raise UnreadableFileError(path, 'no such file, nor one of that name in the package')
+
+
+def default_parameters() -> dict[str, Any]:
+    """Return the flat keys and values of the paper's robot."""
+    return read_parameters(find_file(DEFAULT_MODEL))
+
+
+def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
+    """Return the flat keys and values of a ROS 2 parameter file.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be read, is not YAML within bounds, or has no `ros__parameters`.
+    ModelError
+        For a list that mixes whole and decimal numbers, which ROS 2 refuses.
+    """
+    return parse_parameters(read_text(path), path)
+
+
+def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any]:
+    """Return the flat keys and values of a parameter file's text; `path` is named in errors."""
+    flat: dict[str, Any] = {}
+    for key, value in _flatten(_parameters_block(path, parse(text, path))):
+        if key in flat:
+            raise ModelError(key, value, 'stand once: it is given nested and with dots', str(path))
+        flat[key] = value
+        if isinstance(value, list) and len({type(element) for element in value}) > 1:
+            raise ModelError(key, value, 'hold elements of one type, as ROS 2 demands '
+                             '(write 0.0, not 0, among decimal numbers)', str(path))
+    return flat
+
+
+def other_nodes(text: str) -> dict[str, Any]:
+    """Return the blocks of a parameter file's text that are for single nodes, not the model."""
+    content = parse(text)
+    chosen = _parameters_block('', content)
+    return {node: block for node, block in content.items()
+            if block['ros__parameters'] is not chosen}
+
+
+def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
+    if not isinstance(content, Mapping) or not content:
+        raise UnreadableFileError(path, 'not a model file: it must map /** to ros__parameters')
+    blocks: dict[str, Mapping[str, Any]] = {}
+    for node, block in content.items():
+        if not isinstance(block, Mapping) or not isinstance(block.get('ros__parameters'), Mapping):
+            raise UnreadableFileError(
+                path, f'not a model file: {node} must hold a mapping ros__parameters')
+        blocks[node] = block['ros__parameters']
+    if '/**' in blocks:
+        for node, block in blocks.items():
+            for key, _ in _flatten(block) if node != '/**' else ():
+                if key in NAMES or key.startswith(ADDED):
+                    raise UnreadableFileError(
+                        path, f'{key} of the model stands under {node}: put it under /**, for '
+                        'every node and command alike')
+        return blocks['/**']
+    if len(blocks) > 1:
+        raise UnreadableFileError(
+            path, f'parameters of {len(blocks)} nodes and none for all: put the model under /**')
+    return next(iter(blocks.values()))
+
+
+def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    for key, value in block.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flatten(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}', value

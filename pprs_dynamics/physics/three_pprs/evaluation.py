@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Evaluation of the equations over samples: compiled, on floats, or on arrays.
+
+A *kernel* is a function `kernel(p, s, *tables)` that reads sample s of tables, evaluates
+equations and writes sample s of other tables; it returns whether the sample is sound. Tables are
+(N, k) float64, `p` is a named tuple of parameters. With Numba a kernel is compiled, and called
+for every s in turn. Without, s is one sample of memoryviews, whose elements are Python's floats
+and faster than NumPy's; or, of many samples, a slice, so that the same lines work on arrays.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
+
+Kernel = Callable[..., Any]
+
+PLAIN = 'PPRS_DYNAMICS_PLAIN'  # set to anything but 0, nothing is compiled
+BLOCK = 2048  # samples: about 100 intermediate arrays then stay in a core's cache
+FEW = 8  # samples, up to which floats are faster than arrays
+
+_loops: dict[Kernel, Callable[..., int]] = {}
+_compile: Callable[[Kernel, tuple[Any, ...]], Callable[..., int]] | None = None
+_decided = False
+
+
+def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
+    """Run a kernel over all samples; return the first that is not sound, or -1.
+
+    Parameters
+    ----------
+    kernel : function
+    parameters : KernelParameters
+        Of the same form in every call with this kernel.
+    tables : arrays
+        C-contiguous; the first is (N, k), N samples.
+    """
+    loop = _loops.get(kernel)
+    if loop is None:
+        if not is_compiled():
+            return evaluate_plainly(kernel, parameters, *tables)
+        assert _compile is not None
+        loop = _loops[kernel] = _compile(kernel, parameters.named)
+    return loop(parameters.row, *tables)
+
+
+def evaluate_if_ready(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
+    """Run a kernel as `evaluate` does, compiled only where something has been compiled before."""
+    loop = _loops.get(kernel)
+    if loop is not None:
+        return loop(parameters.row, *tables)
+    return (evaluate if _decided else evaluate_plainly)(kernel, parameters, *tables)
+
+
+def evaluate_plainly(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
+    """Run a kernel as `evaluate` does, never compiled."""
+    samples, p = len(tables[0]), parameters.named
+    if samples <= FEW:
+        try:
+            return _on_floats(kernel, samples, p, tables)
+        except (ZeroDivisionError, OverflowError, ValueError):
+            pass  # arrays answer with infinities instead
+    with np.errstate(all='ignore'):
+        for start in range(0, samples, BLOCK):
+            sound = kernel(p, slice(start, start + BLOCK), *tables)
+            if not np.all(sound):
+                return start + int(np.argmin(sound)) if np.ndim(sound) else start
+    return -1
+
+
+def is_compiled() -> bool:
+    """Return whether kernels are compiled here."""
+    global _compile, _decided
+    if not _decided:
+        _decided = True
+        if os.environ.get(PLAIN, '0') in ('', '0'):
+            # Half a second, so only where something is evaluated.
+            from pprs_dynamics.physics.mechanism.compilation import compiler
+
+            _compile = compiler()
+    return _compile is not None
+
+
+def _on_floats(
+    kernel: Kernel, samples: int, p: tuple[Any, ...], tables: tuple[Array, ...],
+) -> int:
+    views = [table.data for table in tables]
+    for s in range(samples):
+        if not kernel(p, s, *views):
+            return s
+    return -1

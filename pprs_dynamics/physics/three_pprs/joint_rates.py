@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Rates in the passive joints, and the turnover of their friction."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
+from pprs_dynamics.physics.mechanism.vectors import ChainVector
+from pprs_dynamics.physics.three_pprs.chains import CHAINS
+from pprs_dynamics.physics.three_pprs.evaluation import evaluate
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import read_chains
+from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
+
+
+class Turnover(NamedTuple):
+    """sgn(s) / s in C_i and in A_i [s/rad]."""
+
+    revolute: Any
+    spherical: Any
+
+
+def relative_rate(u_dot: Any, omega: ChainVector) -> ChainVector:
+    """Return omega_n = u_dot_i n_i - omega, of the rod relative to the platform [rad/s]."""
+    return ChainVector(-omega.e, u_dot - omega.n, -omega.k)                    # Eq. (9)
+
+
+def length(v: ChainVector) -> Any:
+    """Return |v|."""
+    return sqrt(v.e * v.e + v.n * v.n + v.k * v.k)
+
+
+def turnover(u_dot: Any, omega: ChainVector, width: Any) -> Turnover:
+    """Return the turnover of friction in the joints of a chain, within `width` [rad/s]."""
+    return Turnover(sign_over_speed(abs(u_dot), width),
+                    sign_over_speed(length(relative_rate(u_dot, omega)), width))
+
+
+def turnover_table(chains: Array, width: float) -> Array:
+    """Return `turnover` for a table of chains: C_i, then A_i, (N, 6)."""
+    table = np.empty((len(chains), 6))
+    evaluate(turnover_kernel, KernelParameters(TurnoverParameters(width)), chains, table)
+    return table
+
+
+class TurnoverParameters(NamedTuple):
+    """Parameters of `turnover_kernel`: the width in which friction turns over [rad/s]."""
+
+    width: Any
+
+
+def turnover_kernel(p: TurnoverParameters, s: Any, chains: Any, table: Any) -> Any:
+    """Fill a table of `turnover`."""
+    rods = read_chains(chains, s)
+    for i in range(CHAINS):
+        table[s, i], table[s, CHAINS + i] = turnover(rods[i].u_dot, rods[i].omega, p.width)
+    return True

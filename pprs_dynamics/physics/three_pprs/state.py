@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Motion, Jacobians and frictionless forces of the mechanism, as effects take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
+from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
+from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
+from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, StructureLoad, solve_bodies
+from pprs_dynamics.physics.three_pprs.robot import DRIVES, Geometry, Robot
+
+
+class DriveStates(Protocol):
+    """Protocol of N samples of D drives, whatever they move, as effects on drives take them."""
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+
+    @property
+    def time(self) -> Array | None:
+        """[s], (N,), where known."""
+
+    @property
+    def position(self) -> Array:
+        """[m], (N, D)."""
+
+    @property
+    def velocity(self) -> Array:
+        """[m/s], (N, D)."""
+
+    @property
+    def acceleration(self) -> Array:
+        """[m/s^2], (N, D)."""
+
+    @property
+    def direction(self) -> Array:
+        """Sign of the velocities, sgn, (N, D)."""
+
+    @property
+    def guide_load(self) -> Array:
+        """[N], (N, D)."""
+
+
+class MechanismKinematics:
+    """Kinematics of a mechanism along a motion, independent of its masses; evaluated lazily.
+
+    Raises
+    ------
+    WorkspaceError, SingularityError
+        On first use, see `solve_inverse_kinematics` and `inverse_table`.
+    """
+
+    def __init__(
+        self, geometry: Geometry, motion: PlatformMotion, minimum_sine: float,
+        condition_limit: float,
+    ) -> None:
+        self.geometry, self.motion = geometry, motion
+        self.minimum_sine, self.condition_limit = minimum_sine, condition_limit
+
+    @cached_property
+    def chain_table(self) -> Array:
+        """Motion of the chains for kernels."""
+        return chain_table(self.geometry, self.motion, self.minimum_sine)
+
+    @cached_property
+    def inverse_table(self) -> Array:
+        """[B]^-1 for kernels, (N, 36)."""
+        return inverse_table(self.geometry, self.chain_table, self.condition_limit)
+
+    @cached_property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration of the drives [m, m/s, m/s^2], (N, 6) each."""
+        chains = self.chains
+        return chains.position, chains.velocity, chains.acceleration
+
+    @cached_property
+    def chains(self) -> ChainKinematics:
+        """Motion of the chains."""
+        return ChainKinematics.from_table(self.chain_table)
+
+    @cached_property
+    def jacobians(self) -> Jacobians:
+        """Jacobians of the mechanism."""
+        return Jacobians(self.geometry, self.chains, self.inverse_table.reshape(-1, 6, 6))
+
+    def direction(self, width: float | tuple[float, ...]) -> Array:
+        """Return sgn of the drive velocities, (N, 6), turning over within widths [m/s]."""
+        return self._kept('direction', width, lambda: np.asarray(
+            smooth_sign(self.chains.velocity, np.asarray(width))))
+
+    def turnover(self, width: float) -> Array:
+        """Return sgn(s) / s of the joints C_i, then A_i, (N, 6), within `width` [rad/s]."""
+        return self._kept('turnover', width, lambda: turnover_table(self.chain_table, width))
+
+    def _kept(self, name: str, width: Any, found: Callable[[], Array]) -> Array:
+        kept: tuple[Any, Array] | None = self.__dict__.get(f'_{name}')
+        if kept is None or not np.array_equal(kept[0], width):
+            # The last one only: a fit tries many widths.
+            kept = self.__dict__[f'_{name}'] = (width, found())
+        return kept[1]
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismState:
+    """Motion, Jacobians and frictionless forces at N samples.
+
+    Drive quantities (`position`, `velocity`, `acceleration`, `guide_load`) are (N, 6) in drive
+    order; chain quantities (N, 3).
+    """
+
+    robot: Robot
+    motion: PlatformMotion
+    kinematics: MechanismKinematics
+    reversal: Reversal
+    printed: bool = False
+    load: StructureLoad | None = None
+
+    @classmethod
+    def unsolved(
+        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: MechanismKinematics,
+    ) -> MechanismState:
+        """Return the state of other fields and these; in a fifth of the constructor's time."""
+        state = object.__new__(cls)
+        state.__dict__.update(fields, motion=motion, kinematics=kinematics)
+        return state
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        return DRIVES
+
+    @property
+    def chains(self) -> ChainKinematics:
+        """Motion of drives and rods."""
+        return self.kinematics.chains
+
+    @property
+    def jacobians(self) -> Jacobians:
+        """Jacobians of the mechanism."""
+        return self.kinematics.jacobians
+
+    @cached_property
+    def rigid_body(self) -> RigidBody:
+        """Frictionless drive forces and reactions."""
+        return solve_bodies(self.robot, self.motion, self.kinematics.chain_table,
+                            self.kinematics.inverse_table, self.printed, self.load)
+
+    @property
+    def rigid_force(self) -> Array:
+        """Frictionless drive forces [N], (N, 6)."""
+        return self.rigid_body.force
+
+    @property
+    def time(self) -> Array | None:
+        """Times of the samples [s], (N,), where known."""
+        return self.motion.time
+
+    @property
+    def position(self) -> Array:
+        """Drive positions q [m]."""
+        return self.kinematics.drive_motion[0]
+
+    @property
+    def velocity(self) -> Array:
+        """Drive velocities [m/s]."""
+        return self.kinematics.drive_motion[1]
+
+    @property
+    def acceleration(self) -> Array:
+        """Drive accelerations [m/s^2]."""
+        return self.kinematics.drive_motion[2]
+
+    @property
+    def guide_load(self) -> Array:
+        """Normal forces on the drives' guides [N]."""
+        return self.rigid_body.guide_load
+
+    @property
+    def direction(self) -> Array:
+        """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
+        return self.kinematics.direction(self.reversal.velocity)
+
+    def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
+        """Return a state of this motion with other bodies, and with an additional load.
+
+        The robot must have the geometry that the state was solved for.
+        """
+        if load is None:
+            load = self.load
+        elif self.load is not None:
+            load = self.load + load
+        return replace(self, robot=robot, load=load)
+
+
+def solve_mechanism(
+    robot: Robot, motion: PlatformMotion, *, reversal: Reversal | None = None,
+    printed: bool = False, minimum_sine: float = 1e-6, condition_limit: float = np.inf,
+) -> MechanismState:
+    """Return the state of the mechanism for a platform motion.
+
+    Raises
+    ------
+    WorkspaceError, SingularityError
+        See `solve_inverse_kinematics` and `inverse_table`.
+    """
+    kinematics = MechanismKinematics(robot.geometry, motion, minimum_sine, condition_limit)
+    state = MechanismState(robot, motion, kinematics, reversal or Reversal(), printed)
+    _ = kinematics.inverse_table
+    return state

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""From a request to the forces that may go out: the model, its memory, scale and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import LimitError
+from pprs_dynamics.physics.mechanism.pose_spline import load_splines
+from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
+from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.ros.conversions import NANOSECONDS
+from pprs_dynamics.ros.feedforward_settings import CLAMP
+from pprs_dynamics.ros.model_parameters import NodeModel
+from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.trajectory_request import SPLINE, Motion, TrajectoryRequest
+
+
+class Answer(NamedTuple):
+    """What goes out for a request.
+
+    Parameters
+    ----------
+    request : TrajectoryRequest
+    forces : Forces
+        As the model gave them.
+    effort : (N, D) array
+        What goes out [N, N m; A where commands are currents]: scaled and within the limits.
+    clamp_reason : str
+        Which effort was clamped; empty where none was.
+    """
+
+    request: TrajectoryRequest
+    forces: Forces
+    effort: Array
+    clamp_reason: str = ''
+
+    @property
+    def clamped(self) -> bool:
+        """Whether an effort was over its limit."""
+        return bool(self.clamp_reason)
+
+
+class Feedforward:
+    """The model in force, what its effects remember, and what may go out.
+
+    Parameters
+    ----------
+    model : DriveModel or ArmModel
+    own : mapping
+        The node's parameters, see `feedforward_settings`.
+    """
+
+    def __init__(self, model: NodeModel, own: Mapping[str, Any]) -> None:
+        self._model: Any = model
+        self._memory: ModelState | None = None
+        self._remembers = False
+        # The model that remembered last, and what.
+        self._before: tuple[NodeModel, ModelState] | None = None
+        self._epoch: int | None = None
+        self._last: TrajectoryRequest | None = None
+        self.use(model, own)
+
+    def use(self, model: NodeModel, own: Mapping[str, Any]) -> None:
+        """Go on with another model; effects that both have keep their memory."""
+        if self._memory is not None:
+            self._before = self._model, self._memory
+        # Made with the next answer, which is refused where an effect fails at it.
+        self._memory = None
+        self._model, self._scale = model, own['feedforward_scale'] * model.amperes
+        self._scales = bool((self._scale != 1).any())
+        if own['missing_derivatives'] == SPLINE:
+            load_splines()
+        self._clamps = own['limit_policy'] == CLAMP
+        self._limits: DriveLimits = model.limits
+        if own['effort_limits']:
+            self._limits = model.limits.with_efforts(own['effort_limits'])
+
+    @property
+    def parts(self) -> list[str]:
+        """Names of the force parts of the model in force."""
+        return [RIGID_BODY, *(e.name for e in self._model.effects if not e.is_measurement)]
+
+    def part(self, answer: Answer, name: str) -> Array:
+        """Return one part of the first forces, scaled as they are, (D,)."""
+        part: Array = self._scale * answer.forces.parts[name][0]
+        return part
+
+    def answer(self, request: TrajectoryRequest) -> Answer:
+        """Return what goes out for a request.
+
+        Raises
+        ------
+        Rejection, WorkspaceError, SingularityError, LimitError, EffectError
+            Where nothing may; the memory is then what it was.
+        """
+        memory = self._memory or self._made_memory()
+        if not self._remembers:
+            forces = self._model.drive_forces(request.motion, memory)
+            answer = self._checked(request, forces)
+        else:
+            # Memory advances with what is executed, the first point, once that is accepted.
+            motion, ahead = self._timed(request), memory.copy()
+            answer = self._checked(request, self._model.drive_forces(motion, ahead))
+            if len(motion) > 1:
+                ahead = memory.copy()
+                self._model.drive_forces(motion[:1], ahead)
+            self._memory = ahead
+        self._last = request
+        return answer
+
+    def _made_memory(self) -> ModelState:
+        self._memory = memory = (self._model.continued_state(*self._before) if self._before
+                                 else self._model.initial_state())
+        self._remembers = memory.has_memory
+        return memory
+
+    def hold(self, gravity: bool) -> Answer:
+        """Return what goes out to hold the last accepted pose at rest, or zeros.
+
+        Effects of other packages that fail are left out: a drive must be held without them, too.
+
+        Raises
+        ------
+        Rejection, PprsError
+            Where there is no such force, e.g. as the model has changed since.
+        """
+        if self._last is None:
+            raise Rejection('EMPTY', 'no trajectory has been accepted')
+        # The forces at rest, not those of the way there: no memory of it.
+        motion = self._last.motion.held()
+        forces = self._model.sound_at(motion).drive_forces(motion)
+        effort = self._limits.clamped(self._scale * forces.total) if gravity else (
+            np.zeros_like(forces.total))
+        if not np.all(np.isfinite(effort)):
+            raise Rejection('OUTPUT', 'the model gave an effort that is not finite')
+        return Answer(self._last, forces, effort)
+
+    def _checked(self, request: TrajectoryRequest, forces: Forces) -> Answer:
+        effort = self._scale * forces.total if self._scales else forces.total
+        if self._limits.allow(effort, forces.drive_motion):
+            return Answer(request, forces, effort)
+        return self._looked_at(request, forces, effort)
+
+    def _looked_at(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> Answer:
+        """Return what goes out where something is not allowed, or raise what is wrong."""
+        position, velocity, acceleration = forces.drive_motion
+        for name, quantity in (('n effort', effort), (' drive velocity', velocity),
+                               (' drive acceleration', acceleration)):
+            if not np.isfinite(quantity).all():
+                raise Rejection('OUTPUT', f'the model gave a{name} that is not finite')
+        self._limits.check_strokes(position)
+        try:
+            self._limits.check_efforts(effort)
+        except LimitError as error:
+            if not self._clamps:
+                raise
+            return Answer(request, forces, self._limits.clamped(effort), str(error))
+        return Answer(request, forces, effort)
+
+    def _timed(self, request: TrajectoryRequest) -> Motion:
+        """Return the motion on one time scale for all messages, which memories go by."""
+        if self._epoch is None:
+            self._epoch = request.start
+        return request.motion.with_time(
+            (request.start - self._epoch + request.offsets) / NANOSECONDS)

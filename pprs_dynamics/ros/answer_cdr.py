@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The answers as CDR bytes: the same messages as rclpy would serialise, without the objects."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.physics.model.force_model import Forces
+from pprs_dynamics.ros.conversions import LATEST_SECOND, NANOSECONDS, frame_of
+from pprs_dynamics.ros.trajectory_cdr import LITTLE_ENDIAN, STAMP, WORD
+
+
+class AnswerBytes:
+    """Messages about some drives, serialised.
+
+    Parameters
+    ----------
+    drives : sequence of D str
+    """
+
+    def __init__(self, drives: Sequence[str]) -> None:
+        self._count = count = len(drives)
+        self._values = struct.Struct(f'<{count}d')
+        self._point = np.dtype([
+            *((name, [('count', '<u4', 2), ('values', '<f8', count)])
+              for name in ('positions', 'velocities', 'accelerations', 'effort')),
+            ('sec', '<i4'), ('nanosec', '<u4')])
+        # No dimensions, no offset, the numbers, and what aligns them.
+        self._commands = _padded(LITTLE_ENDIAN + WORD.pack(0) + WORD.pack(0) + WORD.pack(count), 8)
+        self._names = _names(drives)
+
+    def commands(self, effort: Array) -> bytes:
+        """Return a std_msgs/Float64MultiArray that holds the drives' efforts."""
+        return self._commands + self._values.pack(*effort.tolist())
+
+    def joint_state(self, stamp: int, effort: Array, position: Array | None = None,
+                    velocity: Array | None = None) -> bytes:
+        """Return a sensor_msgs/JointState of the drives at a time [ns]."""
+        message = LITTLE_ENDIAN + _stamp(stamp) + self._names
+        for values in (position, velocity, effort):
+            if values is None:
+                message = _padded(message, 4) + WORD.pack(0)
+            else:
+                message = (_padded(_padded(message, 4) + WORD.pack(self._count), 8)
+                           + self._values.pack(*values.tolist()))
+        return message
+
+    def joint_trajectory(
+        self, start: int, offsets: Indices, forces: Forces, effort: Array,
+    ) -> bytes:
+        """Return a trajectory_msgs/JointTrajectory of all samples.
+
+        Parameters
+        ----------
+        start : int
+            Header stamp [ns].
+        offsets : (N,) array of int
+            time_from_start [ns].
+        forces : Forces
+            For the drives' motion.
+        effort : (N, D) array
+        """
+        points = np.zeros(len(offsets), self._point)
+        position, velocity, acceleration = forces.drive_motion
+        for name, values in (('positions', position), ('velocities', velocity),
+                             ('accelerations', acceleration), ('effort', effort)):
+            points[name]['count'][:, 0] = self._count
+            points[name]['values'] = values
+        seconds, nanoseconds = np.divmod(offsets, NANOSECONDS)
+        points['sec'] = np.minimum(seconds, LATEST_SECOND)
+        points['nanosec'] = nanoseconds
+        head = _padded(LITTLE_ENDIAN + _stamp(start) + self._names, 4) + WORD.pack(len(points))
+        # The first point's first length word may stand where its padding would be.
+        first = _padded(head + WORD.pack(self._count), 8)
+        return first + points.tobytes()[8:]
+
+
+def _stamp(moment: int) -> bytes:
+    seconds, rest = divmod(moment, NANOSECONDS)
+    return STAMP.pack(min(seconds, LATEST_SECOND), rest)
+
+
+def _text(word: str) -> bytes:
+    data = word.encode() + b'\x00'
+    return WORD.pack(len(data)) + data
+
+
+def _padded(data: bytes, size: int) -> bytes:
+    """Return data filled up to a multiple of the size, counted after the encapsulation."""
+    return data + bytes(-(len(data) - len(LITTLE_ENDIAN)) % size)
+
+
+def _names(drives: Sequence[str]) -> bytes:
+    """Return frame and names of the drives, as they follow a stamp."""
+    start = LITTLE_ENDIAN + bytes(STAMP.size)
+    message = _padded(start + _text(frame_of(drives)), 4) + WORD.pack(len(drives))
+    for drive in drives:
+        message = _padded(message, 4) + _text(drive)
+    return message[len(start):]

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""ROS 2 messages to motions and back: shapes and names, no mathematics."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Duration, Time
+from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.whole import message_in
+
+PLATFORM = 'platform'
+BASE_FRAMES = ('', 'base')
+NANOSECONDS = 1_000_000_000
+LATEST_SECOND = 2 ** 31 - 1
+
+
+def write_trajectory(
+    motion: PlatformMotion, stamp: Time, offsets: Sequence[int],
+) -> MultiDOFJointTrajectory:
+    """Return the message that asks for a platform motion.
+
+    Parameters
+    ----------
+    motion : PlatformMotion
+    stamp : builtin_interfaces/Time
+    offsets : sequence of int
+        time_from_start of every point [ns].
+    """
+    message = MultiDOFJointTrajectory(joint_names=[PLATFORM])
+    message.header.stamp, message.header.frame_id = stamp, BASE_FRAMES[1]
+    for sample, offset in enumerate(offsets):
+        x, y, z, w = motion.orientation[sample].tolist()
+        message.points.append(MultiDOFJointTrajectoryPoint(
+            transforms=[Transform(translation=_vector(motion.position[sample]),
+                                  rotation=Quaternion(x=x, y=y, z=z, w=w))],
+            velocities=[Twist(linear=_vector(motion.linear_velocity[sample]),
+                              angular=_vector(motion.angular_velocity[sample]))],
+            accelerations=[Twist(linear=_vector(motion.linear_acceleration[sample]),
+                                 angular=_vector(motion.angular_acceleration[sample]))],
+            time_from_start=duration(offset)))
+    return message
+
+
+def joint_state(
+    stamp: int, effort: Array, position: Array | None = None, velocity: Array | None = None,
+    drives: Sequence[str] = DRIVES,
+) -> JointState:
+    """Return efforts, and what else is known, at a time [ns]."""
+    message = JointState(name=list(drives), effort=_doubles(effort))
+    if position is not None and velocity is not None:
+        message.position, message.velocity = _doubles(position), _doubles(velocity)
+    message.header.stamp, message.header.frame_id = time(stamp), frame_of(drives)
+    return message
+
+
+def frame_of(drives: Sequence[str]) -> str:
+    """Return the frame of what drives say: a platform's `base`; that of joints means nothing."""
+    return BASE_FRAMES[1] if tuple(drives) == DRIVES else BASE_FRAMES[0]
+
+
+def read_drives(message: JointState, field: str, may_be_nan: bool = False,
+                drives: Sequence[str] = DRIVES) -> Array:
+    """Return one field of a JointState in the order of drives, matched by name, (D,).
+
+    Raises
+    ------
+    Rejection
+        Where a drive is missing, the field's length is not that of `name`, or a value is not
+        finite.
+    """
+    names, values = list(message.name), getattr(message, field)
+    missing = [drive for drive in drives if drive not in names]
+    if missing:
+        raise Rejection('NAMES', f'name is {names!r:.100}, must hold {missing[0]}')
+    if len(values) != len(names):
+        raise Rejection('SIZE', f'{field} has {len(values)} values, must have '
+                        f'{len(names)}, as name')
+    found = np.array([values[names.index(drive)] for drive in drives], dtype=float)
+    if may_be_nan:
+        # Not a number, and no measurement either.
+        return np.where(np.isfinite(found), found, np.nan)
+    if not np.all(np.isfinite(found)):
+        raise Rejection('NON_FINITE', f'{field} is {found.tolist()}, must be finite')
+    return found
+
+
+def read_measured(
+    data: bytes, drives: Sequence[str] = DRIVES,
+) -> tuple[int, Array, Array]:
+    """Return stamp [ns], positions and efforts, NaN where unknown, of a JointState's bytes.
+
+    Raises
+    ------
+    Rejection
+        As `message_in` and `read_drives`.
+    """
+    message = message_in(data, JointState)
+    return (nanoseconds(message.header.stamp), read_drives(message, 'position', drives=drives),
+            read_drives(message, 'effort', may_be_nan=True, drives=drives))
+
+
+def nanoseconds(moment: Time | Duration) -> int:
+    """Return a stamp or a duration in nanoseconds."""
+    return int(moment.sec) * NANOSECONDS + int(moment.nanosec)
+
+
+def time(moment: int) -> Time:
+    """Return a stamp from nanoseconds, held within what the message can say."""
+    seconds, rest = divmod(moment, NANOSECONDS)
+    return Time(sec=min(seconds, LATEST_SECOND), nanosec=rest)
+
+
+def duration(moment: int) -> Duration:
+    """Return a duration from nanoseconds, held within what the message can say."""
+    seconds, rest = divmod(moment, NANOSECONDS)
+    return Duration(sec=min(seconds, LATEST_SECOND), nanosec=rest)
+
+
+def _doubles(values: Array) -> array[float]:
+    """Return values in the form that messages take over without looking at each one."""
+    return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
+
+
+def _vector(values: Array) -> Vector3:
+    x, y, z = values.tolist()
+    return Vector3(x=x, y=y, z=z)
+

@@ -1,0 +1,303 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node `feedforward`: trajectories of a platform or of joints in, the drives' efforts out."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.model.margins import Margins, margins
+from pprs_dynamics.physics.model.model_fingerprint import fingerprint
+from pprs_dynamics.physics.model.preparation import prepare
+from pprs_dynamics.ros.answer import Answer, Feedforward
+from pprs_dynamics.ros.answer_cdr import AnswerBytes
+from pprs_dynamics.ros.conversions import NANOSECONDS
+from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
+from pprs_dynamics.ros.managed_node import ManagedNode
+from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.parameters import declare_own, drive_count
+from pprs_dynamics.ros.provenance import files_given
+from pprs_dynamics.ros.qos import UNANSWERED, publisher, subscription
+from pprs_dynamics.ros.rejection import CODES, Rejection
+from pprs_dynamics.ros.request_reader import reader_for
+from pprs_dynamics.ros.status import StatusReporter
+from pprs_dynamics.ros.timing import Durations
+from pprs_dynamics.ros.watchdog import CommandWatchdog
+
+# Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
+MARGINS_PERIOD = 0.01
+LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
+
+
+class FeedforwardNode(ExplainsRefusals, ManagedNode):
+    """Answers every valid trajectory with friction-compensated efforts of the drives.
+
+    A message that breaks a rule is rejected whole: nothing goes out, a counter rises, and the
+    reason stands in `~/status` and in the log. When commands go stale, when an effect of another
+    package fails, and when the node is deactivated or ended, `timeout_action` is done once.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        ManagedNode.__init__(
+            self, 'feedforward', allow_undeclared_parameters=True, **options)
+        self._publishers_made: list[Any] = []
+        self._parts: dict[str, Any] = {}
+        self._subscription: Any = None
+        self._watchdog: CommandWatchdog | None = None
+        self._failure: Exception | None = None
+        parameters = parameters_for(drive_count(self))
+        own = declare_own(self, parameters)
+        self._settings = ModelParameters(self, parameters, self._use_settings)
+        # Compiling or loading takes a second or more, for which no message should have to wait.
+        self.get_logger().info('loading the equations; the first time they are compiled, which '
+                               'may take some 15 s')
+        prepare(self._settings.model)
+        # Which drives there are, and by which message they are asked for, stays.
+        self._reader = reader_for(self._settings.model)
+        self._bytes = AnswerBytes(self._settings.model.drives)
+        self._feedforward = Feedforward(self._settings.model, self._settings.own)
+        self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
+                          **dict.fromkeys(CODES, 0)}
+        self._margins_due, self._margins = 0.0, Margins(None, 1.0, '')
+        self._compute_time, self._lag = Durations(), Durations()
+        self._counted = (0, time.monotonic())
+        self._files = files_given(options.get('cli_args') or sys.argv)
+        self._status = StatusReporter(
+            self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
+            self._refresh)
+        self._refresh()
+        self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
+        if own['autostart']:
+            self._start()
+
+    # --- life -----------------------------------------------------------------------------------
+
+    def _start(self) -> None:
+        for trigger in (self.trigger_configure, self.trigger_activate):
+            if trigger() != TransitionCallbackReturn.SUCCESS:
+                raise self._failure or RuntimeError(f'{trigger.__name__} failed')
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Create topics; messages that arrive from now on are dropped until activation."""
+        try:
+            self._create_topics()
+        except Exception as error:
+            # rclpy would swallow it; a supervisor gets the transition's failure and this line.
+            self._failure = error
+            self.get_logger().error(f'cannot be configured: {error}')
+            self._destroy_topics()
+            return TransitionCallbackReturn.FAILURE
+        self._feedforward = Feedforward(self._settings.model, self._settings.own)
+        self._status.report('OK', 'INACTIVE', 'waiting to be activated')
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer messages from now on."""
+        self._status.report('OK', 'WAITING', 'waiting for the first message')
+        model = self._settings.model
+        self.get_logger().info(
+            f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer nothing any more, with the timeout's action as the last word."""
+        self._last_word()
+        self._status.report('OK', 'INACTIVE', 'waiting to be activated')
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take the topics away."""
+        self._destroy_topics()
+        self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End for good; the process goes on telling so until it is stopped."""
+        self._last_word()
+        self._destroy_topics()
+        self._status.report('OK', 'FINALIZED', 'shut down')
+        return super().on_shutdown(state)
+
+    def finish(self) -> None:
+        """Do what must be done before the process ends."""
+        self._last_word()
+
+    def _create_topics(self) -> None:
+        self._commands = self._publisher(Float64MultiArray, '~/commands')
+        self._joint_command = self._publisher(JointState, '~/joint_command')
+        self._joint_trajectory = self._publisher(JointTrajectory, '~/joint_trajectory')
+        self._watchdog = CommandWatchdog(
+            self, lambda: self._settings.own['command_timeout'], self._on_stale)
+        self._create_parts()
+        # Raw: message objects of a long trajectory would take longer than the model.
+        self._subscription = subscription(
+            self, self._reader.message, '~/trajectory', self._on_trajectory, raw=True,
+            profile=UNANSWERED)
+
+    def _publisher(self, kind: type, topic: str) -> Any:
+        self._publishers_made.append(publisher(self, kind, topic))
+        return self._publishers_made[-1]
+
+    def _create_parts(self) -> None:
+        names = self._feedforward.parts
+        for name in self._parts.keys() - set(names):
+            self.destroy_publisher(self._parts.pop(name))
+        for name in names:
+            if name not in self._parts:
+                self._parts[name] = publisher(self, JointState, f'~/effort/{name}')
+
+    def _destroy_topics(self) -> None:
+        if self._subscription is not None:
+            self.destroy_subscription(self._subscription)
+        if self._watchdog is not None:
+            self._watchdog.destroy()
+        for each in (*self._publishers_made, *self._parts.values()):
+            self.destroy_publisher(each)
+        self._subscription = self._watchdog = None
+        self._publishers_made, self._parts = [], {}
+
+    def _use_settings(self) -> None:
+        self._feedforward.use(self._settings.model, self._settings.own)
+        if self._watchdog is not None:
+            self._create_parts()
+            self._watchdog.rearm()
+
+    # --- messages -------------------------------------------------------------------------------
+
+    def _on_trajectory(self, data: bytes, info: dict[str, int]) -> None:
+        began = time.perf_counter()
+        if self.state != 'active' or self._watchdog is None:
+            return
+        self._counters['received'] += 1
+        own, now = self._settings.own, self.get_clock().now().nanoseconds
+        try:
+            request = self._reader.read(data, now, own['max_age'], own['missing_derivatives'])
+            answer = self._feedforward.answer(request)
+        except PprsError as error:
+            self._reject(Rejection.of(error))
+            return
+        self._commands.publish(self._bytes.commands(answer.effort[0]))
+        # What is left may take its time: the drives have their command.
+        self._compute_time.add(time.perf_counter() - began)
+        self._counters['accepted'] += 1
+        self._counters['clamped'] += answer.clamped
+        self._watchdog.feed(request.end - now)
+        self._publish_rest(answer)
+        if info['received_timestamp']:
+            self._lag.add(max(0.0, (time.time_ns() - info['received_timestamp']) / NANOSECONDS
+                              - (time.perf_counter() - began)))
+        self._judge(answer)
+
+    def _publish_rest(self, answer: Answer) -> None:
+        request, forces = answer.request, answer.forces
+        if self._joint_command.get_subscription_count():
+            position, velocity, _ = forces.drive_motion
+            self._joint_command.publish(self._bytes.joint_state(
+                request.first_stamp, answer.effort[0], position[0], velocity[0]))
+        if self._joint_trajectory.get_subscription_count():
+            self._joint_trajectory.publish(self._bytes.joint_trajectory(
+                request.start, request.offsets, forces, answer.effort))
+        for name, each in self._parts.items():
+            if each.get_subscription_count():
+                each.publish(self._bytes.joint_state(
+                    request.first_stamp, self._feedforward.part(answer, name)))
+
+    def _judge(self, answer: Answer) -> None:
+        own, report, now = self._settings.own, self._status.report, time.monotonic()
+        if now > self._margins_due:
+            self._margins_due = now + MARGINS_PERIOD
+            self._margins = left = margins(self._settings.model, answer.forces.mechanism)
+            if left.singularity is not None:
+                self._status.facts['singularity_margin'] = round(left.singularity, 6)
+            self._status.facts['workspace_margin'] = round(left.workspace, 6)
+        left = self._margins
+        if answer.clamped:
+            report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the effort was clamped')
+        elif left.singularity is not None and left.singularity < own['warning_margin']:
+            report('WARN', 'NEAR_SINGULAR', f'{left.singularity:.3f} of the way to the limits of '
+                   f'conditioning is left, warning_margin is {own["warning_margin"]:g}')
+        elif left.workspace < own['warning_margin']:
+            report('WARN', 'NEAR_WORKSPACE', f'{left.drive} has {left.workspace:.3f} of half its '
+                   f'range left, warning_margin is {own["warning_margin"]:g}')
+        elif self._lagging:
+            report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median: they '
+                   'come faster than they are answered, or the machine is busy')
+        else:
+            report('OK', 'OK', 'commands follow the trajectory')
+
+    def _reject(self, rejection: Rejection) -> None:
+        self._counters[rejection.code] += 1
+        text, watchdog = rejection.text, self._watchdog
+        if rejection.code == 'EFFECT' and watchdog is not None and watchdog.fresh:
+            # Not the message is wrong but the model: waiting for a better one would help nothing.
+            watchdog.stop()
+            self._counters['stale'] += 1
+            text = f'{text}; {self._do_timeout_action()}'
+        self._status.report('ERROR', rejection.code, text)
+        self.get_logger().warning(f'rejected, {rejection.code}: {text}', throttle_duration_sec=1.0)
+
+    # --- stale commands -------------------------------------------------------------------------
+
+    def _on_stale(self) -> None:
+        self._counters['stale'] += 1
+        done = self._do_timeout_action()
+        text = f'no valid trajectory for {self._settings.own["command_timeout"]:g} s: {done}'
+        self._status.report('STALE', 'STALE', text)
+        self.get_logger().warning(text, throttle_duration_sec=1.0)
+
+    def _last_word(self) -> None:
+        """Do the timeout's action now where a command is in force, and see it off."""
+        if self._watchdog is None or not self._watchdog.fresh:
+            return
+        self._watchdog.stop()
+        self.get_logger().info(f'ends: {self._do_timeout_action()}')
+        for each in (self._commands, self._joint_command):
+            each.wait_for_all_acked(LAST_WORD)
+
+    def _do_timeout_action(self) -> str:
+        """Send what the action says, once, and return it in words."""
+        action = self._settings.own['timeout_action']
+        if action == SILENT:
+            return 'nothing goes out, the last command stays in force'
+        try:
+            held = self._feedforward.hold(gravity=action == HOLD_GRAVITY)
+        except PprsError as error:
+            return f'the last command stays in force, as none can be given: {error}'
+        self._commands.publish(self._bytes.commands(held.effort[0]))
+        if self._joint_command.get_subscription_count():
+            self._joint_command.publish(self._bytes.joint_state(
+                self.get_clock().now().nanoseconds, held.effort[0],
+                held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
+        if action != HOLD_GRAVITY:
+            return 'efforts are zero'
+        failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
+        return f'the last pose is held at rest{", without " if failed else ""}{", ".join(failed)}'
+
+    # --- status ---------------------------------------------------------------------------------
+
+    @property
+    def _lagging(self) -> bool:
+        return bool(self._status.facts.get('lagging'))
+
+    def _refresh(self) -> None:
+        """Bring what is told once a second up to date."""
+        accepted, now = self._counters['accepted'], time.monotonic()
+        before, then = self._counted
+        self._counted = (accepted, now)
+        threshold = self._settings.own['lag_warning']
+        self._status.facts.update(
+            state=self.state,
+            rate=round((accepted - before) / max(now - then, 1e-3), 1),
+            compute_time=self._compute_time.summary(), lag=self._lag.summary(),
+            lagging=bool(threshold and accepted > before and self._lag.median > threshold),
+            model={'files': self._files, 'sha256': fingerprint(self._settings.model)})

@@ -1,0 +1,237 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Joint states as they come in, for the workbench: kept in a ring, compared, and made a recording.
+
+The node runs in a thread of the workbench; everything that the workbench asks is answered from
+what the node has noted, and changes of running nodes go out as parameters.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.residuals.live import LiveComparison
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.model_parameters import NodeModel
+from pprs_dynamics.ros.qos import UNANSWERED
+from pprs_dynamics.ros.rejection import Rejection
+
+NAME = 'workbench'
+NODES = ('monitor', 'feedforward')
+WINDOW, ERROR_SPAN = 0.12, 2.0  # [s], the monitor's defaults
+JUDGED = 0.05  # [s] between looks at what came in
+MOST_SAMPLES = 300_000  # in the ring: ten minutes at 500 Hz
+SHOWN = 20.0  # [s] of residuals that are kept to be drawn
+PATIENCE = 5.0  # [s] for a running node's answer
+ACTIVE = 'effects.active'
+
+
+class LiveJointStates(Node):
+    """Compares joint states with a model, and keeps the last of them.
+
+    Parameters
+    ----------
+    model : DriveModel or ArmModel
+    topic : str
+        Of sensor_msgs/JointState.
+    """
+
+    def __init__(self, model: NodeModel, topic: str, **options: Any) -> None:
+        super().__init__(NAME, **options)
+        self.model = model
+        self._comparison = LiveComparison(model, WINDOW, ERROR_SPAN)
+        self._lock = threading.Lock()
+        self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
+        self._residuals: deque[tuple[float, Any]] = deque()
+        self._origin: int | None = None
+        self._arrived = 0.0
+        self._counters = {'received': 0, 'rejected': 0}
+        self._trouble = ''
+        self._monitor: list[float] | None = None
+        self._heard = 0.0
+        self.create_subscription(JointState, topic, self._on_state, UNANSWERED, raw=True)
+        self.create_subscription(Float64MultiArray, '/monitor/error', self._on_error, UNANSWERED)
+        self.create_timer(JUDGED, self._judge)
+        self.clients_of = {name: AsyncParameterClient(self, f'/{name}') for name in NODES}
+
+    def use_model(self, model: NodeModel) -> None:
+        """Compare with another model from now on."""
+        with self._lock:
+            self.model = model
+            self._comparison.use_model(model)
+
+    def _on_state(self, data: bytes) -> None:
+        self._counters['received'] += 1
+        try:
+            stamp, position, effort = conversions.read_measured(data, self.model.drives)
+        except Rejection as rejection:
+            self._counters['rejected'] += 1
+            self._trouble = str(rejection)
+            return
+        with self._lock:
+            self._arrived = time.monotonic()
+            if self._origin is None:
+                self._origin = stamp
+            self._ring.append((stamp, position, effort))
+            self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
+                                  effort)
+
+    def _on_error(self, message: Float64MultiArray) -> None:
+        self._monitor, self._heard = list(message.data), time.monotonic()
+
+    def _judge(self) -> None:
+        with self._lock:
+            try:
+                compared = self._comparison.evaluate()
+            except PprsError as error:
+                self._trouble = str(error)
+                if isinstance(error, EffectError):  # its memory may be half advanced
+                    self._comparison.use_model(self.model)
+                return
+            if compared is None:
+                return
+            self._trouble = ''
+            self._residuals.extend(zip(compared.time.tolist(), compared.residual, strict=True))
+            while self._residuals[0][0] < self._residuals[-1][0] - SHOWN:
+                self._residuals.popleft()
+
+    def taken(self) -> Recording:
+        """Return what the ring holds.
+
+        Raises
+        ------
+        PprsError
+            Where that is no recording.
+        """
+        with self._lock:
+            samples = list(self._ring)
+        if not samples:
+            raise UnreadableFileError('joint_states', 'nothing has come in yet')
+        first = samples[0][0]
+        stamps = [(stamp - first) / conversions.NANOSECONDS for stamp, _, _ in samples]
+        return Recording.from_arrays('live', np.array(stamps),
+                                     np.stack([position for _, position, _ in samples]),
+                                     effort=np.stack([effort for _, _, effort in samples]),
+                                     drives=self.model.drives)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return how it stands, and what was left of late [N]."""
+        now = time.monotonic()
+        with self._lock:
+            running = self._comparison.running_error().tolist()
+            late = list(self._residuals)
+            span = ((self._ring[-1][0] - self._ring[0][0]) / conversions.NANOSECONDS
+                    if self._ring else 0.0)
+            age = now - self._arrived if self._arrived else None
+        step = max(1, len(late) // 1000)
+        return {**self._counters, 'drives': list(self.model.drives), 'age': age, 'kept': span,
+                'trouble': self._trouble, 'effects': list(self.model.values.get(ACTIVE, ())),
+                'error': [_plain(value) for value in running],
+                'monitor_error': [_plain(value) for value in self._monitor]
+                if self._monitor is not None and now - self._heard < ERROR_SPAN else None,
+                'time': [moment for moment, _ in late[::step]],
+                'residual': [[_plain(value) for value in column] for column in zip(
+                    *(values.tolist() for _, values in late[::step]), strict=True)]}
+
+
+class LiveSource:
+    """The node in a thread of its own, for callers of other threads.
+
+    Parameters
+    ----------
+    model : DriveModel or ArmModel
+        That running nodes have as well.
+    topic : str
+    """
+
+    def __init__(self, model: NodeModel, topic: str = 'joint_states') -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = LiveJointStates(model, topic, context=self._context)
+        self._base: Mapping[str, Any] = model.values
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            return
+
+    def close(self) -> None:
+        """End it."""
+        self._executor.shutdown()
+        self._context.try_shutdown()
+        self._thread.join(PATIENCE)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return state and running errors."""
+        return self._node.to_json()
+
+    def take(self, path: Path) -> None:
+        """Write what the ring holds as a recording."""
+        write_recording(path, self._node.taken())
+
+    def set_model(self, model: Any) -> dict[str, str]:
+        """Set a model's effects on the running nodes, and compare with it here.
+
+        Parameters
+        ----------
+        model : DriveModel or ArmModel
+
+        Returns
+        -------
+        dict of str to str
+            What each node said; '' where it took everything.
+        """
+        changes = {key: value for key, value in model.values.items()
+                   if key != ACTIVE and not key.startswith('history.')
+                   and self._base.get(key) != value}
+        answers = {name: self._set(name, changes, list(model.values.get(ACTIVE, ())))
+                   for name in NODES}
+        if any(not answer for answer in answers.values()):
+            self._node.use_model(model)
+        return answers
+
+    def _set(self, name: str, changes: Mapping[str, Any], active: list[str]) -> str:
+        client = self._node.clients_of[name]
+        if not client.services_are_ready():
+            return 'does not run'
+        # Its parameters first: never half an effect.
+        steps = [[Parameter(key, value=value) for key, value in changes.items()],
+                 [Parameter(ACTIVE, Parameter.Type.STRING_ARRAY, active)]]
+        for step in filter(None, steps):
+            done = threading.Event()
+            future = client.set_parameters(step)
+            future.add_done_callback(lambda _, done=done: done.set())
+            if not done.wait(PATIENCE):
+                return f'has not answered within {PATIENCE:g} s'
+            refused = [one.reason for one in future.result().results if not one.successful]
+            if refused:
+                return refused[0]
+        return ''
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A managed node that knows its state and refuses impossible transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+CHANGE_STATE = '/change_state'
+
+
+class ManagedNode(LifecycleNode):
+    """A managed node.
+
+    Attributes
+    ----------
+    state : str
+        Label of the state that the last transition led to, which rclpy shows in no public way.
+    """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
+        self.state = 'unconfigured'
+        for service in self.services:
+            if service.srv_name.endswith(CHANGE_STATE):
+                service.callback = self._refusing(service.callback)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go to `inactive`."""
+        self.state = 'inactive'
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go to `active`."""
+        self.state = 'active'
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go to `inactive`."""
+        self.state = 'inactive'
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go to `unconfigured`."""
+        self.state = 'unconfigured'
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go to `finalized`."""
+        self.state = 'finalized'
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go where rclpy goes after a transition that failed."""
+        outcome = super().on_error(state)
+        self.state = ('unconfigured' if outcome == TransitionCallbackReturn.SUCCESS
+                      else 'finalized')
+        return outcome
+
+    def _refusing(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a service's callback that answers no instead of raising.
+
+        Jazzy's rclpy raises at a transition that the present state does not have: a supervisor's
+        mistake would end the node.
+        """
+        def answer(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except RuntimeError as error:
+                self.get_logger().warning(f'no transition: {" ".join(str(error).split())}')
+                response.success = False
+                return response
+
+        return answer

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A node's model, kept in step with its parameters: what is not valid is never in force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.keys import ARM_JOINTS, KEYS, NAMES, NODE_PREFIXES, is_arm
+from pprs_dynamics.ros.parameters import (
+    NodeParameter,
+    added_descriptor,
+    current_values,
+    declare_arm,
+    declare_model,
+    overrides,
+)
+
+NodeModel = DriveModel | ArmModel
+
+
+class ExplainsRefusals(Node):
+    """A node that refuses parameters in the words of the model's files.
+
+    rclpy compares with the range in a descriptor first, and says less.
+    """
+
+    _settings: ModelParameters
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """Set parameters one after the other; each is taken or refused by itself."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set all parameters or none."""
+        result = self._settings.check(parameter_list)
+        return super().set_parameters_atomically(parameter_list) if result.successful else result
+
+
+class ModelParameters:
+    """Declares a model's parameters on a node, and follows their changes.
+
+    Parameters
+    ----------
+    node : Node
+    own : sequence of NodeParameter
+        The node's own parameters, declared already.
+    changed : callable
+        Called after every change that was accepted.
+
+    Attributes
+    ----------
+    model : DriveModel or ArmModel
+        In force now; of one kind, and of the same drives, as long as the node runs.
+    own : dict
+        Values of the node's own parameters.
+    taken_from_paper : list of str
+        Keys without a value of their own; none where a whole model was given.
+
+    Raises
+    ------
+    ModelError, EffectError
+        Where the parameters at start are no model, or an effect of another package cannot begin.
+    """
+
+    def __init__(
+        self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
+    ) -> None:
+        self._node, self._declared, self._changed = node, tuple(own), changed
+        self._kind: type[NodeModel] = ArmModel if is_arm(overrides(node)) else DriveModel
+        taken_from_paper = []
+        if self._kind is ArmModel:
+            declare_arm(node)
+        else:
+            taken_from_paper = declare_model(node)
+        self._drives: tuple[str, ...] | None = None
+        self.model, self.own = self._validated()
+        self._drives = self.model.drives
+        # A status entry, and a line in the log: another robot would get wrong forces.
+        self.taken_from_paper = taken_from_paper
+        if taken_from_paper:
+            node.get_logger().warning(
+                'no geometry is given: this is the paper\'s robot'
+                + (f', but for {len(KEYS) - len(taken_from_paper)} parameters'
+                   if len(taken_from_paper) < len(KEYS) else ''))
+        self._checked = self.model, self.own
+        node.add_on_set_parameters_callback(self.check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[NodeModel, dict[str, Any]]:
+        values = current_values(self._node, changes)
+        own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
+        model = self._kind.from_parameters(values)
+        if self._drives not in (None, model.drives):
+            raise ModelError(ARM_JOINTS, model.drives, 'stay as it was when the node started: '
+                             f'{", ".join(self._drives or ())}')
+        model.initial_state()  # an effect that cannot even begin is refused
+        return model, own
+
+    def check(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return whether the parameters would be valid with some of them changed, and why not."""
+        if _of_topics(changes):
+            return SetParametersResult(successful=True)
+        try:
+            self._checked = self._validated(changes)
+        except PprsError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, changes: list[Parameter]) -> None:
+        if _of_topics(changes):
+            return
+        # What was checked, and nothing else, comes into force.
+        self.model, self.own = self._checked
+        for change in changes:
+            if change.name not in NAMES and change.name.startswith('effects.') and (
+                    self._node.has_parameter(change.name)):
+                self._describe(change.name)
+        self._changed()
+
+    def _describe(self, name: str) -> None:
+        if not self._node.describe_parameter(name).description:
+            self._node.set_descriptor(name, added_descriptor(name))
+
+
+def _of_topics(changes: list[Parameter]) -> bool:
+    """Return whether these are the QoS of topics, which rclpy declares as topics appear."""
+    return all(change.name.startswith(NODE_PREFIXES) for change in changes)

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node `monitor`: measured efforts against the model, live."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from pprs_dynamics.errors import EffectError, PprsError
+from pprs_dynamics.measurement.residuals.live import Compared, LiveComparison
+from pprs_dynamics.physics.mechanism.units import common_effort
+from pprs_dynamics.physics.model.keys import is_arm
+from pprs_dynamics.physics.model.preparation import prepare
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.parameters import NodeParameter, declare_own, overrides
+from pprs_dynamics.ros.qos import EVERY_MESSAGE
+from pprs_dynamics.ros.rejection import CODES, Rejection
+from pprs_dynamics.ros.status import StatusReporter
+
+PARAMETERS = (
+    NodeParameter('window', 0.12, 'of the smoothing that gives velocity and acceleration; '
+                  'answers lag by half of it [s]', lower=0.01, upper=2.0),
+    NodeParameter('error_span', 2.0, 'over which ~/error is taken [s]', lower=0.05, upper=600.0),
+    NodeParameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
+                  lower=1.0, upper=1000.0),
+)
+
+
+# Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
+ARM_WINDOW = 0.25  # [s]
+
+
+class MonitorNode(ExplainsRefusals):
+    """Publishes what the model says at every measured stamp, and how wrong it is."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('monitor', allow_undeclared_parameters=True, **options)
+        parameters = PARAMETERS
+        if is_arm(overrides(self)):
+            parameters = (replace(PARAMETERS[0], default=ARM_WINDOW), *PARAMETERS[1:])
+        own = declare_own(self, parameters)
+        self._settings = ModelParameters(self, parameters, self._use)
+        prepare(self._settings.model)
+        self._comparison = LiveComparison(
+            self._settings.model, own['window'], own['error_span'])
+        self._begins_anew = self._cannot_begin = False
+        self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}
+        self._origin: int | None = None
+        self._status = StatusReporter(self, {}, self._counters)
+        self._model_effort = self.create_publisher(JointState, '~/model_effort', EVERY_MESSAGE)
+        self._residual = self.create_publisher(JointState, '~/residual', EVERY_MESSAGE)
+        self._error = self.create_publisher(Float64MultiArray, '~/error', EVERY_MESSAGE)
+        self.create_subscription(JointState, 'joint_states', self._on_state, EVERY_MESSAGE,
+                                 raw=True)
+        self.create_timer(1.0 / own['update_rate'], self._judge)
+        self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
+
+    def _use(self) -> None:
+        self._begins_anew = True
+
+    def _on_state(self, data: bytes) -> None:
+        self._counters['received'] += 1
+        try:
+            stamp, position, effort = conversions.read_measured(data, self._settings.model.drives)
+        except Rejection as rejection:
+            self._reject(rejection)
+            return
+        if self._cannot_begin:
+            return  # samples would pile up
+        if self._origin is None:
+            self._origin = stamp
+        # Counted from the first stamp: seconds since 1970 would cost digits.
+        self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position, effort)
+
+    def _judge(self) -> None:
+        try:
+            if self._begins_anew:
+                self._cannot_begin = True
+                self._comparison.use_model(self._settings.model)
+                self._begins_anew = self._cannot_begin = False
+            compared = self._comparison.evaluate()
+        except PprsError as error:
+            # An effect that failed may have left its memory half advanced.
+            self._begins_anew = self._begins_anew or isinstance(error, EffectError)
+            self._reject(Rejection.of(error))
+            return
+        self._counters['gaps'] = self._comparison.gaps
+        if compared is None:
+            return
+        self._counters['compared'] += len(compared.time)
+        self._publish(compared)
+        running = self._comparison.running_error()
+        self._error.publish(Float64MultiArray(data=running.tolist()))
+        worst = float(np.nanmax(running)) if np.isfinite(running).any() else float('nan')
+        self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
+                                       for value in running.tolist()]
+        unit = common_effort(self._settings.model.units)
+        self._status.report('OK', 'OK', f'largest running error {worst:.4g} {unit}')
+
+    def _publish(self, compared: Compared) -> None:
+        for publisher, efforts in ((self._model_effort, compared.model),
+                                   (self._residual, compared.residual)):
+            if publisher.get_subscription_count():
+                for time, effort in zip(compared.time, efforts, strict=True):
+                    stamp = self._origin + round(time * conversions.NANOSECONDS)
+                    publisher.publish(conversions.joint_state(
+                        stamp, effort, drives=self._settings.model.drives))
+
+    def _reject(self, rejection: Rejection) -> None:
+        self._counters[rejection.code] += 1
+        self._status.report('ERROR', rejection.code, rejection.text)
+        self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node `play_trajectory`: publishes a path of the platform in real time, then ends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rclpy.duration import Duration
+from rclpy.node import Node
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.measurement.files.pose_files import read_poses
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.parameters import NodeParameter, declare_own, refuse_unknown
+from pprs_dynamics.ros.qos import EVERY_MESSAGE
+from pprs_dynamics.ros.run import Finished
+
+SOURCES = ('helix', 'excitation', 'csv')
+
+PARAMETERS = (
+    NodeParameter('source', 'helix', 'what to play', choices=SOURCES),
+    NodeParameter('file', '', 'CSV of poses, for source csv'),
+    NodeParameter('rate', 100.0, 'messages per second [Hz]', lower=0.1, upper=10_000),
+    NodeParameter('points', 1, 'points per message: the present one and those that follow',
+                  lower=1),
+    NodeParameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
+    NodeParameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
+    NodeParameter('seed', 0, 'of an excitation', lower=0),
+    NodeParameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
+                  '0: start there', lower=0),
+    NodeParameter('ahead', 0.0, 'how far ahead of its moment each message is stamped [s]',
+                  lower=0),
+)
+
+
+class PlayTrajectoryNode(Node):
+    """Publishes one message per period, once somebody listens on `feedforward/trajectory`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('play_trajectory', **options)
+        values = declare_own(self, PARAMETERS)
+        self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
+        self._ahead = values['ahead']
+        refuse_unknown(self)
+        self._motion = _path(values)
+        self._next, self._round = 0, 1
+        self._publisher = self.create_publisher(
+            MultiDOFJointTrajectory, 'feedforward/trajectory', EVERY_MESSAGE)
+        self.get_logger().info(
+            f'{values["source"]}, {len(self._motion)} messages at {self._rate:g} Hz; waiting for '
+            f'a listener on {self._publisher.topic_name}')
+        self.create_timer(1.0 / self._rate, self._tick)
+
+    def _tick(self) -> None:
+        if self._next == 0 and not self._publisher.get_subscription_count():
+            return
+        if self._next == len(self._motion):
+            if self._round == self._repeat:
+                # Leave only when the last message has arrived.
+                # A listener that is stuck must not keep this node from ending.
+                if not self._publisher.wait_for_all_acked(Duration(seconds=1.0)):
+                    self.get_logger().warning('a listener did not take the last messages')
+                self.get_logger().info(f'played {self._round * len(self._motion)} messages')
+                raise Finished
+            self._next, self._round = 0, self._round + 1
+        part = self._motion[self._next:self._next + self._points]
+        offsets = [round(k * conversions.NANOSECONDS / self._rate) for k in range(len(part))]
+        self._publisher.publish(conversions.write_trajectory(
+            part, conversions.time(self._stamp()), offsets))
+        self._next += 1
+
+    def _stamp(self) -> int:
+        """Return the moment that the next pose belongs to [ns], evenly spaced."""
+        if self._next == 0:
+            self._start = self.get_clock().now().nanoseconds + round(
+                self._ahead * conversions.NANOSECONDS)
+        return self._start + round(self._next * conversions.NANOSECONDS / self._rate)
+
+
+def _path(values: dict[str, Any]) -> PlatformMotion:
+    if values['source'] == 'csv':
+        if not values['file']:
+            raise ModelError('file', '', 'be a CSV of poses where source is csv')
+        motion = read_poses(values['file'], values['rate'])
+    else:
+        path: HelicalPath | Excitation = HelicalPath()
+        if values['source'] == 'excitation':
+            path = Excitation(duration=values['duration'], seed=values['seed'])
+        # One step beyond the end, held there: the last message is the pose at rest.
+        motion = path.motion(np.arange(0.0, path.duration + 1 / values['rate'], 1 / values['rate']))
+    if values['repeat'] != 1 and not motion.is_closed():
+        raise ModelError('repeat', values['repeat'],
+                         'be 1 for a path that does not end where it starts')
+    return with_lead_in(motion, values['lead_in'], values['rate'])

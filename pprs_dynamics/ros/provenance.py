@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which model a node runs, so that a recording of its status tells it too."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.system.bounded_yaml import parse, read_text
+from pprs_dynamics.system.plain_text import displayed
+
+OPTION = '--params-file'
+BLOCK = 'ros__parameters.'
+
+
+def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
+    """Return path and SHA-256 of the parameter files on a command line, in order.
+
+    Without any it is the package's own model that a node runs.
+    """
+    paths = _paths(arguments) or [find_file(DEFAULT_MODEL)]
+    return [{'file': displayed(path.resolve()), 'sha256': _digest(path.read_bytes())}
+            for path in paths if path.is_file()]
+
+
+def check_files(arguments: Sequence[str]) -> None:
+    """Raise UnreadableFileError where a parameter file on a command line is out of bounds.
+
+    ROS 2 takes a minute over a list that is nested 10^5 deep, and longer over larger ones.
+    """
+    for path in _paths(arguments):
+        if path.is_file():  # what is not, ROS 2 refuses; a pipe can be read only once
+            read_text(path)
+
+
+def _paths(arguments: Sequence[str]) -> list[Path]:
+    return [Path(value) for option, value in pairwise(arguments) if option == OPTION]
+
+
+def names_given(arguments: Sequence[str] | None = None) -> list[str]:
+    """Return the names of parameters on a command line and in the files that it names."""
+    arguments = sys.argv if arguments is None else arguments
+    return [name for path in _paths(arguments) if path.is_file()
+            for name in _names_in(path)] + _names_on(arguments)
+
+
+def folder_of(name: str, arguments: Sequence[str] | None = None) -> Path:
+    """Return the folder that a path in a parameter counts from: its file's, or the present one."""
+    arguments = sys.argv if arguments is None else arguments
+    files = [path for path in _paths(arguments) if path.is_file() and name in _names_in(path)]
+    return Path.cwd() if not files or name in _names_on(arguments) else files[-1].resolve().parent
+
+
+def _names_in(path: Path) -> list[str]:
+    return [name.partition(BLOCK)[2] for name in _flat(parse(read_text(path), path))
+            if BLOCK in name]
+
+
+def _names_on(arguments: Sequence[str]) -> list[str]:
+    return [value.partition(':=')[0].rpartition(':')[2]
+            for option, value in pairwise(arguments) if option in ('-p', '--param')]
+
+
+def _flat(tree: Mapping[str, Any]) -> Iterator[str]:
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from (f'{name}.{rest}' for rest in _flat(value))
+        else:
+            yield str(name)
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""How topics are delivered, and how a user overrides it, topic by topic."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.ros.parameters import overrides
+
+# Reliable, and deep enough that a listener that stalls for a tenth of a second at 1 kHz gets
+# every message: each one is answered.
+EVERY_MESSAGE = QoSProfile(depth=100)
+# The same for what waits for a node that has work to do on it: a machine that is busy with other
+# things for a second loses no message at 1 kHz. The status tells that messages wait, and max_age
+# keeps those out that have waited too long.
+UNANSWERED = QoSProfile(depth=1000)
+# Reliable, and the last one is kept for whoever comes later.
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+POLICIES = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
+            QoSPolicyKind.DURABILITY)
+
+
+def publisher(node: Node, kind: type, topic: str, profile: QoSProfile = EVERY_MESSAGE) -> Any:
+    """Create a publisher whose QoS the parameters qos_overrides.<topic>.publisher.* change.
+
+    Raises
+    ------
+    ModelError
+        For an override that is none.
+    """
+    return _overridable(node, topic, lambda options: node.create_publisher(
+        # rclpy writes the overrides into the profile.
+        kind, topic, copy.copy(profile), qos_overriding_options=options))
+
+
+def subscription(
+    node: Node, kind: type, topic: str, callback: Callable[..., None], raw: bool = False,
+    profile: QoSProfile = EVERY_MESSAGE,
+) -> Any:
+    """Create a subscription whose QoS qos_overrides.<topic>.subscription.* change."""
+    return _overridable(node, topic, lambda options: node.create_subscription(
+        kind, topic, callback, copy.copy(profile), qos_overriding_options=options, raw=raw))
+
+
+def _overridable(node: Node, topic: str, create: Callable[[QoSOverridingOptions], Any]) -> Any:
+    try:
+        return create(QoSOverridingOptions(POLICIES))
+    except (ParameterException, InvalidQosOverridesError, RuntimeError, ValueError,
+            AssertionError) as error:
+        name = f'qos_overrides.{node.resolve_topic_name(topic)}'
+        prefix = f'{name}.'
+        given = {key.removeprefix(prefix): value
+                 for key, value in overrides(node).items() if key.startswith(prefix)}
+        raise ModelError(name, given, 'hold history: keep_last or keep_all, a depth from 0 on, '
+                         'reliability: reliable or best_effort, and durability: volatile or '
+                         f'transient_local ({error})') from None

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Why a message was rejected, as a code of the interface and a sentence."""
+
+from __future__ import annotations
+
+from pprs_dynamics.errors import (
+    ConvergenceError,
+    EffectError,
+    LimitError,
+    MotionError,
+    PprsError,
+    SingularityError,
+    WorkspaceError,
+)
+
+CODES = ('EMPTY', 'NAMES', 'FRAME', 'SIZE', 'NON_FINITE', 'QUATERNION', 'TIME', 'WORKSPACE',
+         'SINGULAR', 'LIMIT', 'OUTPUT', 'EFFECT')
+
+_KINDS = {'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
+
+
+class Rejection(PprsError):
+    """A message that breaks a rule.
+
+    Parameters
+    ----------
+    code : str
+        One of `CODES`.
+    text : str
+        What, which value, which rule.
+    """
+
+    def __init__(self, code: str, text: str) -> None:
+        self.code, self.text = code, text
+        super().__init__(f'{code}: {text}')
+
+    @classmethod
+    def of(cls, error: PprsError) -> Rejection:
+        """Return the rejection that an error of the model amounts to."""
+        if isinstance(error, Rejection):
+            return error
+        if isinstance(error, MotionError):
+            return cls(_KINDS[error.kind], str(error))
+        if isinstance(error, SingularityError):
+            return cls('SINGULAR', str(error))
+        if isinstance(error, (WorkspaceError, ConvergenceError)):
+            return cls('WORKSPACE', str(error))
+        if isinstance(error, LimitError):
+            return cls('LIMIT', str(error))
+        if isinstance(error, EffectError):
+            return cls('EFFECT', str(error))
+        raise error

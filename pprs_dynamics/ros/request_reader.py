@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which message asks a model for forces, and how it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.ros.joint_request import read_joint_trajectory
+from pprs_dynamics.ros.trajectory_request import TrajectoryRequest, read_serialised
+from pprs_dynamics.ros.whole import message_in
+
+
+class RequestReader(NamedTuple):
+    """How requests arrive.
+
+    Parameters
+    ----------
+    message : type
+        On `~/trajectory`.
+    read : callable
+        Bytes, time of arrival [ns], largest age [s] and what to do about missing derivatives ->
+        TrajectoryRequest; see `read_trajectory`.
+    """
+
+    message: type
+    read: Callable[[bytes, int, float, str], TrajectoryRequest]
+
+
+def reader_for(model: ForceModel) -> RequestReader:
+    """Return how trajectories for a model arrive."""
+    if not isinstance(model, ArmModel):
+        return RequestReader(MultiDOFJointTrajectory, read_serialised)
+    joints = model.drives
+
+    def read(data: bytes, now: int, max_age: float, missing: str) -> TrajectoryRequest:
+        return read_joint_trajectory(
+            message_in(data, JointTrajectory), joints, now, max_age, missing)
+
+    return RequestReader(JointTrajectory, read)

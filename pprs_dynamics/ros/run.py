@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Start a node, spin it, and end cleanly; a user's mistake is one sentence and status 2."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Callable
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.ros.executor import PromptExecutor, StopSignals
+from pprs_dynamics.ros.provenance import check_files
+
+
+class Finished(Exception):
+    """Raised by a node whose work is done."""
+
+
+def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
+    """Spin one node until SIGINT, SIGTERM or `Finished`.
+
+    A node with a method `finish` gets it called while it can still publish.
+
+    Returns
+    -------
+    int
+        Exit status: 0, or 2 for bad parameters.
+    """
+    stop = _Stop()
+    StopSignals(stop)
+    try:
+        check_files(sys.argv if args is None else args)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except PprsError as error:
+        return _complain(str(error))
+    except RuntimeError as error:  # the public base of rclpy's own
+        # An unreadable parameter file, or arguments that are none.
+        return _complain(' '.join(str(error).split()))
+    node = None
+    # Two threads answered 44 of 5 000 messages at 1 kHz; one answers all.
+    executor = PromptExecutor()
+    stop.attach(executor)
+    try:
+        node = factory()
+        executor.add_node(node)
+        # What stands now stays: the garbage collector need not walk through a quarter of a
+        # million objects in the middle of a control cycle, nor now.
+        gc.freeze()
+        gc.enable()
+        executor.spin()
+    except PprsError as error:
+        return _complain(str(error))
+    except (KeyboardInterrupt, ExternalShutdownException, Finished):
+        pass
+    finally:
+        if node is not None and rclpy.ok():
+            getattr(node, 'finish', lambda: None)()
+        executor.shutdown()
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+class _Stop:
+    """What a stop signal does: nothing but leave a note until there is something to stop."""
+
+    def __init__(self) -> None:
+        self._executor: PromptExecutor | None = None
+        self._wanted = False
+
+    def __call__(self) -> None:
+        self._wanted = True
+        if self._executor is not None:
+            self._executor.stop()
+
+    def attach(self, executor: PromptExecutor) -> None:
+        self._executor = executor
+        if self._wanted:
+            executor.stop()
+
+
+def _complain(sentence: str) -> int:
+    print(sentence, file=sys.stderr)
+    return 2

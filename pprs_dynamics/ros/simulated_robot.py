@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node `simulated_robot`: a physics-engine 3-PPRS to run against, in real time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.parameters import (
+    NodeParameter,
+    current_values,
+    declare_model,
+    declare_own,
+)
+from pprs_dynamics.ros.qos import EVERY_MESSAGE
+from pprs_dynamics.ros.setpoints import SetpointQueue
+from pprs_dynamics.ros.status import StatusReporter
+from pprs_dynamics.ros.whole import message_in
+from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
+from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.robot import SimulatedRobot
+from pprs_dynamics.simulation.sensors import SensorSettings
+
+PARAMETERS = (
+    NodeParameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
+    NodeParameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0),
+    NodeParameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0),
+    NodeParameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
+                  'false: it is ignored, and the PD loop compensates gravity by itself'),
+    NodeParameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
+                  '0: never', lower=0, upper=3600),
+    NodeParameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
+    NodeParameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
+    NodeParameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
+                  lower=0),
+    NodeParameter('hidden_effects', [], 'names of effects that the model does not know of, '
+                  'or random for one drawn at random'),
+    NodeParameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
+    NodeParameter('seed', 0, 'of noise and hidden effects', lower=0),
+)
+# A node that was stopped for longer than this [s] goes on from now instead of catching up.
+LONGEST_CATCH_UP = 0.5
+# Between them the executor takes one command: with more, commands at 200 Hz would pile up.
+CYCLES_AT_ONCE = 2
+LATE_SHARE = 0.001
+
+
+class SimulatedRobotNode(Node):
+    """Publishes joint_states, and follows setpoints with efforts, or efforts alone.
+
+    Setpoints are executed at their stamps, interpolated between them; a stamp that has passed is
+    executed at once. What the robot refuses, or cannot do, stands in `~/status` and in the log.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
+        own = declare_own(self, PARAMETERS)
+        declare_model(self)
+        values = {name: value for name, value in current_values(self).items() if name not in own}
+        self._model = DriveModel.from_parameters(values)
+        self._use_effort = own['use_effort']
+        self._robot = _robot(self._model.values, own)
+        self._queue = SetpointQueue(self._robot.control)
+        self._period = round(conversions.NANOSECONDS / own['rate'])
+        self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
+        self._late_before, self._cycles_before = 0, 0
+        hidden = [effect.name for effect in self._robot.effects]
+        # What is hidden is told to nobody who only listens: the log is the robot's own.
+        self._status = StatusReporter(self, {}, self._counters)
+        self._states = self.create_publisher(JointState, 'joint_states', EVERY_MESSAGE)
+        for kind, topic, callback in ((JointState, '~/joint_command', self._on_setpoint),
+                                      (Float64MultiArray, '~/commands', self._on_efforts)):
+            self.create_subscription(kind, topic, callback, EVERY_MESSAGE, raw=True)
+        self.get_logger().info(
+            f'{own["rate"]:g} Hz, PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m, '
+            f'hidden effects: {", ".join(hidden) or "none"}; holding at home')
+        self._robot.tick()
+        self._start = self.get_clock().now().nanoseconds
+        # How far the simulation has fallen behind the clock for good, where it could not keep up.
+        self._lag = 0.0
+        self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
+        self.create_timer(self._period / conversions.NANOSECONDS, self._on_timer)
+        self.create_timer(1.0, self._judge_timing)
+
+    def _on_timer(self) -> None:
+        behind = self._now() - self._lag - self._robot.time
+        if behind > LONGEST_CATCH_UP:
+            self._lag += behind
+        # A few at a time: commands must get through even where the machine cannot keep up.
+        for _ in range(CYCLES_AT_ONCE):
+            late = self._now() - self._lag - self._robot.time
+            if late < 0:
+                break
+            self._counters['cycles'] += 1
+            self._counters['late'] += late * conversions.NANOSECONDS > self._period
+            self._cycle()
+
+    def _cycle(self) -> None:
+        robot = self._robot
+        now = robot.time + self._lag
+        stamp = self._start + round(now * conversions.NANOSECONDS)
+        held = robot.control.holding
+        if not self._queue.advance(now, self._lag):
+            self._counters['refused'] += 1
+            self._queue.clear()
+        measured = robot.tick()
+        self._states.publish(conversions.joint_state(
+            stamp, measured.effort, measured.position, measured.velocity))
+        if held and not robot.control.holding:
+            self._status.report('OK', 'OK', 'following commands')
+        for note in robot.notes:
+            self._status.report('WARN' if note.code == 'HOLD' else 'ERROR', note.code, note.message)
+            self.get_logger().warning(f'{note.code}: {note.message}', throttle_duration_sec=1.0)
+        robot.notes.clear()
+
+    def _on_setpoint(self, data: bytes) -> None:
+        self._counters['commands'] += 1
+        try:
+            message = message_in(data, JointState)
+            fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
+            setpoint = Setpoint(*(conversions.read_drives(message, field) for field in fields))
+        except PprsError as error:
+            self._refuse(str(error))
+            return
+        stamp = conversions.nanoseconds(message.header.stamp)
+        time = (stamp - self._start) / conversions.NANOSECONDS if stamp else self._now()
+        self._queue.add(time, setpoint)
+
+    def _on_efforts(self, data: bytes) -> None:
+        self._counters['commands'] += 1
+        try:
+            message = message_in(data, Float64MultiArray)
+        except PprsError as error:
+            self._refuse(str(error))
+            return
+        efforts = np.array(message.data)
+        if efforts.shape != (6,) or not np.all(np.isfinite(efforts)):
+            self._refuse(f'data holds {len(efforts)} values, must be six finite efforts')
+            return
+        self._queue.clear()
+        self._queue.add(self._now(), Setpoint(None, None, efforts))
+
+    def _refuse(self, reason: str) -> None:
+        self._counters['refused'] += 1
+        self._status.report('ERROR', 'REFUSED', f'a command was refused: {reason}')
+        self.get_logger().warning(f'a command was refused: {reason}', throttle_duration_sec=1.0)
+
+    def _judge_timing(self) -> None:
+        late = self._counters['late'] - self._late_before
+        cycles = self._counters['cycles'] - self._cycles_before
+        self._late_before, self._cycles_before = self._counters['late'], self._counters['cycles']
+        if late > LATE_SHARE * cycles:
+            self._status.report('WARN', 'LATE', f'{late} of {cycles} cycles of the last second '
+                                'were late: this machine is too busy for the simulation')
+
+    def _now(self) -> float:
+        """Return the time since the start [s]."""
+        return (self.get_clock().now().nanoseconds - self._start) / conversions.NANOSECONDS
+
+
+def _robot(values: Any, own: dict[str, Any]) -> SimulatedRobot:
+    if 2000 % own['rate']:
+        raise ModelError('rate', own['rate'], PARAMETERS[0].rule)
+    rng = np.random.default_rng(own['seed'])
+    effects = draw_effects(own['hidden_effects'], rng, own['hidden_scale'])
+    return SimulatedRobot(
+        values, effects, seed=own['seed'], rate=own['rate'],
+        control=ControlSettings(
+            own['stiffness'], own['damping'], gravity_compensation=not own['use_effort'],
+            command_timeout=own['command_timeout'] or np.inf,
+            actuation_delay=own['actuation_delay']),
+        sensors=SensorSettings.with_effort_noise(
+            own['effort_noise'], own['encoder_resolution']))

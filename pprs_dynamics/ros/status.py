@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a node tells about itself: JSON on `~/status`, and `/diagnostics` where it exists."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from pprs_dynamics.ros.qos import LATCHED, publisher
+
+try:
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+except ImportError:
+    DiagnosticArray = None
+
+LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
+
+
+class StatusReporter:
+    """Publishes level, code, message and counters on change and at 1 Hz.
+
+    Parameters
+    ----------
+    node : Node
+    facts : dict
+        Constant entries of the JSON, e.g. the model's file.
+    counters : dict of int
+        Shared with the node, which counts up in place.
+    refresh : callable, optional
+        Called once a second before the status goes out, to bring `facts` up to date.
+    """
+
+    def __init__(
+        self, node: Node, facts: dict[str, Any], counters: dict[str, int],
+        refresh: Callable[[], None] | None = None,
+    ) -> None:
+        self._node, self.facts, self._counters = node, facts, counters
+        self._refresh = refresh
+        self._publisher = publisher(node, String, '~/status', LATCHED)
+        self._diagnostics = None
+        if DiagnosticArray is not None:
+            self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._current = ('OK', 'OK', 'waiting for the first message')
+        node.create_timer(1.0, self._tick)
+        self._publish()
+
+    @property
+    def code(self) -> str:
+        """Code of the present condition."""
+        return self._current[1]
+
+    def report(self, level: str, code: str, message: str) -> None:
+        """Take over a new condition; it goes out at once where the code changed."""
+        changed = (level, code) != self._current[:2]
+        self._current = (level, code, message)
+        if changed:
+            self._publish()
+
+    def _tick(self) -> None:
+        if self._refresh is not None:
+            self._refresh()
+        self._publish()
+
+    def _publish(self) -> None:
+        level, code, message = self._current
+        content = {'level': level, 'code': code, 'message': message,
+                   'counters': self._counters, **self.facts}
+        self._publisher.publish(String(data=json.dumps(content)))
+        if self._diagnostics is not None:
+            status = DiagnosticStatus(
+                level=bytes([LEVELS.index(level)]), name=self._node.get_fully_qualified_name(),
+                message=f'{code}: {message}',
+                values=[KeyValue(key=key, value=str(value))
+                        for key, value in {**self._counters, **self.facts}.items()
+                        if isinstance(value, (int, float, str))])
+            array = DiagnosticArray(status=[status])
+            array.header.stamp = self._node.get_clock().now().to_msg()
+            self._diagnostics.publish(array)

@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A trajectory message as the model needs it, or the rule that it breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.samples import Indices, Mask
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
+from pprs_dynamics.ros.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
+from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.trajectory_cdr import read_points
+from pprs_dynamics.ros.whole import message_in
+
+REJECT, SPLINE = 'reject', 'spline'
+VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)
+Motion = PlatformMotion | JointMotion
+
+
+class TrajectoryRequest(NamedTuple):
+    """What a trajectory message asks for.
+
+    Parameters
+    ----------
+    motion : PlatformMotion or JointMotion
+        All points; its time is in seconds after `start`.
+    start : int
+        Header stamp, or the time of arrival where it is 0 [ns].
+    offsets : (N,) array of int
+        time_from_start of every point [ns], exact.
+    """
+
+    motion: Any
+    start: int
+    offsets: Indices
+
+    @property
+    def first_stamp(self) -> int:
+        """When the first point is due [ns]."""
+        return self.start + int(self.offsets[0])
+
+    @property
+    def end(self) -> int:
+        """When the last point is due [ns]."""
+        return self.start + int(self.offsets[-1])
+
+
+def read_serialised(
+    data: bytes, now: int, max_age: float = 0.0, missing: str = REJECT,
+) -> TrajectoryRequest:
+    """Return what the bytes of a message ask for; see `read_trajectory`."""
+    points = read_points(data)
+    if points is not None:
+        stamp, numbers, offsets = points
+        return request_of(start_of(stamp, now, max_age), offsets, _motion_of(numbers))
+    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing)
+
+
+def read_trajectory(
+    message: MultiDOFJointTrajectory, now: int, max_age: float = 0.0, missing: str = REJECT,
+) -> TrajectoryRequest:
+    """Return the platform motion that a message asks for.
+
+    Parameters
+    ----------
+    message : trajectory_msgs/MultiDOFJointTrajectory
+    now : int
+        Time of arrival [ns].
+    max_age : float
+        Oldest header stamp that is accepted [s]; 0 for any.
+    missing : {'reject', 'spline'}
+        What to do where points have no velocities or no accelerations: 'spline' takes those
+        that are missing from a spline through the poses.
+
+    Raises
+    ------
+    Rejection, MotionError
+        For a message that breaks a rule.
+    """
+    points = message.points
+    if not points:
+        raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
+    if list(message.joint_names) != [PLATFORM]:
+        raise Rejection('NAMES', f'joint_names is {list(message.joint_names)!r:.100}, '
+                        f'must be [{PLATFORM!r}]')
+    if message.header.frame_id not in BASE_FRAMES:
+        raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
+                        "must be 'base' or empty")
+    lacking = check_counts(points, missing)
+    start = start_of(nanoseconds(message.header.stamp), now, max_age)
+    offsets = offsets_of(points)
+    numbers = np.array([_row(point) for point in points])
+    if lacking.any():
+        _fill(numbers, offsets, lacking)
+    return request_of(start, offsets, _motion_of(numbers))
+
+
+def _motion_of(numbers: Array) -> Callable[[Array], Motion]:
+    return lambda time: PlatformMotion.from_rows(numbers, time)
+
+
+def request_of(
+    start: int, offsets: Indices, motion_at: Callable[[Array], Motion],
+) -> TrajectoryRequest:
+    """Return the request for a motion that is made with its times [s], from the start on."""
+    if offsets[0] < 0:
+        raise Rejection('TIME', f'time_from_start of point 0 is {offsets[0] / NANOSECONDS:g} s, '
+                        'must not be negative')
+    return TrajectoryRequest(motion_at(offsets / NANOSECONDS), start, offsets)
+
+
+def offsets_of(points: Sequence[Any]) -> Indices:
+    """Return time_from_start of every point [ns], (N,)."""
+    return np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
+
+
+def start_of(stamp: int, now: int, max_age: float) -> int:
+    """Return a header stamp, or the time of arrival where it is 0 [ns]; see `read_trajectory`."""
+    start = stamp if stamp else now
+    age = (now - start) / NANOSECONDS
+    if max_age and age > max_age:
+        raise Rejection('TIME', f'header.stamp is {age:.3f} s old, max_age allows {max_age:g} s')
+    return start
+
+
+def check_counts(
+    points: Sequence[Any], missing: str, places: str = 'transforms', wanted: int = 1,
+) -> Mask:
+    """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
+
+    Parameters
+    ----------
+    points : sequence of messages
+    missing : {'reject', 'spline'}
+    places : str
+        Field that says where.
+    wanted : int
+        Elements that each field must have.
+
+    Raises
+    ------
+    Rejection
+        SIZE, for another number of elements.
+    """
+    lacking = np.zeros((len(points), 2), dtype=bool)
+    for index, point in enumerate(points):
+        for column, field in enumerate(('velocities', 'accelerations', places)):
+            count = len(getattr(point, field))
+            if count == wanted:
+                continue
+            may_lack = count == 0 and field != places and missing == SPLINE
+            if may_lack and len(points) >= FEWEST_POSES:
+                lacking[index, column] = True
+                continue
+            hint = (f': a spline needs at least {FEWEST_POSES} points, and the trajectory has '
+                    f'{len(points)}' if may_lack else '')
+            raise Rejection(
+                'SIZE', f'point {index} has {count} {field}, must have {wanted}{hint}')
+    return lacking
+
+
+def _fill(numbers: Array, offsets: Indices, lacking: Mask) -> None:
+    """Put the derivatives of a spline through the poses where points lack their own."""
+    derivatives = spline_derivatives(
+        (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7])
+    fill_in(numbers, (VELOCITY, ACCELERATION), derivatives, lacking)
+
+
+def fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
+            lacking: Mask) -> None:
+    """Put the derivatives of a spline into the columns of those points that lack their own."""
+    for place, values, rows in zip(places, derivatives, lacking.T, strict=True):
+        if not np.isfinite(values).all():
+            raise Rejection('OUTPUT', 'the spline through the points has derivatives that are '
+                            'not finite')
+        numbers[rows, place] = values[rows]
+
+
+def _row(point: MultiDOFJointTrajectoryPoint) -> tuple[float, ...]:
+    """Return the numbers of a point, zero where it has none."""
+    pose = point.transforms[0]
+    p, q = pose.translation, pose.rotation
+    return (p.x, p.y, p.z, q.x, q.y, q.z, q.w,
+            *_twist(point.velocities), *_twist(point.accelerations))
+
+
+def _twist(twists: Sequence[Any]) -> tuple[float, ...]:
+    if not twists:
+        return (0.0,) * 6
+    linear, angular = twists[0].linear, twists[0].angular
+    return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z

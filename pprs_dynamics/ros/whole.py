@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether the CDR bytes of a message hold every element that their length words promise.
+
+The deserialiser of rmw_fastrtps does not notice where a message is cut off within padding before
+a number, and reads on in foreign memory. What arrives from other machines is looked at before.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+
+from pprs_dynamics.ros.rejection import Rejection
+
+HEADER = 4  # bytes of the encapsulation
+STAMP = 8  # of a time or a duration
+TWO_WORDS = 8
+
+
+def message_in(data: bytes, kind: type) -> Any:
+    """Return the message of a kind that the bytes hold.
+
+    Parameters
+    ----------
+    data : bytes
+        As a raw subscription gives them.
+    kind : type
+        MultiDOFJointTrajectory, JointTrajectory, JointState or Float64MultiArray.
+
+    Raises
+    ------
+    Rejection
+        SIZE, where they are no whole message.
+    """
+    try:
+        message = deserialize_message(data, kind) if is_whole(data, kind) else None
+    except (RuntimeError, UnicodeDecodeError):  # the former is the public base of rclpy's own
+        message = None
+    if message is None:
+        package = kind.__module__.partition('.')[0]
+        raise Rejection('SIZE', f'{len(data)} bytes arrived that are no '
+                        f'whole {package}/{kind.__name__}')
+    return message
+
+
+def is_whole(data: bytes, kind: type = MultiDOFJointTrajectory) -> bool:
+    """Return whether the bytes hold every element that their length words promise."""
+    if len(data) < HEADER or data[0] or data[1] > 1:
+        # Another encoding: its deserialiser has to know.
+        return len(data) >= HEADER
+    walk = _Walk(data, '<I' if data[1] else '>I')
+    try:
+        _WALKS[kind](walk)
+    except struct.error:
+        return False
+    return walk.at <= len(data)
+
+
+class _Walk:
+    """A place in the bytes of a message, which moves on over what is read."""
+
+    def __init__(self, data: bytes, word: str) -> None:
+        self._data, self._word, self.at = data, struct.Struct(word), HEADER
+
+    def aligned(self, size: int) -> None:
+        """Go to the next place that values of a size may start at, counted after the header."""
+        self.at += (HEADER - self.at) % size
+
+    def over(self, size: int, alignment: int = 4) -> None:
+        """Go over that many bytes of values."""
+        self.aligned(alignment)
+        self.at += size
+
+    def count(self) -> int:
+        """Read a length word."""
+        self.aligned(4)
+        count: int = self._word.unpack_from(self._data, self.at)[0]
+        # Every element takes a byte at least: more is garbage, and would loop for ever.
+        if count > len(self._data):
+            raise struct.error
+        self.at += self._word.size
+        return count
+
+    def text(self) -> None:
+        """Go over a text."""
+        count = self.count()
+        self.at += count
+
+    def texts(self) -> None:
+        """Go over a sequence of texts."""
+        for _ in range(self.count()):
+            self.text()
+
+    def numbers(self, each: int = 1) -> None:
+        """Go over a sequence of elements that are `each` numbers of 8 bytes."""
+        if count := self.count():
+            self.over(8 * each * count, 8)
+
+
+def _trajectory(walk: _Walk) -> None:
+    walk.over(STAMP)
+    walk.text()
+    walk.texts()
+    for _ in range(walk.count()):
+        for numbers in (7, 6, 6):
+            walk.numbers(numbers)
+        walk.over(STAMP)
+
+
+def _joint_trajectory(walk: _Walk) -> None:
+    walk.over(STAMP)
+    walk.text()
+    walk.texts()
+    for _ in range(walk.count()):
+        for _ in range(4):
+            walk.numbers()
+        walk.over(STAMP)
+
+
+def _joint_state(walk: _Walk) -> None:
+    walk.over(STAMP)
+    walk.text()
+    walk.texts()
+    for _ in range(3):
+        walk.numbers()
+
+
+def _array(walk: _Walk) -> None:
+    for _ in range(walk.count()):
+        walk.text()
+        walk.over(TWO_WORDS)  # size and stride of a dimension
+    walk.over(4)  # data_offset
+    walk.numbers()
+
+
+_WALKS: dict[type, Callable[[_Walk], None]] = {
+    MultiDOFJointTrajectory: _trajectory, JointTrajectory: _joint_trajectory,
+    JointState: _joint_state, Float64MultiArray: _array}

@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""YAML as ROS 2 parameter files have it, within bounds that keep reading it below a second.
+
+A few lines of YAML can stand for 10^9 values, or nest so deep that parsers give up: such files
+are refused with a sentence before anything is made of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pprs_dynamics.errors import UnreadableFileError
+
+LARGEST = 300_000  # bytes: sixty times the paper's robot, or a ledger of dozens of steps
+DEEPEST = 20  # /** and ros__parameters included, a model file has 7
+LONGEST = 1_000  # characters of a value without quotes: no number is that long
+STRING_TAG = 'tag:yaml.org,2002:str'
+
+# The parser in C is ten times faster, and not everywhere.
+_SafeLoader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+
+
+def read_text(path: str | PathLike[str]) -> str:
+    """Return the text of a YAML file, which is within bounds.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be read, is not text or YAML, or is out of bounds.
+    """
+    try:
+        with Path(path).open('rb') as file:
+            content = file.read(LARGEST + 1)
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    if len(content) > LARGEST:
+        raise UnreadableFileError(
+            path, f'it is larger than {LARGEST // 1000} kB, which no parameter file needs')
+    try:
+        text = content.decode('utf-8')
+    except UnicodeDecodeError:
+        raise UnreadableFileError(path, 'not a text file in UTF-8') from None
+    check_bounds(text, path)
+    return text
+
+
+def check_bounds(text: str, path: str | PathLike[str] = '') -> None:
+    """Raise UnreadableFileError where a text is no YAML, or holds what may not be there.
+
+    The parser's events are looked at one by one: nothing is built, and the first that is out of
+    bounds ends it.
+    """
+    depth = 0
+    try:
+        events: Iterator[Any] = yaml.parse(text, Loader=_SafeLoader)
+        for event in events:
+            line = event.start_mark.line + 1
+            if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+                depth += 1
+            elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
+                depth -= 1
+            if depth > DEEPEST:
+                raise UnreadableFileError(
+                    path, f'line {line}: it is nested more than {DEEPEST} deep')
+            if isinstance(event, yaml.AliasEvent):
+                raise UnreadableFileError(
+                    path, f'line {line}: *{event.anchor} is an alias, which ROS 2 parameter files '
+                    'do not know: write the value itself')
+            if getattr(event, 'tag', None) not in (None, STRING_TAG):
+                raise UnreadableFileError(
+                    path, f'line {line}: {event.tag} is a tag, which ROS 2 parameter files do not '
+                    'know: write the value alone')
+            if (isinstance(event, yaml.ScalarEvent) and not event.style
+                    and len(event.value) > LONGEST):
+                raise UnreadableFileError(
+                    path, f'line {line}: a value has {len(event.value)} characters, but without '
+                    f'quotes it must have at most {LONGEST}')
+    except yaml.YAMLError as error:
+        raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
+
+
+def parse(text: str, path: str | PathLike[str] = '') -> Any:
+    """Return what a YAML text within bounds holds.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it is no YAML, or the same key stands twice.
+    """
+    try:
+        return yaml.load(text, Loader=_StrictLoader)
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
+
+
+def _one_line(error: Exception) -> str:
+    return ' '.join(str(error).split())
+
+
+class _StrictLoader(_SafeLoader):  # type: ignore[misc]
+    """YAML that refuses the same key twice: the later one would win in silence."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(
+                    None, None, 'a key must be a word', key_node.start_mark)
+            key = key_node.value
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'the key {key!r} stands twice', key_node.start_mark)
+            seen.add(key)
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)
+        return mapping
+
+
+# ROS 2 reads 1e-3 and 1.0e2 as numbers; YAML 1.1, which PyYAML follows, as words.
+_StrictLoader.add_implicit_resolver(
+    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$'),
+    list('-+0123456789.'))

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Text for every terminal and file: plain characters, and names of files as they can be shown."""
+
+from __future__ import annotations
+
+import codecs
+
+# Name of the error handler for streams that are not UTF-8.
+PLAIN = 'pprs_plain'
+# What the package prints beyond ASCII, and what comes near it there.
+SUBSTITUTES = {'…': '...', '±': '+/-', '²': '^2', '°': ' deg', '·': '*', '→': '->',
+               '\u2013': '-', '\u2014': '-', 'µ': 'u', 'μ': 'u', '█': '#', '▏': '|'}
+
+
+def displayed(name: object) -> str:
+    """Return a name, of a file or in one, without what cannot be shown or written as UTF-8.
+
+    Bytes that are not UTF-8 become `\\xff`, control characters what Python writes for them.
+    """
+    return ''.join(character if character.isprintable() else _escaped(character)
+                   for character in str(name))
+
+
+def _escaped(character: str) -> str:
+    # Python keeps a file name's undecodable byte 0xff as the lone surrogate U+DCFF.
+    if '\udc80' <= character <= '\udcff':
+        return f'\\x{ord(character) - 0xdc00:02x}'
+    return character.encode('unicode_escape').decode('ascii')
+
+
+def _in_plain(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return ''.join(SUBSTITUTES.get(character) or _escaped(character)
+                   for character in error.object[error.start:error.end]), error.end
+
+
+codecs.register_error(PLAIN, _in_plain)

@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command-line tool: what it writes, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from ros_processes import executable
+
+from pprs_dynamics.app.commands.output import write_text
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.physics.model.parameter_file import default_parameters
+
+
+def pprs(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *arguments], capture_output=True, text=True, cwd=cwd,
+                          timeout=120)
+
+
+def png_size(file: Path) -> tuple[int, int]:
+    header = file.read_bytes()[:24]
+    assert header[:8] == b'\x89PNG\r\n\x1a\n'
+    return struct.unpack('>II', header[16:24])
+
+
+@pytest.fixture(scope='module')
+def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('reproduce')
+    done = pprs('reproduce', '--output', str(folder / 'new' / 'output'), '--json',
+                str(folder / 'result.json'), cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert 'reproduced' in done.stdout
+    return folder
+
+
+def test_reproduce_writes_figures_curves_and_claims(reproduced: Path) -> None:
+    output = reproduced / 'new' / 'output'
+    for name in ('figure_8.png', 'figure_9.png'):
+        assert min(png_size(output / name)) > 400
+    content = json.loads((reproduced / 'result.json').read_text())
+    assert content == json.loads((output / 'claims.json').read_text())
+    for claim in content['claims']:
+        assert set(claim) == {'claim', 'paper', 'found', 'reproduced'}
+        assert isinstance(claim['reproduced'], bool)
+
+
+def test_reproduce_is_honest_about_what_does_not_come_out(reproduced: Path) -> None:
+    claims = json.loads((reproduced / 'result.json').read_text())['claims']
+    verdicts = [claim['reproduced'] for claim in claims]
+    assert verdicts == [True, True, False, False, True, True]
+    # The checked figures: 24 to 28 % printed, active 0.93 N, passive 0.13 N exact and 0.00 N.
+    assert 'motor 1: 29.1 %' in claims[0]['found']
+    assert '0.93 N rms active, 0.13 N rms passive' in claims[1]['found']
+    assert '0.000 N rms by the second' in claims[2]['found']
+    assert '48.2 to 109.5 degrees' in claims[4]['found']
+
+
+def test_the_printed_equations_give_the_printed_figures(tmp_path: Path) -> None:
+    model = tmp_path / 'printed.yaml'
+    values = default_parameters() | {'equations': 'printed'}
+    model.write_text(yaml.safe_dump({'/**': {'ros__parameters': values}}))
+    done = pprs('reproduce', '--model', str(model), '--output', str(tmp_path))
+    assert done.returncode == 0
+    claims = json.loads((tmp_path / 'claims.json').read_text())['claims']
+    assert '0.10 N rms passive' in claims[1]['found']
+    assert '0.097 N rms by the first, 0.000 N rms by the second' in claims[2]['found']
+
+
+def test_the_curves_leave_a_gap_where_the_second_approach_is_not_defined(reproduced: Path) -> None:
+    curves = np.genfromtxt(reproduced / 'new/output/forces.csv', delimiter=',', names=True)
+    first, second = curves['slide_1whole_mechanism'], curves['slide_1independent_chains']
+    assert np.isfinite(first).all()
+    assert 0.05 < np.isnan(second).mean() < 0.5
+    assert np.nanmax(np.abs(curves['lift_1independent_chains'])) < 20.0
+    # rms of the frictionless forces: 3.43, 3.93, 3.93, 13.41, 13.41, 13.41 N.
+    rms = [np.sqrt(np.mean(curves[f'{drive}Q'] ** 2)) for drive in (
+        'slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')]
+    np.testing.assert_allclose(rms, [3.43, 3.93, 3.93, 13.41, 13.41, 13.41], atol=0.005)
+
+
+MISTAKES = {
+    ('reproduce',): '--output',
+    ('compute',): 'compute',
+    ('reproduce', '--output', '/dev/null/below'): '/dev/null/below: cannot be a folder',
+    ('reproduce', '--output', '{tmp}', '--model', 'nowhere.yaml'): 'nowhere.yaml: no such file',
+    ('reproduce', '--output', '{tmp}', '--json', '{tmp}/no/x.json'): 'no/x.json: cannot be written',
+}
+
+
+@pytest.mark.parametrize('arguments', MISTAKES, ids=' '.join)
+def test_a_mistake_is_one_line_and_status_2(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    done = pprs(*(word.replace('{tmp}', str(tmp_path)) for word in arguments), cwd=tmp_path)
+    assert done.returncode == 2
+    assert MISTAKES[arguments] in done.stderr
+    assert 'Traceback' not in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith('pprs')
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one_whole(tmp_path: Path) -> None:
+    old = tmp_path / 'result.json'
+    write_text(old, 'old')
+    with pytest.raises(UnreadableFileError, match='cannot be written'):
+        write_text(tmp_path / 'result.json' / 'below', 'new')
+    with pytest.raises(UnicodeEncodeError):
+        write_text(old, 'new \ud800')
+    assert old.read_text() == 'old'
+    assert list(tmp_path.iterdir()) == [old]

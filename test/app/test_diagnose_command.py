@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs diagnose, from files of a robot with a hidden effect to its answer and its page."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from browser import Seen, chromium, needs_browser
+from ros_processes import executable
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.app.commands.diagnosis_cache import diagnosis_key, kept_diagnosis
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.simulation.driven_motion import DrivenMotion
+from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.prescribed import PrescribedPlant
+from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+
+HIDDEN, RATE = 'coulomb_friction', 250.0
+
+
+def pprs(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
+                          text=True, timeout=300, cwd=cwd)
+
+
+def record(path: Path, seed: int, duration: float) -> dict[str, Any]:
+    """Write a recording of a robot whose friction the model does not know; return the truth."""
+    model = DriveModel.load()
+    time = np.arange(0.0, duration, 1 / RATE)
+    drives = model.mechanism(Excitation(duration=duration, seed=seed).motion(time))
+    motion = DrivenMotion.of_drives(model.values, time, drives.position, drives.velocity,
+                                    drives.acceleration)
+    effect = draw_effect(HIDDEN, np.random.default_rng(11))
+    read = PrescribedPlant(model.values, motion).readings([effect])
+    sensors = SensorSettings()
+    noise = EffortNoise(sensors, np.random.default_rng(seed)).samples(len(time))
+    write_recording(path, Recording.from_arrays(
+        path.name, time, sensors.quantised(read.position), None, read.effort + noise))
+    return effect.truth()
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Diagnose one recording, with another one held out."""
+    folder = tmp_path_factory.mktemp('diagnose')
+    truth = record(folder / 'run.csv', 1, 14.0)
+    record(folder / '<b>other<b>.mcap', 2, 8.0)
+    (folder / 'truth.json').write_text(json.dumps(truth))
+    done = pprs('diagnose', 'run.csv', '--validate', '<b>other<b>.mcap', '--json', 'result.json',
+                '--report', 'page.html', cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / 'stdout.txt').write_text(done.stdout)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def result(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((folder / 'result.json').read_text())
+    return content
+
+
+def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
+    folder: Path, result: dict[str, Any],
+) -> None:
+    truth = json.loads((folder / 'truth.json').read_text())
+    assert result['verdict'] == 'effect'
+    first = result['effects'][0]
+    assert first['name'] == HIDDEN
+    assert set(first['drives']) == set(truth['drives'])
+    for drive, values in truth['parameters'].items():
+        assert first['parameters'][f'{drive}.force']['value'] == pytest.approx(
+            values['force'], rel=0.1)
+    assert first['error_after'] < 0.5 * first['error_before']
+    assert first['held_out_after'] < 0.5 * first['held_out_before']
+    assert result['candidates'][0]['name'] == HIDDEN
+
+
+def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
+    promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
+    added = {'calibrated', 'held_out_on', 'noise_floor', 'noise_floors', 'sets', 'warnings'}
+    assert set(result) == promised | added
+    for effect in result['effects']:
+        assert set(effect) == {'name', 'drives', 'parameters', 'error_before', 'error_after',
+                               'held_out_before', 'held_out_after', 'evidence'}
+        assert set(effect['drives']) <= set(DRIVES)
+        for parameter in effect['parameters'].values():
+            assert set(parameter) == {'value', 'std', 'unit'}
+    for candidate in result['candidates']:
+        assert set(candidate) == {'name', 'drives', 'evidence', 'error_after'}
+    assert set(result['noise_floors']) == set(DRIVES)
+    assert result['sets'][0]['cost'] == 0.0
+    assert [one['name'] for one in result['sets'][0]['effects']] == [HIDDEN]
+    assert all(one['cost'] > 0 for one in result['sets'][1:])
+    assert result['held_out_on'] == 'validation'
+    assert all(isinstance(one, str) for one in result['warnings'])
+
+
+def test_the_terminal_says_verdict_fall_and_the_next_command_in_25_lines(folder: Path) -> None:
+    text = (folder / 'stdout.txt').read_text()
+    assert len(text.strip().splitlines()) <= 25
+    shown = ' '.join(text.replace('│', ' ').split())
+    for part in (f'The model lacks {HIDDEN} on', 'the error falls from', 'Runner-up',
+                 f"pprs adopt {HIDDEN} run.csv --validate '<b>other<b>.mcap' --output "
+                 f'with_{HIDDEN}.yaml', 'page: page.html'):
+        assert part in shown
+
+
+def test_adopt_after_diagnose_need_not_diagnose_again(folder: Path) -> None:
+    """With what `diagnose` kept; and not once a recording or the model is another."""
+    shutil.copy(folder / 'run.csv', folder / 'copy.csv')
+    assert kept_diagnosis(diagnosis_key(DriveModel.load(), [str(folder / 'copy.csv')], None)), (
+        'the contents count, not the name')
+    other = build_model({**DriveModel.load().values, 'masses.payload': 1.001})
+    assert kept_diagnosis(diagnosis_key(other, [str(folder / 'run.csv')], None)) is None
+    with (folder / 'copy.csv').open('a') as file:
+        file.write('\n')
+    assert kept_diagnosis(
+        diagnosis_key(DriveModel.load(), [str(folder / 'copy.csv')], None)) is None
+    done = pprs('adopt', HIDDEN, 'run.csv', '--validate', '<b>other<b>.mcap', '--output',
+                'adopted.yaml', cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.strip().splitlines()) <= 25
+
+
+MISTAKES = {
+    ('run.csv', '--validate', 'run.csv'): 'what is held out must be another recording',
+    ('run.csv', '--adopt-all'): '--adopt-all: no --output FILE is given',
+    ('run.csv', '--output', 'x.yaml'): '--output: it is given without --adopt-all',
+    ('nowhere.csv',): 'nowhere.csv: No such file',
+    ('run.csv', '--model', 'nowhere.yaml'): 'nowhere.yaml: no such file',
+    ('empty.csv',): 'empty.csv: ',
+}
+
+
+@pytest.mark.parametrize('arguments', MISTAKES, ids=' '.join)
+def test_a_mistake_is_one_line_and_status_2(folder: Path, arguments: tuple[str, ...]) -> None:
+    (folder / 'empty.csv').write_text('')
+    done = pprs('diagnose', *arguments, cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.startswith('pprs diagnose: ')
+    assert MISTAKES[arguments] in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (folder / 'x.yaml').exists()
+
+
+def test_no_recording_is_a_mistake_too() -> None:
+    done = pprs('diagnose')
+    assert done.returncode == 2
+    assert 'RECORDING' in done.stderr
+
+
+@needs_browser
+@pytest.mark.parametrize('width', [1280, 390])
+def test_a_browser_draws_the_page_without_complaints(
+    folder: Path, tmp_path: Path, width: int,
+) -> None:
+    text = (folder / 'page.html').read_text()
+    assert '&lt;b&gt;other' in text
+    assert '<b>other' not in text
+    with chromium() as browser:
+        seen = Seen(browser, folder / 'page.html', viewport={'width': width, 'height': 1600})
+        # The effect, its card, candidates, contributions, each drive before and after.
+        assert seen.unfold() == 5 + len(DRIVES)
+        assert seen.complaints == []
+        seen.tab.evaluate('scrollTo(0, 0)')
+        seen.tab.screenshot(path=tmp_path / 'page.png')
+    picture = matplotlib.image.imread(tmp_path / 'page.png')
+    pixels = picture[..., :3]
+    assert 0.003 < np.mean(pixels.min(axis=2) < 0.5) < 0.5
+    assert np.mean(np.ptp(pixels, axis=2) > 0.2) > 0.002

@@ -1,0 +1,191 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs compare from files to its page, and the page in a real browser."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from browser import Seen, chromium, needs_browser
+from rich.console import Console
+from rich.progress import Progress
+from ros_processes import executable
+
+from pprs_dynamics.app.report.comparison_figures import thinned, worst_spans
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.app.report.progress import staged_bar
+from pprs_dynamics.measurement.files.recording import read_recording, write_recording
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+
+def pprs(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
+                          text=True, timeout=300)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Simulate a robot with a hidden effect, and compare the model with it."""
+    folder = tmp_path_factory.mktemp('compare')
+    # A name that would be a script where it is not escaped.
+    run = folder / '<script>alert(1)</script>.mcap'.replace('/', '')
+    done = pprs('simulate', '--output', run, '--effect', 'coulomb_friction', '--seed', '11',
+                '--duration', '15', '--json', folder / 'truth.json', '--report',
+                folder / 'robot.html')
+    assert done.returncode == 0, done.stderr
+    done = pprs('compare', run, '--json', folder / 'mcap.json', '--report', folder / 'page.html')
+    assert done.returncode == 0, done.stderr
+    (folder / 'stdout.txt').write_text(done.stdout)
+    return folder
+
+
+def test_compare_finds_the_hidden_effects_drive_and_its_size(folder: Path) -> None:
+    truth = json.loads((folder / 'truth.json').read_text())['effects'][0]['parameters']
+    result = json.loads((folder / 'mcap.json').read_text())
+    assert set(result['drives']) == set(DRIVES)
+    for name, drive in result['drives'].items():
+        assert set(drive) == {'rms', 'relative', 'bias', 'peak'}
+        if name in truth:
+            # Nearly all of the error of a dry friction is its size.
+            assert drive['rms'] == pytest.approx(abs(truth[name]['force']), rel=0.25)
+        else:
+            assert drive['rms'] < 0.08
+    assert result['where'], 'a dry friction stands out'
+    first = result['where'][0]
+    assert first['drive'] in truth
+    assert first['variable'] in ('direction', 'velocity')
+    assert set(first) == {'drive', 'variable', 'range', 'share_of_error', 'share_of_time', 'text'}
+    squares = [drive['rms'] ** 2 for drive in result['drives'].values()]
+    assert result['overall']['rms'] == pytest.approx(np.sqrt(np.mean(squares)))
+
+
+def test_the_same_samples_from_other_files_give_the_same_numbers(folder: Path) -> None:
+    run = next(folder.glob('*.mcap'))
+    recording = read_recording(run)
+    for name in ('run.csv', 'bag', 'run.db3'):
+        write_recording(folder / name, recording)
+        done = pprs('compare', folder / name, '--json', folder / 'other.json')
+        assert done.returncode == 0, done.stderr
+        assert json.loads((folder / 'other.json').read_text()) == json.loads(
+            (folder / 'mcap.json').read_text()), name
+
+
+def test_info_says_what_is_in_a_file_and_what_is_wrong_with_it(folder: Path) -> None:
+    recording = read_recording(next(folder.glob('*.mcap')))
+    broken = folder / 'broken.csv'
+    write_recording(broken, recording)
+    lines = broken.read_text().splitlines()
+    del lines[3000:3500]
+    broken.write_text('\n'.join(lines))
+    done = pprs('info', broken, '--json', folder / 'info.json')
+    assert done.returncode == 0
+    for drive in DRIVES:
+        assert drive in done.stdout
+    content = json.loads((folder / 'info.json').read_text())['recordings'][0]
+    assert [finding['kind'] for finding in content['findings']] == ['gap']
+    assert len(content['segments']) == 2
+    assert '1 gap' in done.stdout
+
+
+@pytest.mark.parametrize('content', [b'', b'time,a\n1,2\n', bytes(range(256)) * 20])
+def test_a_foreign_file_is_one_line_and_status_2(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / 'x.csv'
+    file.write_bytes(content)
+    for command in ('compare', 'info'):
+        done = pprs(command, file)
+        assert done.returncode == 2
+        assert done.stderr.startswith(f'pprs {command}: {file}: ')
+        assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_the_page_needs_no_network_and_escapes_names(folder: Path) -> None:
+    text = (folder / 'page.html').read_text()
+    assert not re.search(r'<(script|link|img)[^>]+(src|href)=', text)
+    assert '<script>alert(1)' not in text
+    assert '&lt;script&gt;alert(1)' in text
+
+
+@needs_browser
+@pytest.mark.parametrize('name', ['page.html', 'robot.html'])
+def test_a_browser_draws_the_page_without_complaints(
+    folder: Path, tmp_path: Path, name: str,
+) -> None:
+    with chromium() as browser:
+        seen = Seen(browser, folder / name, viewport={'width': 1280, 'height': 1600})
+        assert seen.unfold() >= 1
+        assert seen.complaints == []
+        seen.tab.evaluate('scrollTo(0, 0)')
+        seen.tab.screenshot(path=tmp_path / 'page.png')
+    picture = matplotlib.image.imread(tmp_path / 'page.png')
+    assert picture.shape[:2] == (1600, 1280)
+    # Text and curves: dark and coloured pixels, on a page mostly white.
+    pixels = picture[..., :3]
+    assert 0.003 < np.mean(pixels.min(axis=2) < 0.5) < 0.5
+    assert np.mean(np.ptp(pixels, axis=2) > 0.2) > 0.002
+
+
+def test_a_progress_bar_never_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[tuple[Any, float]] = []
+    monkeypatch.setattr(Progress, 'update', lambda self, task, completed: shown.append(
+        (task, completed)))
+    with staged_bar(Console(file=io.StringIO())) as advance:
+        for stage, share in (('diagnosing', 0.1), ('diagnosing', 0.6), ('diagnosing', 0.4),
+                             ('adopting', 0.2), ('adopting', 0.1)):
+            advance(stage, share)
+    first, second = shown[0][0], shown[-1][0]
+    assert shown == [(first, 0.1), (first, 0.6), (first, 0.6), (second, 0.2), (second, 0.2)]
+    assert first != second
+
+
+def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
+    time = np.arange(100_000.0)
+    first, second = np.zeros(100_000), np.zeros(100_000)
+    first[40_000], second[70_001] = 3.0, -4.0
+    times, one, other = thinned(time, first, second)
+    assert len(times) == len(one) == len(other) <= 3000
+    assert one.max() == 3.0
+    assert other.min() == -4.0
+
+
+def test_long_recordings_are_thinned_without_losing_a_peak() -> None:
+    time = np.arange(1_000_000.0)
+    values = np.zeros(1_000_000)
+    values[[123_456, 777_777]] = (5.0, -7.0)
+    values[500_000:500_500] = np.nan
+    shown_time, shown = thinned(time, values)
+    assert len(shown) <= 3000
+    assert {5.0, -7.0} <= set(shown)
+    assert np.all(np.diff(shown_time) > 0)
+
+
+def test_the_worst_second_is_the_one_with_the_planted_error() -> None:
+    time = np.arange(0, 20, 0.01)
+    error = np.zeros((len(time), 6))
+    error[700:760, 2] = 1.0
+    residuals = Residuals(DRIVES, time, np.zeros(len(time), dtype=int), error, np.zeros_like(error))
+    start, end = worst_spans(residuals, 2)[0]
+    assert start <= 7.0
+    assert end >= 7.59
+    assert worst_spans(residuals, 1) == []
+
+
+def test_text_from_files_is_escaped_everywhere() -> None:
+    page = Page('<b>')
+    page.heading('<i>')
+    page.text('<u>', 'lead')
+    page.bullets(['<s>'])
+    page.table(('<p>', 'x'), [('<q>', '<r>')], ['good'])
+    html = page.html()
+    for letter in 'biuspqr':
+        assert f'&lt;{letter}&gt;' in html
+    assert '<th scope="row" class="good">&lt;q&gt;' in html

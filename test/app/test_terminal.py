@@ -1,0 +1,254 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What commands print and write: for every terminal, pipe and file name."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_processes import executable
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_writer import format_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters
+
+RATE, DURATION = 200.0, 8.0
+# A drive force that the model lacks, so that commands have something to say.
+VISCOUS = 12.0  # [N s/m]
+BOXES = '┃│━─┏┓'
+UNDECODABLE = os.fsdecode(b'bad\xff[m].csv')
+NAMES = ('x[bold].csv', 'a:bug:.csv', UNDECODABLE, 'line\nbreak.csv')
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the recording run.csv."""
+    folder = tmp_path_factory.mktemp('terminal')
+    model = DriveModel.load()
+    motion = Excitation(DURATION).motion(np.arange(0.0, DURATION, 1 / RATE))
+    forces = model.drive_forces(motion)
+    q, q_dot = forces.mechanism.position, forces.mechanism.velocity
+    noise = np.random.default_rng(0).normal(0, 0.05, q.shape)
+    effort = forces.total + noise
+    effort[:, 1] += VISCOUS * q_dot[:, 1]
+    write_recording(folder / 'run.csv', Recording.from_arrays(
+        'run', motion.time, np.round(q, 6), q_dot, effort))
+    (folder / 'model.yaml').write_text(format_model(default_parameters()), encoding='utf-8')
+    return folder
+
+
+def pprs(
+    folder: Path, *arguments: str, redirect: str = '', **variables: str,
+) -> subprocess.CompletedProcess[bytes]:
+    """Run the command in a shell, which closes or redirects streams."""
+    return subprocess.run(
+        ['sh', '-c', f'"$@" {redirect}', 'sh', executable('pprs'), *arguments], cwd=folder,
+        capture_output=True, timeout=300, env={**os.environ, **variables})
+
+
+COMMANDS = {
+    'info': ('info', 'run.csv'),
+    'compare': ('compare', 'run.csv', '--json', '{name}.json', '--report', '{name}.html'),
+    'diagnose': ('diagnose', 'run.csv', '--json', '{name}.json'),
+    'adopt': ('adopt', 'viscous_friction', 'run.csv', '--output', '{name}.yaml'),
+    'history': ('history', 'model.yaml', '--report', '{name}.html'),
+    'reproduce': ('reproduce', '--output', '{name}')}
+STREAMS = {
+    'POSIX': {'LC_ALL': 'POSIX'}, 'ascii': {'PYTHONIOENCODING': 'ascii'},
+    'latin-1': {'PYTHONIOENCODING': 'latin-1'}}
+
+
+@pytest.mark.parametrize('stream', STREAMS)
+@pytest.mark.parametrize('command', ['info', 'compare', 'reproduce', 'history'])
+def test_a_terminal_that_is_not_utf_8_gets_plain_characters(
+    folder: Path, stream: str, command: str,
+) -> None:
+    arguments = [word.format(name=f'{command}-{stream}') for word in COMMANDS[command]]
+    done = pprs(folder, *arguments, PYTHONUTF8='', **STREAMS[stream])
+    assert done.returncode == 0, done.stderr
+    text = done.stdout.decode('latin-1' if stream == 'latin-1' else 'ascii')
+    assert len(text.splitlines()) >= 1
+    assert '?' not in text
+    assert '\\u' not in text
+    if command == 'info':
+        assert '-0.0' in text
+        assert ' ... ' in text
+        # Every line of the table is as wide as its frame.
+        widths = {len(line) for line in text.splitlines() if line.startswith(('|', '+'))}
+        assert len(widths) == 1
+
+
+@pytest.mark.parametrize('command', ['diagnose', 'adopt'])
+def test_work_of_seconds_is_not_lost_to_a_terminal(folder: Path, command: str) -> None:
+    arguments = [word.format(name=command) for word in COMMANDS[command]]
+    done = pprs(folder, *arguments, LC_ALL='POSIX', PYTHONUTF8='')
+    assert done.returncode == 0, done.stderr
+    assert '+/-' in done.stdout.decode('ascii')
+
+
+def test_utf_8_terminals_keep_their_characters(folder: Path) -> None:
+    for variables in ({'LC_ALL': 'C.UTF-8'}, {'LC_ALL': 'POSIX', 'PYTHONUTF8': '1'}):
+        text = pprs(folder, 'info', 'run.csv', **variables).stdout.decode('utf-8')
+        assert all(character in text for character in '┃│━…')
+
+
+def test_headings_keep_their_units(folder: Path) -> None:
+    info = pprs(folder, 'info', 'run.csv').stdout.decode()
+    for heading in ('position [m]', 'velocity [m/s]', 'effort [N]'):
+        assert heading in info
+    compared = pprs(folder, 'compare', 'run.csv').stdout.decode()
+    assert 'rms [N]' in compared
+
+
+@pytest.mark.parametrize('redirect', ['>&-', '2>&-', '>&- 2>&-', '<&- >&- 2>&-'])
+def test_closed_streams_do_not_end_the_work(folder: Path, redirect: str) -> None:
+    answer = folder / 'closed.json'
+    answer.unlink(missing_ok=True)
+    done = pprs(folder, 'info', 'run.csv', '--json', answer.name, redirect=redirect)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == b''
+    # No text of the terminal in a file that took the place of a closed stream.
+    assert json.loads(answer.read_text())['recordings'][0]['name'] == 'run.csv'
+
+
+@pytest.mark.parametrize('redirect', ['| head -n 1', '| true'])
+def test_a_reader_that_goes_away_does_not_take_the_files_with_it(
+    folder: Path, redirect: str,
+) -> None:
+    answer = folder / 'read.json'
+    answer.unlink(missing_ok=True)
+    done = pprs(folder, 'compare', 'run.csv', '--json', answer.name,
+                redirect=f'{redirect}; test -s {answer.name}')
+    assert done.returncode == 0
+    assert done.stderr == b''
+
+
+def test_a_full_disk_behind_the_text_is_one_sentence_and_the_files_are_there(
+    folder: Path,
+) -> None:
+    answer = folder / 'full.json'
+    done = pprs(folder, 'info', 'run.csv', '--json', answer.name, redirect='> /dev/full')
+    assert done.returncode == 2
+    assert done.stderr == b'pprs info: output: No space left on device\n'
+    assert json.loads(answer.read_text())
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, name: str) -> None:
+    (folder / 'x[').mkdir(exist_ok=True)
+    shown = name.replace(UNDECODABLE, 'bad\\xff[m].csv').replace('\n', '\\n')
+    shutil.copy(folder / 'run.csv', folder / name)
+    done = pprs(folder, 'info', name, '--json', 'name.json')
+    assert done.returncode == 0, done.stderr
+    assert f'{shown}: ' in done.stdout.decode()
+    content = json.loads((folder / 'name.json').read_text(encoding='utf-8'))
+    assert content['recordings'][0]['name'] == shown
+    page = name.replace('.csv', '.html')
+    done = pprs(folder, 'compare', name, '--report', page, '--json',
+                name.replace('.csv', '.json'))
+    assert done.returncode == 0, done.stderr
+    assert f'page: {shown.replace(".csv", ".html")}' in done.stdout.decode()
+    (folder / page).read_text(encoding='utf-8')
+
+
+def test_a_closing_tag_in_a_path_is_no_markup(folder: Path) -> None:
+    (folder / 'x[').mkdir(exist_ok=True)
+    shutil.copy(folder / 'run.csv', folder / 'x[' / '].csv')
+    for command in ('info', 'compare'):
+        done = pprs(folder, command, 'x[/].csv')
+        assert done.returncode == 0, done.stderr
+    done = pprs(folder, 'info', 'x[/]none.csv')
+    assert done.returncode == 2
+    assert done.stderr.startswith(b'pprs info: x[/]none.csv: ')
+
+
+def test_names_in_the_ledger_and_on_the_page_of_an_adoption(folder: Path) -> None:
+    shutil.copy(folder / 'run.csv', folder / UNDECODABLE)
+    done = pprs(folder, 'adopt', 'viscous_friction:slide_2', UNDECODABLE, '--output', 'bad.yaml',
+                '--report', 'adopt.html', '--json', 'adopt.json')
+    assert done.returncode == 0, done.stderr
+    done = pprs(folder, 'history', 'bad.yaml', '--json', 'history.json')
+    assert done.returncode == 0, done.stderr
+    assert 'bad\\xff[m].csv' in done.stdout.decode()
+    steps = json.loads((folder / 'history.json').read_text(encoding='utf-8'))['steps']
+    assert steps[0]['recordings'] == ['bad\\xff[m].csv']
+
+
+def test_a_model_file_of_an_undecodable_name(folder: Path) -> None:
+    name = os.fsdecode(b'model\xfe.yaml')
+    shutil.copy(folder / 'model.yaml', folder / name)
+    done = pprs(folder, 'history', name, '--report', 'history.html')
+    assert done.returncode == 0, done.stderr
+    assert 'model\\xfe.yaml' in (folder / 'history.html').read_text(encoding='utf-8')
+    done = pprs(folder, 'info', 'run.csv', '--model', os.fsdecode(b'none\xfe.yaml'))
+    assert done.returncode == 2
+    assert done.stderr.startswith(b'pprs info: none\\xfe.yaml: no such file')
+
+
+def test_an_unknown_effect_is_one_line(folder: Path) -> None:
+    for name in ('nonsense', 'viscous_frictoin', '[/]'):
+        done = pprs(folder, 'adopt', name, 'run.csv', '--output', 'x.yaml')
+        assert done.returncode == 2
+        assert done.stderr.count(b'\n') == 1
+        assert b'unknown effect' in done.stderr
+
+
+OUTPUTS = {
+    ('simulate', '--output', 'x.txt'): '.csv, .mcap, .db3',
+    ('simulate', '--output', 'x.CSV'): '.csv, .mcap, .db3',
+    ('simulate', '--output', 'x.csv', '--report', 'x.pdf'): '.html',
+    ('adopt', 'viscous_friction', 'run.csv', '--output', 'x.csv'): '.yaml or .yml',
+    ('diagnose', 'run.csv', '--adopt-all', '--output', 'x'): '.yaml or .yml',
+    ('history', 'model.yaml', '--undo', '--output', 'x.json'): '.yaml or .yml',
+    ('history', 'model.yaml', '--report', 'x.svg'): '.html or .png',
+    ('next-experiment', 'run.csv', '--output', 'x.yaml'): '.csv',
+    ('compare', 'run.csv', '--report', 'x.txt'): '.html',
+    ('info', 'run.csv', '--json', 'x.txt'): '.json'}
+
+
+@pytest.mark.parametrize('arguments', OUTPUTS, ids=' '.join)
+def test_unknown_endings_of_outputs_are_refused_with_those_that_are_known(
+    folder: Path, arguments: tuple[str, ...],
+) -> None:
+    before = set(folder.iterdir())
+    done = pprs(folder, *arguments)
+    assert done.returncode == 2
+    last = done.stderr.decode().splitlines()[-1]
+    assert f'must end in {OUTPUTS[arguments]}' in last
+    assert set(folder.iterdir()) == before
+
+
+NUMBERS = {
+    'simulate': {'--scale': ('-1', '1e7', 'nan'), '--seed': ('-1', '9' * 5000, '1.5', '²'),
+                 '--path-seed': ('-1', '9' * 40), '--duration': ('0', '1e9', 'inf', 'x'),
+                 '--noise': ('-1', '1e9')},
+    'next-experiment': {
+        '--rate': ('0', '1e9', 'nan'), '--duration': ('1', '1e9'), '--velocity': ('0', '1e9'),
+        '--acceleration': ('0', '1e9'), '--tilt': ('0', '4'), '--condition': ('0.5', '1e9'),
+        '--margin': ('-0.1', '1'), '--noise': ('0', '1e9'), '--seed': ('-1', '9' * 40)}}
+
+
+@pytest.mark.parametrize('command', NUMBERS)
+def test_every_number_has_bounds_and_a_sentence(
+    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
+) -> None:
+    from pprs_dynamics.app.commands.pprs import main
+
+    for option, values in NUMBERS[command].items():
+        for value in values:
+            with pytest.raises(SystemExit) as ended:
+                main([command, '--output', str(tmp_path / 'x.csv'), option, value])
+            assert ended.value.code == 2
+            last = capsys.readouterr().err.splitlines()[-1]
+            assert f'argument {option}: ' in last
+            assert ' must ' in last
+            assert len(last) < 200

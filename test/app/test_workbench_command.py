@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""`pprs workbench` on what else it may be given: nothing, folders, surveys, a single axis."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_processes import executable
+from workbench_bench import write_hidden
+from workbench_server import workbench
+
+from pprs_dynamics import load_model
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.workbench import Session
+from pprs_dynamics.app.workbench.server.serve import serve
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+
+AXIS = 'config/single_axis.yaml'
+SPRING = 60.0  # [N/m]
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('command')
+    (folder / 'data').mkdir()
+    write_hidden(folder / 'data' / 'run.csv', 1, 8.0)
+    return folder
+
+
+def test_a_survey_opens_its_recordings(folder: Path) -> None:
+    store = folder / 'store'
+    assert main(['survey', str(folder / 'data' / 'run.csv'), '--output', str(store), '--effects',
+                 'payload_mass', '--workers', '1']) == 0
+    with workbench(store, folder=folder) as bench:
+        bench.enter()
+        bench.wait(lambda screen: not screen['is_beginning'])
+        assert bench.screen()['is_empty']
+        surveyed = bench.get('/api/files').json['surveyed']
+        assert [one['recording'] for one in surveyed] == ['run.csv']
+        assert bench.post('/api/open', name='survey/1').status == 400
+        assert bench.post('/api/open', name='survey/../data').status == 400
+        opened = bench.post('/api/open', name=surveyed[0]['name'])
+        assert opened.status == 200
+        assert [one['name'] for one in bench.screen()['recordings']] == ['run.csv']
+
+
+def test_without_a_recording_it_waits_for_one(folder: Path) -> None:
+    with workbench(folder / 'data', folder=folder) as bench:
+        bench.enter()
+        bench.wait(lambda screen: not screen['is_beginning'])
+        assert bench.screen()['is_empty']
+        assert bench.get('/api/curves').status == 400
+        assert bench.post('/api/open', name='0/run.csv').status == 200
+        assert not bench.settled().get('is_empty')
+
+
+def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder: Path) -> None:
+    short = write_hidden(folder / 'short.csv', 1, 0.6)
+    with workbench(short, folder=folder) as bench:
+        bench.enter()
+        screen = bench.wait(lambda screen: not screen['is_beginning'])
+        assert 'must hold at least 100 of a drive' in screen['failure']
+        assert 'Error' not in (folder / 'workbench.log').read_text()
+
+
+def test_mistakes_of_usage_are_one_line_before_anything_is_served(tmp_path: Path) -> None:
+    bad = tmp_path / 'bad.csv'
+    bad.write_text('time,\n1,2\n')
+    for arguments, told in ((('--port', '99999'), '--port'), (('nothing.csv',), 'nothing.csv'),
+                            (('--model', 'no.yaml'), 'no.yaml'), ((str(bad),), 'bad.csv'),
+                            ((str(bad), str(bad)), 'twice'),
+                            (('--host', '0.0.0.0'), 'one address')):
+        done = subprocess.run([executable('pprs'), 'workbench', '--no-browser', *arguments],
+                              capture_output=True, text=True, timeout=60)
+        assert done.returncode == 2, arguments
+        assert done.stdout == ''
+        assert done.stderr.count('\n') == 1
+        assert told in done.stderr
+
+
+def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
+    time = np.arange(0.0, 15.0, 0.002)
+    position = 0.1 * np.sin(2 * np.pi * 0.4 * time) + 0.03 * np.sin(2 * np.pi * 1.1 * time)
+    velocity, acceleration = np.gradient(position, time), np.gradient(
+        np.gradient(position, time), time)
+    values = load_model(AXIS).values
+    effort = (values['axis.mass'] * acceleration + values['axis.viscous'] * velocity
+              + values['axis.coulomb'] * np.tanh(velocity / values['friction.reversal_velocity'])
+              + values['axis.offset'] + SPRING * position
+              + np.random.default_rng(0).normal(0, 0.3, len(time)))
+    write_recording(tmp_path / 'axis.csv', Recording.from_arrays(
+        'axis', time, position[:, None], velocity[:, None], effort[:, None], drives=('axis',)))
+    session = Session.open([tmp_path / 'axis.csv'], AXIS)
+    session.settle()
+    session.tick('drive_spring')
+    shown = session.settle()
+    assert shown.estimates['drive_spring']['axis.stiffness'].value == pytest.approx(SPRING, rel=0.1)
+    assert session.overall().now < 0.5 * session.overall().before
+    json.dumps(session.to_json(), allow_nan=False)
+
+
+def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'uvicorn', None)
+    with pytest.raises(MissingLibraryError, match=r'workbench'):
+        serve(None, '127.0.0.1', 0, False)

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The workbench on a running robot: effects go to the nodes, and the error falls."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from browser import chromium, needs_browser
+from rclpy.context import Context
+from rclpy.node import Node
+from ros_processes import executable, node_process
+from sensor_msgs.msg import JointState
+from test_workbench_page import Page
+from workbench_bench import NOISE, write_hidden
+from workbench_server import Workbench, workbench
+
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.ros import conversions
+
+pytestmark = [pytest.mark.nodes, needs_browser]
+
+START = 1_700_000_000_000_000_000  # [ns]
+THINNED = 5  # of the recorded samples one is published: 100 Hz
+
+
+class Replay:
+    """Publishes a recording as joint states, in real time, again and again onwards."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context)
+        self.node = Node('replay', context=self.context)
+        self.publisher = self.node.create_publisher(JointState, '/joint_states', 100)
+        self.recording = recording
+        self.ends = threading.Event()
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self) -> None:
+        rows = np.arange(0, len(self.recording.time), THINNED)
+        stamp, began, sent = START, time.monotonic(), 0
+        while True:
+            stamp += 1_000_000_000  # a gap: the motion begins anew
+            for row in rows:
+                message = conversions.joint_state(
+                    stamp, self.recording.effort[row], self.recording.position[row],
+                    self.recording.position[row])
+                message.velocity = []
+                self.publisher.publish(message)
+                stamp += 10_000_000
+                sent += 1
+                if self.ends.wait(max(0.0, began + 0.01 * sent - time.monotonic())):
+                    return
+
+    def close(self) -> None:
+        self.ends.set()
+        self.thread.join(5)
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def bench(tmp_path: Path, ros_domain: int) -> Iterator[Workbench]:
+    recorded, live = write_hidden(tmp_path / 'run.csv', 1), write_hidden(tmp_path / 'live.csv', 3)
+    with ExitStack() as stack:
+        for name in ('monitor', 'feedforward'):
+            stack.enter_context(node_process([executable(name)], ros_domain,
+                                             tmp_path / f'{name}.log'))
+        replay = Replay(read_recording(live))
+        stack.callback(replay.close)
+        running = stack.enter_context(workbench(recorded, '--live', folder=tmp_path))
+        running.enter()
+        yield running
+
+
+def rms(page: Page, key: str) -> float:
+    values: list[Any] = page.tab.evaluate(f'bench.live.{key}')
+    return float(np.sqrt(np.mean(np.square(np.array(values, dtype=float)))))
+
+
+def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench) -> None:
+    with chromium() as browser:
+        page = Page(browser, bench)
+        page.settled()
+        page.tick('payload_mass')
+        page.tick('coulomb_friction')
+        page.tab.locator('#live-tab').click()
+        page.tab.wait_for_function('bench.live && bench.live.monitor_error && bench.live.kept > 6')
+        assert rms(page, 'error') > 0.3
+        assert rms(page, 'monitor_error') > 0.3
+        page.tab.locator('#live-set').click()
+        page.tab.locator('#live-nodes li').nth(1).wait_for()
+        assert page.tab.locator('#live-nodes').inner_text().splitlines() == [
+            'monitor: took the effects', 'feedforward: took the effects']
+        for key in ('error', 'monitor_error'):
+            page.tab.wait_for_function(
+                f'bench.live.{key} && Math.max(...bench.live.{key}) < {3 * NOISE}')
+        assert 'payload mass' in page.tab.locator('#live-state').inner_text()
+        # What came in is data for the session, too.
+        page.tab.locator('#live-take').click()
+        page.tab.wait_for_function('bench.state.recordings.length === 2')
+        assert page.settled()['recordings'][1]['now'] < 3 * NOISE
+        assert page.complaints == []
+        page.context.close()

@@ -1,0 +1,326 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The workbench as a user meets it: ticks, marks, adoption, in a real Chromium."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import chromium, needs_browser
+from test_page_in_browser import LEAST_CONTRAST, LEAST_TEXT, READABLE
+from workbench_bench import write_hidden
+from workbench_server import Workbench, workbench
+
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.physics.model.ledger import read_steps
+from pprs_dynamics.physics.model.model_file import load_model
+
+pytestmark = needs_browser
+PATIENCE = 180_000  # [ms], on a busy machine
+SETTLED = 'bench.state && bench.state.is_settled && bench.curves'
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('page')
+    write_hidden(folder / 'run.csv', 1)
+    write_hidden(folder / 'other.csv', 2)
+    return folder
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Any]:
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture(scope='module')
+def bench(folder: Path) -> Iterator[Workbench]:
+    with workbench(folder / 'run.csv', '--validate', folder / 'other.csv',
+                   folder=folder) as running:
+        running.enter()
+        yield running
+
+
+class Page:
+    """A tab on the workbench, and what it complained about."""
+
+    def __init__(self, browser: Any, bench: Workbench, **options: Any) -> None:
+        self.context = browser.new_context(**{
+            'viewport': {'width': 1500, 'height': 950}, 'bypass_csp': True, **options})
+        self.tab = self.context.new_page()
+        self.tab.set_default_timeout(PATIENCE)
+        self.complaints: list[str] = []
+        self.tab.on('console', self._hear)
+        self.tab.on('pageerror', lambda error: self.complaints.append(str(error)))
+        self.tab.goto(bench.post('/api/invite').json['address'])
+
+    def _hear(self, message: Any) -> None:
+        # The browser tells of every request that was refused; the page says why.
+        if 'the server responded with a status of 400' not in message.text:
+            self.complaints.append(message.text)
+
+    def settled(self) -> dict[str, Any]:
+        self.tab.wait_for_function(SETTLED)
+        found: dict[str, Any] = self.tab.evaluate('bench.state')
+        return found
+
+    def tick(self, name: str) -> dict[str, Any]:
+        """Click a box and wait for all that follows."""
+        before = self.tab.evaluate('bench.settled.length')
+        self.tab.locator(f'#tick-{name}').click()
+        self.tab.wait_for_function(f'bench.settled.length > {before}')
+        return self.settled()
+
+    def mark(self, drive: int, start: float, end: float) -> None:
+        """Drag over a drive's curve, from and to shares of its width."""
+        self.tab.evaluate('window.scrollTo(0, 0)')
+        box = self.tab.locator('#curves .u-over').nth(drive).bounding_box()
+        y = box['y'] + box['height'] / 2
+        self.tab.mouse.move(box['x'] + start * box['width'], y)
+        self.tab.mouse.down()
+        self.tab.mouse.move(box['x'] + end * box['width'], y, steps=4)
+        self.tab.mouse.up()
+
+
+@pytest.fixture
+def page(browser: Any, bench: Workbench) -> Iterator[Page]:
+    bench.settled()
+    for effect in bench.screen()['effects']:
+        if effect['is_ticked']:
+            bench.post('/api/tick', effect=effect['name'], is_ticked=False,
+                       revision=bench.screen()['revision'])
+    bench.settled()
+    found = Page(browser, bench)
+    found.settled()
+    yield found
+    assert found.complaints == []
+    found.context.close()
+
+
+def errors(state: dict[str, Any]) -> dict[str, float]:
+    return {name: one['now'] for name, one in state['errors'].items()}
+
+
+def test_the_page_loads_under_its_own_policy(browser: Any, bench: Workbench) -> None:
+    bench.settled()
+    page = Page(browser, bench, bypass_csp=False)
+    page.tab.locator('#curves canvas').nth(5).wait_for()
+    page.tab.locator('.error .figures').nth(5).wait_for()
+    assert page.tab.locator('.effect').count() == 25
+    assert 'noise' in page.tab.locator('#errors').inner_text()
+    page.tab.keyboard.press('2')
+    page.tab.locator('#scatter').wait_for()
+    assert page.complaints == []
+    page.context.close()
+
+
+def test_a_tick_moves_the_curves_and_the_errors(page: Page) -> None:
+    before = errors(page.settled())
+    curve = 'Array.from(bench.curves.plots[3].data[2]).slice(100, 200)'
+    drawn = page.tab.evaluate(curve)
+    state = page.tick('payload_mass')
+    after = errors(state)
+    assert all(after[name] < 0.5 * before[name] for name in ('lift_1', 'lift_3'))
+    moved = page.tab.evaluate(curve)
+    assert np.abs(np.mean(drawn)) > 5 * np.abs(np.mean(moved))
+    row = page.tab.locator('[data-effect=payload_mass]')
+    assert '±' in row.inner_text()
+    assert 'kg' in row.inner_text()
+    text = page.tab.locator('[data-drive=lift_1] .figures').inner_text()
+    assert f'{after["lift_1"]:.3f}' in text
+    assert page.tab.evaluate('bench.latencies.length') == 1
+    page.tick('payload_mass')
+    assert errors(page.tab.evaluate('bench.state')) == before
+
+
+def test_drives_are_chips_and_values_can_be_typed(page: Page) -> None:
+    page.tick('payload_mass')
+    page.tick('coulomb_friction')
+    row = page.tab.locator('[data-effect=coulomb_friction]')
+    assert row.locator('.chip[aria-pressed=true]').all_inner_texts() == ['lift_2']
+    row.locator('.chip', has_text='slide_1').click()
+    page.tab.wait_for_function("bench.state.effects.find((one) => one.name === 'coulomb_friction')"
+                               '.drives.length === 2')
+    page.settled()
+    field = page.tab.locator('[id="coulomb_friction-lift_2.force"]')
+    best = float(field.input_value())
+    assert best == pytest.approx(0.6, abs=0.05)
+    field.fill(str(2 * best))
+    field.press('Enter')
+    page.tab.wait_for_function('bench.state.departure > 100')
+    assert 'cost' in page.tab.locator('.departure').inner_text()
+    row.get_by_role('button', name='Best values').click()
+    page.tab.wait_for_function('bench.state.departure === 0')
+    field.fill('1e99')
+    field.press('Enter')
+    page.tab.locator('#message', has_text='must be between').wait_for()
+
+
+def test_a_shape_is_dragged(page: Page) -> None:
+    page.tick('payload_mass')
+    page.tick('stribeck_friction')
+    slider = page.tab.locator('[data-effect=stribeck_friction] input[type=range]').first
+    slider.focus()
+    for _ in range(5):
+        page.tab.keyboard.press('ArrowRight')
+    page.tab.wait_for_function('bench.state.effects.some((one) => one.parameters.some('
+                               '(parameter) => parameter.is_chosen))')
+    page.settled()
+
+
+def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
+    page.mark(3, 0.3, 0.6)
+    page.tab.wait_for_function('bench.shares.length === 1')
+    assert 'lift_1' in page.tab.locator('#shares-of').inner_text()
+    assert 'payload mass' in page.tab.locator('#share-list').inner_text()
+    start, end = (float(page.tab.locator(place).input_value()) for place in ('#from', '#to'))
+    span = page.tab.evaluate('bench.curves.range()')
+    assert start == pytest.approx(span[0] + 0.3 * (span[1] - span[0]), abs=0.3)
+    assert end == pytest.approx(span[0] + 0.6 * (span[1] - span[0]), abs=0.3)
+    page.tab.keyboard.press('z')
+    page.tab.wait_for_function(f'Math.abs(bench.curves.plots[5].scales.x.min - {start}) < 0.01')
+    page.tab.keyboard.press('a')
+    page.tab.locator('#share-list button', has_text='payload mass').click()
+    page.tab.wait_for_function("bench.state.effects.find((one) => one.name === 'payload_mass')"
+                               '.is_ticked')
+    page.settled()
+    page.tab.keyboard.press('Escape')
+    assert page.tab.locator('#share-list li').count() == 0
+
+
+def test_a_region_of_a_scatter_leads_to_its_times(page: Page) -> None:
+    page.tick('payload_mass')
+    page.tab.keyboard.press('2')
+    page.tab.select_option('#scatter-drive', 'lift_2')
+    page.tab.wait_for_function("bench.scatter.x.length && bench.scatter.names[0] === 'velocity'")
+    box = page.tab.locator('#scatter').bounding_box()
+    page.tab.mouse.move(box['x'] + 0.55 * box['width'], box['y'] + 20)
+    page.tab.mouse.down()
+    page.tab.mouse.move(box['x'] + 0.95 * box['width'], box['y'] + 0.4 * box['height'], steps=4)
+    page.tab.mouse.up()
+    page.tab.locator('#share-list', has_text='friction on lift_2').wait_for()
+    page.tab.locator('#spans button').click()
+    assert page.tab.locator('#view-curves').is_visible()
+    whole = page.tab.evaluate('bench.curves.time.at(-1) - bench.curves.time[0]')
+    seen = page.tab.evaluate('bench.curves.range()')
+    assert seen[1] - seen[0] < whole
+
+
+def test_the_robot_moves(page: Page) -> None:
+    page.tab.keyboard.press('3')
+    page.tab.wait_for_function('bench.robot.time')
+    picture = page.tab.locator('#robot').screenshot()
+    page.tab.locator('#robot-time').fill('300')
+    assert page.tab.locator('#robot').screenshot() != picture
+    assert ' s' in page.tab.locator('#robot-clock').inner_text()
+    picture = page.tab.locator('#robot').screenshot()
+    page.tab.locator('#robot').press('ArrowLeft')
+    assert page.tab.locator('#robot').screenshot() != picture
+
+
+def test_all_is_done_by_keyboard(page: Page) -> None:
+    page.tab.keyboard.press('/')
+    page.tab.keyboard.type('payload mass')
+    assert page.tab.locator('.effect:visible').count() == 1
+    page.tab.keyboard.press('Tab')
+    assert page.tab.evaluate('document.activeElement.id') == 'tick-payload_mass'
+    page.tab.keyboard.press('Space')
+    page.tab.wait_for_function('bench.settled.length === 1')
+    assert page.settled()['effects']
+    assert page.tab.evaluate("getComputedStyle(document.activeElement).outlineStyle") != 'none'
+    for number, name in enumerate(('curves', 'scatter', 'robot', 'experiment', 'recordings'), 1):
+        page.tab.evaluate('document.activeElement.blur()')
+        page.tab.keyboard.press(str(number))
+        assert page.tab.locator(f'#view-{name}').is_visible()
+
+
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+@pytest.mark.parametrize('width', [1500, 390])
+def test_all_text_can_be_read(browser: Any, bench: Workbench, scheme: str, width: int) -> None:
+    bench.settled()
+    page = Page(browser, bench, color_scheme=scheme, viewport={'width': width, 'height': 900})
+    page.settled()
+    page.tick('payload_mass')
+    contrast, size = page.tab.evaluate(READABLE.replace('main *, header *', 'body *'))
+    assert contrast >= LEAST_CONTRAST
+    assert size >= LEAST_TEXT
+    assert page.tab.evaluate('document.documentElement.scrollWidth') <= width
+    unnamed = page.tab.evaluate('''() => [...document.querySelectorAll('button, input, select, a')]
+        .filter((one) => one.getClientRects().length && !(one.labels?.length || one.ariaLabel
+            || one.textContent.trim() || one.title)).map((one) => one.outerHTML)''')
+    assert unnamed == []
+    page.tick('payload_mass')
+    assert page.complaints == []
+    page.context.close()
+
+
+def test_a_second_browser_follows(page: Page, browser: Any, bench: Workbench) -> None:
+    second = Page(browser, bench)
+    second.settled()
+    page.tick('payload_mass')
+    second.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
+    assert errors(second.settled()) == errors(page.settled())
+    second.context.close()
+
+
+def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
+    page.tick('payload_mass')
+    page.tick('drive_spring')
+    page.tab.locator('[data-effect=drive_spring]').get_by_role('button', name='Adopt').click()
+    page.tab.locator('#message', has_text='drive spring is refused').wait_for()
+    assert page.tab.locator('#ledger li').count() == 1
+    page.tick('drive_spring')
+    page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Adopt').click()
+    page.tab.locator('#message', has_text='payload mass is adopted').wait_for()
+    assert 'payload mass' in page.tab.locator('#ledger').inner_text()
+    state = page.settled()
+    with page.tab.expect_download() as started:
+        page.tab.locator('#export').click()
+    started.value.save_as(folder / 'model.yaml')
+    assert [step.effect for step in read_steps(load_model(folder / 'model.yaml').values)] == [
+        'payload_mass']
+    page.tick('coulomb_friction')
+    ticked = page.settled()
+    with page.tab.expect_download() as started:
+        page.tab.locator('#export-ticked').click()
+    started.value.save_as(folder / 'ticked.yaml')
+    for name, key, shown in (('model.yaml', 'before', state), ('ticked.yaml', 'now', ticked)):
+        assert main(['compare', str(folder / 'run.csv'), '--model', str(folder / name),
+                     '--json', str(folder / 'compared.json')]) == 0
+        found = json.loads((folder / 'compared.json').read_text())
+        for drive, one in shown['errors'].items():
+            assert one[key] == pytest.approx(found['drives'][drive]['rms'], rel=5e-5)
+    page.tab.locator('#undo').click()
+    page.tab.wait_for_function('bench.state.steps.length === 0')
+    page.settled()
+    assert page.tab.locator('#undo').is_disabled()
+
+
+def test_an_adoption_is_called_off(page: Page) -> None:
+    page.tick('payload_mass')
+    page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Adopt').click()
+    page.tab.locator('#verdict', has_text='judging').get_by_role(
+        'button', name='Cancel').last.click()
+    page.tab.locator('#message', has_text='called off').wait_for()
+    assert page.settled()['steps'] == []
+
+
+def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:
+    page.tab.keyboard.press('4')
+    page.tab.locator('#experiment-duration').fill('5')
+    page.tab.locator('#design').click()
+    page.tab.locator('#experiment-file').wait_for()
+    assert page.tab.locator('#experiment-text').inner_text()
+    with page.tab.expect_download() as started:
+        page.tab.locator('#experiment-file').click()
+    started.value.save_as(folder / 'next.csv')
+    lines = (folder / 'next.csv').read_text().splitlines()
+    assert lines[0].startswith('time,x,y,z,qx,qy,qz,qw')
+    assert len(lines) == 1 + 501

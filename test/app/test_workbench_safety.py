@@ -1,0 +1,261 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Attacks on the workbench's server, each as it would be sent."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ros_processes import executable
+from workbench_bench import write_hidden
+from workbench_server import Workbench, workbench
+
+from pprs_dynamics.app.workbench.server.folders import Folders, NotOfferedError
+
+SECRET = 'no business of a browser'
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('safety')
+    (folder / 'given').mkdir()
+    write_hidden(folder / 'run.csv', 1, 8.0)
+    write_hidden(folder / 'given' / 'one.csv', 2, 8.0)
+    (folder / 'secret.csv').write_text(SECRET)
+    (folder / 'given' / 'link.csv').symlink_to(folder / 'secret.csv')
+    return folder
+
+
+@pytest.fixture(scope='module')
+def bench(folder: Path) -> Iterator[Workbench]:
+    with workbench(folder / 'run.csv', folder / 'given', folder=folder) as running:
+        running.enter()
+        running.wait(lambda screen: not screen['is_beginning'])
+        yield running
+
+
+PATHS = ('/', '/api/screen', '/api/curves', '/api/events', '/api/model.yaml',
+         '/static/workbench.js', '/nothing')
+
+
+@pytest.mark.parametrize('path', PATHS)
+@pytest.mark.parametrize('cookie', ['', 'other=1', 'pprs_workbench_{port}=guess',
+                                    'pprs_workbench_{port}='])
+def test_without_the_cookie_nothing_is_served(bench: Workbench, path: str, cookie: str) -> None:
+    answer = bench.send('GET', path, cookie=cookie.format(port=bench.port) or 'a=b')
+    assert answer.status == 401
+    assert b'terminal' in answer.body
+
+
+def test_a_token_is_good_once_and_a_wrong_one_never(bench: Workbench, folder: Path) -> None:
+    assert bench.send('GET', f'/?token={bench.token}', cookie='a=b').status == 403
+    assert bench.send('GET', '/?token=guess', cookie='a=b').status == 403
+    assert bench.send('GET', '/?token=', cookie='a=b').status == 403
+    # Whoever has the cookie may follow an old link.
+    assert bench.send('GET', f'/?token={bench.token}').status == 303
+    new = bench.post('/api/invite').json['address'].rpartition('=')[2]
+    answer = bench.send('GET', f'/?token={new}', cookie='a=b')
+    assert answer.status == 303
+    assert bench.send('GET', f'/?token={new}', cookie='a=b').status == 403
+
+
+def test_of_many_browsers_the_quietest_is_forgotten(bench: Workbench) -> None:
+    cookies = []
+    for _ in range(20):
+        token = bench.post('/api/invite').json['address'].rpartition('=')[2]
+        answer = bench.send('GET', f'/?token={token}', cookie='a=b')
+        cookies.append(answer.headers['Set-Cookie'].partition(';')[0])
+    assert bench.get('/api/files').status == 200
+    assert bench.send('GET', '/api/files', cookie=cookies[0]).status == 401
+    assert bench.send('GET', '/api/files', cookie=cookies[-1]).status == 200
+
+
+def test_the_cookie_is_for_this_page_alone(folder: Path) -> None:
+    with workbench(folder / 'run.csv', folder=folder) as other:
+        cookie = other.enter().headers['Set-Cookie'].lower()
+        assert 'httponly' in cookie
+        assert 'samesite=strict' in cookie
+        line = other.process.stdout.readline()  # type: ignore[union-attr]
+        assert f'http://127.0.0.1:{other.port}/?token=' in line
+        assert other.token not in line
+
+
+@pytest.mark.parametrize('host', ['evil.example', 'evil.example:{port}', '127.0.0.1',
+                                  'localhost.evil.example:{port}', '127.0.0.1:1',
+                                  '192.168.0.7:{port}', '0.0.0.0:{port}'])
+def test_dns_rebinding_is_refused_with_the_right_cookie_too(bench: Workbench, host: str) -> None:
+    name = host.format(port=bench.port)
+    assert bench.send('GET', '/api/screen', host=name).status == 421
+    assert bench.send('GET', f'/?token={bench.token}', host=name).status == 421
+
+
+@pytest.mark.parametrize('origin', ['http://evil.example', 'null', 'http://127.0.0.1:1',
+                                    'https://127.0.0.1:{port}', 'http://127.0.0.1:{port}.evil'])
+def test_another_page_may_neither_read_nor_change(bench: Workbench, origin: str) -> None:
+    name = origin.format(port=bench.port)
+    before = bench.screen()['revision']
+    body = json.dumps({'effect': 'payload_mass', 'revision': before}).encode()
+    for headers in ({'Origin': name}, {'Origin': name, 'Content_Type': 'application/json'}):
+        assert bench.send('POST', '/api/tick', body, **headers).status == 403
+    assert bench.send('GET', '/api/screen', Origin=name).status == 403
+    assert bench.screen()['revision'] == before
+
+
+def test_a_change_says_where_it_comes_from_and_is_json(bench: Workbench) -> None:
+    before = bench.screen()['revision']
+    body = json.dumps({'effect': 'payload_mass', 'revision': before}).encode()
+    ours = f'http://{bench.host}'
+    assert bench.send('POST', '/api/tick', body, Content_Type='application/json').status == 403
+    # A form of another page can send plain text without asking first.
+    assert bench.send('POST', '/api/tick', body, Origin=ours,
+                      Content_Type='text/plain').status == 400
+    assert bench.send('GET', '/api/tick?effect=payload_mass').status == 405
+    assert bench.send('GET', '/api/screen', Sec_Fetch_Site='cross-site').status == 403
+    assert bench.screen()['revision'] == before
+
+
+def test_answers_run_and_load_nothing_from_elsewhere_and_cannot_be_framed(
+    bench: Workbench,
+) -> None:
+    for path, cookie in (('/', None), ('/api/screen', None), ('/', 'a=b'), ('/nothing', None)):
+        headers = bench.send('GET', path, cookie=cookie).headers
+        policy = headers['Content-Security-Policy']
+        assert policy.startswith("default-src 'none'")
+        assert 'unsafe' not in policy
+        assert "frame-ancestors 'none'" in policy
+        assert headers['X-Content-Type-Options'] == 'nosniff'
+        assert headers['Referrer-Policy'] == 'no-referrer'
+        assert headers['Cache-Control'] == 'no-store'
+        assert 'Access-Control-Allow-Origin' not in headers
+
+
+@pytest.mark.parametrize('name', [
+    '../secret.csv', '0/../secret.csv', '0//etc/passwd', '/etc/passwd', '0/link.csv', '1/one.csv',
+    '0/', '0', '', '0/one.csv\0', '-1/one.csv', '0/..', '0/./../secret.csv', '\u0660/one.csv'])
+def test_no_path_outside_the_given_folders_is_opened(
+    bench: Workbench, folder: Path, name: str,
+) -> None:
+    answer = bench.post('/api/open', name=name)
+    assert answer.status == 400
+    assert SECRET.encode() not in answer.body
+    with pytest.raises(NotOfferedError):
+        Folders.of([str(folder / 'given')]).path(name)
+
+
+@pytest.mark.parametrize('path', ['/static/../hub.py', '/static/..%2fhub.py', '/static/hub.py',
+                                  '/static/%2e%2e/%2e%2e/setup.py', '//etc/passwd'])
+def test_only_the_files_of_the_page_are_files(bench: Workbench, path: str) -> None:
+    assert bench.get(path).status == 404
+
+
+def test_a_recording_of_a_given_folder_is_opened(bench: Workbench) -> None:
+    assert '0/one.csv' in bench.get('/api/files').json['files']
+    before = len(bench.screen()['recordings'])
+    assert bench.post('/api/open', name='0/one.csv').status == 200
+    assert len(bench.screen()['recordings']) == before + 1
+    assert bench.post('/api/open', name='0/one.csv').status == 400  # the same samples again
+
+
+def upload(bench: Workbench, body: bytes, name: str = 'a.csv', **headers: str) -> int:
+    return bench.send('POST', f'/api/upload?name={name}', body, Origin=f'http://{bench.host}',
+                      **headers).status
+
+
+def test_uploads_are_bounded_and_read_by_the_strict_readers(
+    bench: Workbench, folder: Path,
+) -> None:
+    before = len(bench.screen()['recordings'])
+    assert upload(bench, b'', Content_Length=str(10**12)) == 413
+    assert upload(bench, b'time,\n1,2\n') == 400
+    assert upload(bench, b'\x89MCAP0\r\n', 'a.mcap') == 400
+    assert upload(bench, b'#!/bin/sh', 'a.sh') == 400
+    assert upload(bench, b'x', '..%2f..%2fa.csv') == 400
+    assert len(bench.screen()['recordings']) == before
+    other = write_hidden(folder / 'other.csv', 3, 8.0)
+    assert upload(bench, other.read_bytes(), '..%2f..%2fother.csv') == 200
+    assert len(bench.screen()['recordings']) == before + 1
+    assert not (folder.parent / 'other.csv').exists()
+    assert bench.screen()['recordings'][-1]['name'] == 'other.csv'
+
+
+def test_a_body_that_goes_on_is_cut_off(bench: Workbench) -> None:
+    assert bench.post('/api/tick', effect='x' * 100_000, revision=0).status == 413
+    # Without a length it is counted as it comes.
+    piece = b'x' * 65_000
+    chunks = b''.join(b'%x\r\n%s\r\n' % (len(part), part) for part in (piece, piece)) + b'0\r\n\r\n'
+    answer = bench.send('POST', '/api/tick', chunks, Origin=f'http://{bench.host}',
+                        Content_Type='application/json', Transfer_Encoding='chunked')
+    assert answer.status == 413
+
+
+@pytest.mark.parametrize('body', [
+    b'', b'[]', b'{', b'[' * 20_000, b'{"effect": 1, "revision": 1}', b'\xff',
+    b'{"effect": "payload_mass"}', b'{"effect": "payload_mass", "revision": true}',
+    b'{"effect": "payload_mass", "revision": 1, "drives": [[]]}',
+    b'{"effect": "../../etc/passwd", "revision": 1}'])
+def test_a_bad_body_is_a_sentence(bench: Workbench, body: bytes) -> None:
+    answer = bench.send('POST', '/api/tick', body, Origin=f'http://{bench.host}',
+                        Content_Type='application/json')
+    assert answer.status == 400
+    assert answer.json['error']
+    assert b'Traceback' not in answer.body
+
+
+def test_a_second_browser_sees_the_same_session_and_cannot_corrupt_it(bench: Workbench) -> None:
+    token = bench.post('/api/invite').json['address'].rpartition('=')[2]
+    second = Workbench(bench.process, f'http://127.0.0.1:{bench.port}/?token={token}')
+    second.enter()
+    revision = bench.settled()['revision']
+    assert second.screen()['revision'] == revision
+    assert bench.post('/api/tick', effect='payload_mass', revision=revision).status == 200
+    ticked = [one['name'] for one in second.screen()['effects'] if one['is_ticked']]
+    assert ticked == ['payload_mass']
+    # It still shows the state before, and acts on that.
+    late = second.post('/api/tick', effect='payload_mass', is_ticked=False, revision=revision)
+    assert late.status == 409
+    assert 'changed elsewhere' in late.json['error']
+    assert [one['name'] for one in bench.screen()['effects'] if one['is_ticked']] == ticked
+    now = second.screen()['revision']
+    assert second.post('/api/tick', effect='payload_mass', is_ticked=False,
+                       revision=now).status == 200
+
+
+def test_changes_are_pushed(bench: Workbench) -> None:
+    with socket.create_connection(('127.0.0.1', bench.port), 30) as connection:
+        connection.sendall(f'GET /api/events HTTP/1.1\r\nHost: {bench.host}\r\n'
+                           f'Cookie: {bench.cookie}\r\n\r\n'.encode())
+        read = b''
+        while b'data: 0' not in read:
+            read += connection.recv(4096)
+        count = bench.settled()['count']
+        bench.post('/api/tick', effect='payload_mass', revision=bench.screen()['revision'])
+        while not any(int(number) > count for number in re.findall(rb'data: (\d+)\n', read)):
+            read += connection.recv(4096)
+    bench.post('/api/tick', effect='payload_mass', is_ticked=False,
+               revision=bench.screen()['revision'])
+
+
+def test_nobody_else_on_the_network_is_listened_to(bench: Workbench) -> None:
+    others = {entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), None)
+              if not str(entry[4][0]).startswith(('127.', '::1'))}
+    for address in others:
+        with pytest.raises((ConnectionRefusedError, TimeoutError)):
+            socket.create_connection((str(address), bench.port), 2).close()
+    listening = Path('/proc/net/tcp').read_text()
+    assert f'0100007F:{bench.port:04X}' in listening
+    assert f'00000000:{bench.port:04X}' not in listening
+
+
+def test_a_port_that_is_taken_is_one_line(bench: Workbench) -> None:
+    done = subprocess.run([executable('pprs'), 'workbench', '--no-browser', '--port',
+                           str(bench.port)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1
+    assert f'127.0.0.1:{bench.port}: cannot be listened on' in done.stderr

@@ -1,0 +1,322 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The session behind the workbench: ticks, evidence, shares, departures, adoption, export."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+from workbench_bench import HIDDEN, write_hidden
+
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.workbench import Session
+from pprs_dynamics.app.workbench.apart import EndedError, run_apart
+from pprs_dynamics.app.workbench.errors import SessionError, StaleError
+from pprs_dynamics.app.workbench.jobs import Cancelled, Job
+from pprs_dynamics.app.workbench.shown import EXACT, FITTED, LINEAR
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.physics.model.ledger import read_steps
+from pprs_dynamics.physics.model.model_file import load_model
+
+FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
+MASS = HIDDEN['effects.payload_mass.mass']
+
+
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_hidden(tmp_path_factory.mktemp('workbench') / 'run.csv', 1)
+
+
+@pytest.fixture(scope='module')
+def shared(recording: Path) -> Session:
+    session = Session.open([recording])
+    session.settle()
+    return session
+
+
+@pytest.fixture
+def session(shared: Session) -> Session:
+    for name in list(shared.shown.ticks):
+        shared.untick(name)
+    shared.settle()
+    return shared
+
+
+def compared(folder: Path, recording: Path, model: Path) -> dict[str, Any]:
+    assert main(['compare', str(recording), '--model', str(model),
+                 '--json', str(folder / 'compared.json')]) == 0
+    found: dict[str, Any] = json.loads((folder / 'compared.json').read_text())
+    return found
+
+
+def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session) -> None:
+    before = session.overall().before
+    assert session.overall().now == before
+    shown = session.tick('payload_mass')
+    assert shown.stage == LINEAR
+    session.tick('coulomb_friction', ['lift_2'])
+    assert session.overall().now < 0.5 * before
+    shown = session.settle()
+    assert shown.stage == EXACT
+    force = shown.estimates['coulomb_friction']['lift_2.force']
+    mass = shown.estimates['payload_mass']['mass']
+    assert abs(force.value - FORCE) < 4 * force.std < 0.1 * FORCE
+    assert abs(mass.value - MASS) < 4 * mass.std < 0.1 * MASS
+    assert min(shown.evidence.values()) > 100
+    noise = session.noise['lift_2']
+    assert session.errors()['lift_2'].now == pytest.approx(noise, rel=0.1)
+
+
+def test_without_ticks_the_error_is_that_of_the_model(session: Session) -> None:
+    session.tick('payload_mass')
+    session.untick('payload_mass')
+    np.testing.assert_array_equal(session.now, session.before)
+
+
+@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), ('time_delay',),
+                                   ('homing_error', 'payload_mass'), ('stribeck_friction',)])
+def test_errors_that_are_shown_are_those_of_compare_after_export(
+    session: Session, recording: Path, tmp_path: Path, ticks: tuple[str, ...],
+) -> None:
+    for name in ticks:
+        session.tick(name)
+    assert session.shown.is_approximate is bool({'time_delay', 'homing_error'} & {*ticks})
+    session.settle()
+    assert not session.shown.is_approximate
+    assert not session.shown.notice
+    session.export(tmp_path / 'ticked.yaml', with_ticked=True)
+    found = compared(tmp_path, recording, tmp_path / 'ticked.yaml')
+    for name, error in session.errors().items():
+        assert error.now == pytest.approx(found['drives'][name]['rms'], rel=5e-5)
+    assert session.overall().now == pytest.approx(found['overall']['rms'], rel=5e-5)
+
+
+def test_a_value_that_is_typed_holds_and_costs_what_it_departs(session: Session) -> None:
+    session.tick('payload_mass')
+    session.tick('coulomb_friction', ['lift_2'])
+    best = session.settle().estimates['coulomb_friction']['lift_2.force']
+    shown = session.choose('coulomb_friction', 'lift_2.force', best.value + 3 * best.std)
+    assert shown.estimates['coulomb_friction']['lift_2.force'].value == pytest.approx(
+        best.value + 3 * best.std)
+    # Of a Gaussian, three standard deviations away.
+    assert shown.departure == pytest.approx(9.0, rel=0.1)
+    far = session.choose('coulomb_friction', 'lift_2.force', 2 * FORCE)
+    assert far.departure > 100
+    # The noise did not grow to hide it.
+    settled = session.settle()
+    assert settled.departure == pytest.approx(far.departure, rel=0.05)
+    assert session.release('coulomb_friction').departure == 0.0
+
+
+def test_a_shape_that_is_dragged_costs_what_it_departs(session: Session) -> None:
+    session.tick('payload_mass')
+    session.tick('stribeck_friction', ['lift_2'])
+    best = session.settle().estimates['stribeck_friction']['lift_2.velocity'].value
+    near = session.choose('stribeck_friction', 'lift_2.velocity', 0.8 * best).departure
+    far = session.choose('stribeck_friction', 'lift_2.velocity', 0.3 * best).departure
+    assert 0 <= near < far
+    session.release('stribeck_friction')
+
+
+def test_shares_say_where_an_error_is_from_less_its_price(session: Session) -> None:
+    lifts = session.shares(session.span(2.0, 6.0, ['lift_1', 'lift_3']))
+    assert lifts[0].net > 0.8
+    assert 'payload_mass' in {one.effect for one in lifts if one.net > 0.9 * lifts[0].net}
+    session.tick('payload_mass')
+    session.settle()
+    of_lift_2 = session.shares(session.span(2.0, 6.0, ['lift_2']))
+    assert of_lift_2[0].effect in ('coulomb_friction', 'asymmetric_friction', 'load_friction')
+    assert of_lift_2[0].net > 0.8
+    assert all(one.net <= max(one.explained, 0.0) + 1e-12 for one in of_lift_2)
+    session.tick('coulomb_friction', ['lift_2'])
+    session.settle()
+    # Nothing is left to be explained: what fits to noise does not pay.
+    assert all(one.net < 0.05 for one in session.shares(session.span(2.0, 6.0)))
+
+
+def test_a_region_of_a_scatter_is_found_in_time(session: Session) -> None:
+    mask = session.region('velocity', 'error before', (0.0, 1.0), (0.0, 10.0), 'lift_2')
+    velocity = session.data.variables['velocity'][:, 4]
+    chosen = (velocity >= 0) & (session.before[:, 4] >= 0)
+    np.testing.assert_array_equal(mask[:, 4], chosen)
+    assert not mask[:, :4].any()
+    with pytest.raises(PprsError, match='must be one of time'):
+        session.region('speed', 'error now', (0, 1), (0, 1), 'lift_2')
+
+
+def test_bad_requests_are_a_sentence_and_change_nothing(session: Session) -> None:
+    session.tick('coulomb_friction', ['lift_2'])
+    revision = session.revision
+    for call, error in (
+            (lambda: session.tick('coulomb'), PprsError),
+            (lambda: session.tick('payload_mass', ['lift_1']), PprsError),
+            (lambda: session.tick('coulomb_friction', ['lift_9']), PprsError),
+            (lambda: session.untick('payload_mass'), SessionError),
+            (lambda: session.choose('coulomb_friction', 'lift_1.force', 1.0), SessionError),
+            (lambda: session.choose('coulomb_friction', 'lift_2.force', float('nan')), ModelError),
+            (lambda: session.choose('coulomb_friction', 'lift_2.force', 1e99), ModelError),
+            (lambda: session.untick('coulomb_friction', revision - 1), StaleError),
+            (lambda: session.undo(), ModelError)):
+        with pytest.raises(error):
+            call()
+        assert session.revision == revision
+    assert set(session.shown.ticks) == {'coulomb_friction'}
+
+
+def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) -> None:
+    session.tick('payload_mass')
+    stages = []
+
+    def change() -> None:
+        stages.append(session.shown.stage)
+        if stages == [FITTED]:
+            session.tick('effort_offset')
+    end = session.subscribe(change)
+    shown = session.settle()
+    end()
+    assert shown.stage == LINEAR
+    assert set(shown.ticks) == {'payload_mass', 'effort_offset'}
+    assert session.settle().stage == EXACT
+
+
+def test_everything_on_the_screen_is_json(session: Session) -> None:
+    session.tick('payload_mass')
+    session.settle()
+    found = json.loads(json.dumps(session.to_json(), allow_nan=False))
+    assert len(found['effects']) == 25
+    assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
+
+
+def test_an_effect_is_adopted_refused_exported_and_taken_back(
+    recording: Path, tmp_path: Path,
+) -> None:
+    other = write_hidden(tmp_path / 'other.csv', 2)
+    session = Session.open([recording], validation=[other])
+    given = dict(session.model.values)
+    session.diagnose().result(300)
+    assert session.diagnosis is not None
+    refused = session.adopt('drive_spring').result(300)
+    assert not refused.adopted
+    assert 'explains these recordings better' in refused.reason
+    assert dict(session.model.values) == given
+    session.tick('payload_mass')
+    session.tick('coulomb_friction')
+    adopted = session.adopt('payload_mass').result(300)
+    assert adopted.adopted, adopted.reason
+    assert adopted.held_out_on == 'validation'
+    assert set(session.shown.ticks) == {'coulomb_friction'}
+    assert [step.effect for step in session.steps] == ['payload_mass']
+    session.export(tmp_path / 'adopted.yaml')
+    assert [step.effect for step in read_steps(load_model(tmp_path / 'adopted.yaml').values)] == [
+        'payload_mass']
+    found = compared(tmp_path, recording, tmp_path / 'adopted.yaml')
+    for name, error in session.errors().items():
+        assert error.before == pytest.approx(found['drives'][name]['rms'], rel=5e-5)
+    session.undo()
+    assert dict(session.model.values) == given
+
+
+def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:
+    (tmp_path / 'again.csv').write_bytes(recording.read_bytes())
+    with pytest.raises(SessionError, match='may be given once'):
+        Session.open([recording, tmp_path / 'again.csv'])
+
+
+def test_a_job_is_cancelled_at_its_next_report() -> None:
+    shares = []
+
+    def work(report: Any) -> None:
+        for k in range(10_000_000):
+            report(k / 10_000_000)
+            shares.append(k)
+            if k == 3:
+                job.cancel()
+    job: Job[None] = Job('adopt', 'this', work)
+    job.start()
+    with pytest.raises(Cancelled):
+        job.result(10)
+    assert shares == [0, 1, 2, 3]
+    assert job.to_json()['error'] == ''
+    assert not job.is_running
+
+
+def sleep(seconds: float, progress: Any) -> str:
+    for _ in range(int(100 * seconds)):
+        progress(0.5)
+        time.sleep(0.01)
+    return 'slept'
+
+
+def fail(progress: Any) -> None:
+    raise SessionError('the value is 1, must be 2')
+
+
+def end(progress: Any) -> None:
+    os._exit(3)
+
+
+def test_work_apart_answers_fails_and_is_ended() -> None:
+    shares: list[float] = []
+    assert run_apart(sleep, 0.5, report=shares.append) == 'slept'
+    assert 0.5 in shares
+    with pytest.raises(SessionError, match='must be 2'):
+        run_apart(fail, report=shares.append)
+    with pytest.raises(EndedError, match='status 3'):
+        run_apart(end, report=shares.append)
+    began = time.monotonic()
+    job: Job[str] = Job('diagnose', '', lambda report: run_apart(sleep, 60, report=report)).start()
+    time.sleep(0.5)
+    job.cancel()
+    with pytest.raises(Cancelled):
+        job.result(20)
+    assert time.monotonic() - began < 20
+
+
+def test_the_session_imports_neither_ros_nor_a_server() -> None:
+    code = ('import sys; from pprs_dynamics.app.workbench import Session; '
+            'print(" ".join({name.split(".")[0] for name in sys.modules}))')
+    loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                            check=True).stdout.split()
+    assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
+
+
+def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
+    notebook = json.loads((Path(__file__).parents[2] / 'docs' / 'workbench.ipynb').read_text())
+    assert notebook['nbformat'] == 4
+    names: dict[str, Any] = {'__name__': '__main__'}
+    for cell in notebook['cells']:
+        if cell['cell_type'] == 'code':
+            exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
+    said = capsys.readouterr().out
+    assert 'adopted - the error on held-out blocks' in said
+    assert said.endswith("['payload_mass']\n[]\n")
+    costs = names['costs']
+    assert costs[0] > costs[4] < costs[-1]
+
+
+def test_an_arm_is_shown_in_its_own_words_and_units(tmp_path: Path) -> None:
+    model = arm.real_arm(tmp_path)
+    real = arm.real_arm(tmp_path, **{'friction.viscous': (14.0, 5.0, 20.0)})
+    session = Session(model, {'run': arm.record(real, arm.motion(10.0))})
+    session.tick('viscous_friction', ['turn'])
+    session.settle()
+    state = session.to_json()
+    assert state['unit'] == 'N or N m'
+    assert state['units']['turn'] == {'effort': 'N m', 'position': 'rad', 'velocity': 'rad/s',
+                                      'acceleration': 'rad/s²'}
+    assert state['units']['reach']['position'] == 'm'
+    effects = {one['name']: one for one in state['effects']}
+    assert effects['payload_mass']['equation'].startswith('tau')
+    shown, = effects['viscous_friction']['parameters']
+    assert (shown['key'], shown['unit']) == ('turn.coefficient', 'N m s/rad')
+    assert shown['value'] == pytest.approx(6.0, rel=0.05)

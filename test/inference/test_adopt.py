@@ -1,0 +1,407 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Adding an effect: files in, files out, through the commands; and what is refused, and why."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from node_bench import bench
+from ros_processes import environment, executable, node_process
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.inference.adoption import loop, objections
+from pprs_dynamics.inference.adoption.adopt import Adoption, adopt
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.measurement.files.fingerprint import fingerprint
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.ledger import read_steps
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
+
+BENCHMARKS = Path(__file__).parents[2] / 'benchmarks'
+MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'adoption_score')
+HIDDEN, WRONG = 'coulomb_friction', 'drive_spring'
+DURATION = 15.0  # [s]
+NOISE = 0.05  # [N], of recordings made without the simulated robot
+
+
+@dataclass
+class Files:
+    """A robot with hidden friction: its model, two recordings, and what adopt said of them."""
+
+    folder: Path
+    model: Path
+    first: Path
+    second: Path
+    other_robot: Recording
+    new: Path
+    answer: dict[str, Any]
+    text: str
+    recordings: tuple[Recording, Recording]
+    diagnosis: Diagnosis
+
+
+def pprs(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
+                          text=True, env={**os.environ, 'COLUMNS': '200'}, **options)
+
+
+@pytest.fixture(scope='module')
+def score() -> Iterator[ModuleType]:
+    """Yield the script that hides effects, with short recordings."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        modules = {name: importlib.import_module(name) for name in MODULES}
+        patch.setattr(modules['hidden_recordings'], 'DURATION', DURATION)
+        yield modules['adoption_score']
+    for name in MODULES:
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture(scope='module')
+def files(score: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Files:
+    folder = tmp_path_factory.mktemp('adopt')
+    robot = score.Robot(score.Case('effects', (HIDDEN,), 7, 3.0, width=1.0))
+    recordings = robot.recordings()
+    for recording in recordings:
+        write_recording(folder / f'{recording.name}.csv', recording)
+    model, new = folder / 'model.yaml', folder / 'new.yaml'
+    write_model(model, robot.model.values)
+    done = pprs('adopt', HIDDEN, folder / 'first.csv', '--validate', folder / 'second.csv',
+                '--model', model, '--output', new, '--json', folder / 'answer.json',
+                '--report', folder / 'page.html')
+    assert done.returncode == 0, done.stdout + done.stderr
+    robot.effects = []
+    return Files(folder, model, folder / 'first.csv', folder / 'second.csv',
+                 robot.recordings()[1], new, json.loads((folder / 'answer.json').read_text()),
+                 done.stdout, recordings, diagnose(robot.model, recordings[:1]))
+
+
+def error_on(model: Path, recording: Recording) -> float:
+    error = measure_residuals(DriveModel.load(model), [recording])[0].error
+    return float(np.sqrt(np.nanmean(error ** 2)))
+
+
+def test_the_effect_is_added_and_the_error_falls_on_data_that_was_not_fitted(
+    files: Files,
+) -> None:
+    answer = files.answer
+    assert answer['adopted'] is True
+    assert answer['held_out_after'] < 0.5 * answer['held_out_before']
+    assert answer['error_after'] < 1.1 * answer['noise_floor']
+    # What was promised is what the written file does.
+    for file, before_or_after in ((files.model, 'before'), (files.new, 'after')):
+        for recording, what in zip(files.recordings, ('error', 'held_out'), strict=True):
+            assert answer[f'{what}_{before_or_after}'] == pytest.approx(
+                error_on(file, recording), rel=1e-3)
+    assert HIDDEN in files.text
+    assert 'adopted' in files.text
+    assert 'plotly' in (files.folder / 'page.html').read_text()
+
+
+def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None:
+    step, = read_steps(read_parameters(files.new))
+    assert step.effect == HIDDEN
+    assert step.sha256 == (fingerprint(files.first),)
+    assert step.validation == ('second.csv',)
+    assert (step.error_before, step.held_out_after) == pytest.approx(
+        (files.answer['error_before'], files.answer['held_out_after']), rel=1e-5)
+    assert not step.forced
+    for name, value, std in zip(step.parameters, step.values, step.std, strict=True):
+        assert read_parameters(files.new)[f'effects.{HIDDEN}.{name}'] == value
+        assert 0 < std < abs(value)
+
+
+def test_adopting_twice_changes_nothing(files: Files) -> None:
+    output = files.folder / 'again.yaml'
+    done = pprs('adopt', HIDDEN, files.first, '--model', files.new, '--output', output)
+    assert done.returncode == 1
+    assert 'in the model already' in done.stdout
+    assert not output.exists()
+
+
+def test_a_step_taken_back_gives_the_old_file_to_the_byte(files: Files) -> None:
+    output = files.folder / 'back.yaml'
+    done = pprs('history', files.new, '--undo', '--output', output)
+    assert done.returncode == 0, done.stderr
+    assert DriveModel.load(output).values == DriveModel.load(files.model).values
+    changed = [line for line in output.read_text().splitlines()
+               if line not in files.model.read_text().splitlines()]
+    # Comments may keep the column that longer numbers moved them to.
+    assert all('#' in line for line in changed)
+
+
+def requested(files: Files, text: str, *validation: Recording, **options: Any) -> Adoption:
+    return adopt(DriveModel.load(files.model), EffectRequest.of(text), files.recordings[:1],
+                 validation, diagnosis=files.diagnosis, **options)
+
+
+@pytest.mark.parametrize('effect', [WRONG, 'payload_mass', 'time_delay', 'quadratic_friction'])
+def test_a_wrong_effect_is_refused_and_the_right_one_named(files: Files, effect: str) -> None:
+    answer = requested(files, effect)
+    assert not answer.adopted
+    assert f'{HIDDEN} on' in answer.reason
+    assert 'explains these recordings better' in answer.reason
+
+
+def test_an_effect_that_makes_another_recording_worse_is_refused(files: Files) -> None:
+    answer = requested(files, HIDDEN, files.other_robot)
+    assert not answer.adopted
+    assert 'the error on the validation recordings does not fall' in answer.reason
+    assert answer.held_out_after > answer.held_out_before
+
+
+def test_blocks_of_the_same_recording_are_told_as_weak_evidence(files: Files) -> None:
+    answer = requested(files, HIDDEN)
+    assert answer.adopted
+    assert answer.held_out_on == 'blocks'
+    assert any('weak evidence' in remark and '--validate' in remark
+               for remark in answer.remarks)
+
+
+def test_force_overrides_and_is_recorded(files: Files) -> None:
+    output = files.folder / 'forced.yaml'
+    done = pprs('adopt', f'{WRONG}:lift_1', files.first, '--model', files.model, '--output',
+                output, '--force', '--json', files.folder / 'forced.json')
+    assert done.returncode == 0, done.stdout + done.stderr
+    step, = read_steps(read_parameters(output))
+    assert step.forced
+    assert 'explains these recordings better' in ' '.join(step.objections)
+    assert json.loads((files.folder / 'forced.json').read_text())['forced'] is True
+    assert 'by force' in done.stdout
+
+
+def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Recording]:
+    """Return a model and a recording of a robot that differs from it."""
+    motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.002))
+    forces = build_model({**default_parameters(), **recorded}).drive_forces(motion)
+    noise = np.random.default_rng(8).normal(0, NOISE, forces.total.shape)
+    return build_model({**default_parameters(), **values}), Recording.from_arrays(
+        'synthetic', motion.time, forces.mechanism.position, None, forces.total + noise)
+
+
+def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
+    model, recording = synthetic({}, **{
+        'effects.active': [HIDDEN], f'effects.{HIDDEN}.slide_1.force': 0.4})
+    answer = adopt(model, EffectRequest.of(f'{HIDDEN}:lift_2'), [recording])
+    assert not answer.adopted
+    assert f'the recordings show {HIDDEN} on slide_1, not on lift_2' in answer.reason
+
+
+LESS = {f'effects.load_friction.lift_{k}.coefficient': -0.1 for k in (1, 2, 3)}
+
+
+def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
+    hidden = {'effects.active': ['load_friction'], **LESS}
+    model, recording = synthetic({}, **hidden)
+    answer = adopt(model, EffectRequest.of('load_friction'), [recording])
+    assert not answer.adopted
+    assert 'would push along the motion' in answer.reason
+    rough = {'friction.drives.coulomb': [0.05, 0.05, 0.05, 0.2, 0.2, 0.2]}
+    model, recording = synthetic(rough, **rough, **hidden)
+    answer = adopt(model, EffectRequest.of('load_friction'), [recording])
+    assert answer.adopted, answer.reason
+    assert answer.parameters['lift_1.coefficient'].value == pytest.approx(-0.1, rel=0.05)
+
+
+def test_where_nothing_is_missing_nothing_is_added() -> None:
+    model, recording = synthetic({})
+    answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
+    assert not answer.adopted
+    assert 'do not call for it' in answer.reason
+
+
+MISTAKES = {
+    ('coulomb_frictoin', '{first}', '--output', '{tmp}/x.yaml'): 'did you mean coulomb_friction',
+    ('coulomb_friction:lift_7', '{first}', '--output', '{tmp}/x.yaml'): "unknown drive 'lift_7'",
+    ('payload_mass:lift_1', '{first}', '--output', '{tmp}/x.yaml'): 'must stand alone',
+    ('payload_mass', '{first}', '--output', '{model}'): 'another file than the model',
+    ('payload_mass', '{first}', '--output', '{tmp}/none/x.yaml'): 'its folder does not exist',
+    ('payload_mass', '{first}', '--validate', '{first}', '--output', '{tmp}/x.yaml'):
+        'what is held out must be another recording',
+    ('payload_mass', '{tmp}/none.csv', '--output', '{tmp}/x.yaml'): 'No such file',
+}
+
+
+@pytest.mark.parametrize('arguments', MISTAKES, ids=' '.join)
+def test_a_mistake_is_one_line_and_status_2(
+    files: Files, tmp_path: Path, arguments: tuple[str, ...],
+) -> None:
+    done = pprs('adopt', '--model', files.model, *(
+        word.format(first=files.first, model=files.model, tmp=tmp_path) for word in arguments))
+    assert done.returncode == 2
+    assert MISTAKES[arguments] in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('damage', ['cut', 'binary', 'value', 'ledger'])
+def test_a_damaged_model_file_is_left_alone(files: Files, tmp_path: Path, damage: str) -> None:
+    model = tmp_path / 'model.yaml'
+    text = files.new.read_text()
+    model.write_bytes({
+        'cut': text[:len(text) // 3].encode(), 'binary': b'\x00\xff\xfe' * 50,
+        'value': text.replace('effect: coulomb_friction', 'effect: 5', 1).encode(),
+        'ledger': text.replace('forced: false', 'forced: perhaps', 1).encode()}[damage])
+    content = model.read_bytes()
+    commands = [['history', str(model), '--undo', '--output', str(tmp_path / 'new.yaml')]]
+    if damage in ('cut', 'binary'):
+        commands.append(['adopt', HIDDEN, str(files.first), '--model', str(model), '--output',
+                         str(tmp_path / 'new.yaml')])
+    for command in commands:
+        done = pprs(*command)
+        assert done.returncode == 2
+        assert str(model) in done.stderr or 'history.step_01' in done.stderr
+        assert 'Traceback' not in done.stderr
+    assert model.read_bytes() == content
+    assert list(tmp_path.iterdir()) == [model]
+
+
+def test_a_full_disk_is_one_line_and_leaves_both_files_whole(
+    files: Files, tmp_path: Path,
+) -> None:
+    old, output = tmp_path / 'old.yaml', tmp_path / 'output.yaml'
+    shutil.copy(files.new, old)
+    output.write_text('what was there')
+    done = pprs('history', old, '--undo', '--output', output, preexec_fn=lambda: (
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))))
+    assert done.returncode == 2
+    assert 'cannot be written' in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert output.read_text() == 'what was there'
+    assert old.read_bytes() == files.new.read_bytes()
+    assert sorted(tmp_path.iterdir()) == [old, output]
+
+
+def test_a_killed_adoption_leaves_no_half_file(files: Files, tmp_path: Path) -> None:
+    old = tmp_path / 'old.yaml'
+    shutil.copy(files.model, old)
+    with subprocess.Popen([executable('pprs'), 'adopt', HIDDEN, str(files.first), '--model',
+                           str(old), '--output', str(tmp_path / 'new.yaml')],
+                          stdout=subprocess.DEVNULL) as running:
+        time.sleep(2.0)
+        running.send_signal(signal.SIGKILL)
+    assert old.read_bytes() == files.model.read_bytes()
+    assert list(tmp_path.iterdir()) == [old]
+
+
+@pytest.mark.nodes
+def test_the_node_starts_with_the_written_file(
+    files: Files, ros_domain: int, tmp_path: Path,
+) -> None:
+    with bench() as running, node_process(
+            [executable('feedforward'), '--ros-args', '--params-file', str(files.new)],
+            ros_domain, tmp_path / 'log', environment(ros_domain)) as process:
+        part = f'/feedforward/effort/{HIDDEN}'
+        assert running.spin_until(lambda: part in {
+            name for name, _ in running.probe.get_topic_names_and_types()}, 90), (
+                tmp_path / 'log').read_text()
+        assert process.poll() is None
+
+
+def test_the_loop_walks_by_itself_until_nothing_is_left(
+    score: ModuleType, tmp_path: Path,
+) -> None:
+    robot = score.Robot(score.Case(
+        'pairs', ('stribeck_friction', 'payload_offset'), 13, 1.0, width=1.0))
+    first, second = robot.recordings()
+    write_model(tmp_path / 'model.yaml', robot.model.values)
+    write_recording(tmp_path / 'first.csv', first)
+    new = tmp_path / 'new.yaml'
+    done = pprs('diagnose', tmp_path / 'first.csv', '--model', tmp_path / 'model.yaml',
+                '--adopt-all', '--output', new, '--json', tmp_path / 'walk.json')
+    assert done.returncode == 0, done.stdout + done.stderr
+    walk = json.loads((tmp_path / 'walk.json').read_text())['adoption']
+    steps = read_steps(read_parameters(new))
+    assert {step.effect for step in steps} == {'stribeck_friction', 'payload_offset'}
+    assert walk['ended'] == 'adequate'
+    assert [step['effect'] for step in walk['steps']] == [step.effect for step in steps]
+    assert steps[1].error_before == pytest.approx(steps[0].error_after, rel=1e-5)
+    assert error_on(new, second) < 1.1 * robot.best_error(first, second)
+
+
+def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is requested once more after something else was adopted, and told in the end."""
+    effects = [SimpleNamespace(name=name, effect=SimpleNamespace(name=name), drives=('slide_1',),
+                               evidence=100.0) for name in ('force_ripple', 'coulomb_friction')]
+    asked: list[str] = []
+
+    def found(model: tuple[str, ...], *_: object) -> SimpleNamespace:
+        left = tuple(one for one in effects if one.name not in model)
+        return SimpleNamespace(effects=left, indistinguishable=(), depends_on=())
+
+    def answer(model: tuple[str, ...], request: EffectRequest, *_: object,
+               **__: object) -> SimpleNamespace:
+        name = request.effect.name
+        asked.append(name)
+        good = name != 'force_ripple'
+        return SimpleNamespace(request=request, effect=name, adopted=good,
+                               reason='it does not fall', rivals=(),
+                               after=(*model, name) if good else model)
+
+    for name, fake in (('diagnose', found), ('adopt', answer), ('original', lambda model: model),
+                       ('EffectRequest', lambda effect, _: SimpleNamespace(effect=effect))):
+        monkeypatch.setattr(loop, name, fake)
+    walk: Any = loop.adopt_all((), [])  # type: ignore[arg-type]
+    assert asked == ['force_ripple', 'coulomb_friction', 'force_ripple']
+    assert walk.model == ('coulomb_friction',)
+    assert (walk.ended, walk.reason) == ('refused', 'force_ripple: it does not fall')
+
+
+def test_a_model_that_is_not_what_was_fitted_is_refused() -> None:
+    assert objections.of_linearity(1.2, 1.7, 'N') == []
+    said, = objections.of_linearity(1.2, 26.8, 'N')
+    assert '26.8 N' in said
+    assert '1.2 N' in said
+
+
+def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'a.db3').write_bytes(b'one')
+    first = fingerprint(tmp_path / 'bag')
+    (tmp_path / 'bag' / 'a.db3').rename(tmp_path / 'bag' / 'b.db3')
+    assert fingerprint(tmp_path / 'bag') != first
+    assert len(first) == 64
+
+
+def test_a_request_is_read_in_one_way() -> None:
+    request = EffectRequest.of('coulomb_friction: lift_2,slide_1,lift_2')
+    assert request.drives == ('slide_1', 'lift_2')
+    assert replace(request, drives=None) == EffectRequest.of('coulomb_friction')
+
+
+@pytest.mark.parametrize(('text', 'named'), [('coulomb_friction:slide_1,lift_1', 'slide_1'),
+                                             ('viscous_friction:slide_2', 'slide_2')])
+def test_friction_on_a_drive_that_stands_is_refused_in_one_sentence(text: str, named: str) -> None:
+    model, time = DriveModel.load(), np.arange(2000) * 0.004
+    up_and_down = np.tile([0.0, 0.0, 0.5], (2000, 1))
+    up_and_down[:, 2] += 0.04 * np.sin(2 * np.pi * time / 4) * np.sin(np.pi * time / 8) ** 2
+    motion = PlatformMotion.from_poses(time, up_and_down, np.tile([0.0, 0, 0, 1], (2000, 1)))
+    forces = model.drive_forces(motion)
+    noise = 0.05 * np.random.default_rng(1).normal(size=(2000, 6))
+    recording = Recording.from_arrays('heave', time, forces.mechanism.position, None,
+                                      forces.total + noise)
+    answer = adopt(model, EffectRequest.of(text), [recording])
+    assert not answer.adopted
+    assert f'{named} hardly moved in the recordings' in answer.reason

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Base models of arms from recordings, recordings in amperes, rests, and a hidden payload."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+
+from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.fit.arm_columns import columns_of
+from pprs_dynamics.inference.fit.arm_fit import fit_arm
+from pprs_dynamics.inference.fit.base_fit import fit_base
+from pprs_dynamics.inference.fit.bodies import Bodies, pseudo_inertia
+from pprs_dynamics.measurement.files.recording import read_recording, write_recording
+from pprs_dynamics.measurement.motion.rests import find_rests
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.model.model_file import build_model
+
+NOISE = 0.2
+
+
+def heavier(folder: Path) -> ArmModel:
+    """Return an arm that is not as described: heavier links, rotors, friction."""
+    model = ArmModel.load(arm.write_arm(folder))
+    mass = np.array(model.arm.inertial)
+    factors = np.array([1.2, 0.8, 1.3])[:, None]
+    changed = mass * factors
+    return arm.real_arm(folder, **{
+        'links.mass': tuple(changed[:, 0]), 'links.moment': tuple(changed[:, 1:4].ravel()),
+        'links.inertia': tuple((changed[:, 4:][:, [0, 2, 5, 1, 3, 4]]).ravel()),
+        'arm.armature': (0.5, 0.3, 2.0)})
+
+
+def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Path) -> None:
+    real = heavier(tmp_path)
+    described = ArmModel.load(arm.write_arm(tmp_path))
+    runs = [arm.record(real, arm.motion(seed=seed), NOISE, seed) for seed in (0, 1)]
+    fit = fit_base(described, runs, [arm.record(real, arm.motion(seed=7), NOISE, 7)])
+    for key in ('friction.viscous', 'friction.coulomb'):
+        assert fit.model.values[key] == pytest.approx(arm.FRICTION[key], rel=0.03)
+    assert max(fit.held_out.values()) < 1.1 * NOISE
+    assert min(fit.before.values()) > 5 * NOISE
+
+
+def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:
+    real = heavier(tmp_path)
+    described = ArmModel.load(arm.write_arm(tmp_path))
+    inside = []
+    for seed in range(4):
+        runs = [arm.record(real, arm.motion(20.0, seed=seed), NOISE, seed)]
+        fit = fit_arm(described, columns_of(described, runs))
+        for key in ('friction.viscous', 'friction.coulomb', 'friction.offset'):
+            off = np.abs(np.array(fit.model.values[key]) - arm.FRICTION[key]) / fit.std[key]
+            inside += list(off < 2.5)
+    assert np.mean(inside) > 0.85
+
+
+def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
+    real = arm.real_arm(tmp_path)
+    moved = arm.motion()
+    still = JointMotion(*(values * [1, 1, 0] for values in (
+        moved.position, moved.velocity, moved.acceleration)), moved.time)
+    described = ArmModel.load(arm.write_arm(tmp_path, friction__viscous=[1.0, 1.0, 33.0]))
+    fit = fit_base(described, [arm.record(real, still, NOISE)])
+    assert fit.model.values['friction.viscous'][2] == 33.0
+    assert any('reach hardly moves' in sentence for sentence in fit.told)
+
+
+def test_fitted_links_are_bodies(tmp_path: Path) -> None:
+    described = ArmModel.load(arm.write_arm(tmp_path))
+    fit = fit_base(described, [arm.record(heavier(tmp_path), arm.motion(20.0), 5.0)])
+    assert isinstance(fit.model, ArmModel)
+    for link in fit.model.arm.inertial:
+        assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > -1e-6
+
+
+def test_points_of_bodies_begin_at_the_description(tmp_path: Path) -> None:
+    described = ArmModel.load(arm.write_arm(tmp_path)).arm.inertial
+    bodies = Bodies(described)
+    assert bodies.inertial(np.zeros(len(bodies))) == pytest.approx(described, rel=1e-9, abs=1e-12)
+    assert np.all(bodies.distance(np.zeros(len(bodies))) == 0)
+
+
+def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
+    from pprs_dynamics import AxisModel
+    from pprs_dynamics.measurement.files.recording import Recording
+
+    given = AxisModel.load()
+    open_values = {**given.values, 'tolerances.axis.mass': 0.2, 'tolerances.axis.coulomb': 0.3}
+    real = build_model({**given.values, 'axis.mass': 100.0, 'axis.coulomb': 22.0})
+    time = np.arange(0, 20, 0.002)
+    q = 0.05 * np.sin(2 * time)[:, None] + 0.01 * np.sin(9 * time)[:, None]
+    v = 0.1 * np.cos(2 * time)[:, None] + 0.09 * np.cos(9 * time)[:, None]
+    a = -0.2 * np.sin(2 * time)[:, None] - 0.81 * np.sin(9 * time)[:, None]
+    force = real.drive_forces(JointMotion(q, v, a, time)).total
+    force = force + 0.5 * np.random.default_rng(0).normal(size=force.shape)
+    run = Recording.from_arrays('run', time, q, None, force, ('axis',))
+    fit = fit_base(build_model(open_values), [run])
+    assert fit.model.values['axis.mass'] == pytest.approx(100.0, rel=0.01)
+    assert fit.model.values['axis.coulomb'] == pytest.approx(22.0, rel=0.01)
+
+
+def write_currents(folder: Path, model: ArmModel, gain: tuple[float, ...], name: str) -> Path:
+    """Write a packed CSV of currents, joints in another order, stamps that jitter."""
+    run = arm.record(model, arm.motion(20.0), NOISE)
+    header = ['time']
+    columns = [run.time]
+    for k in (2, 0, 1):
+        joint = model.drives[k]
+        header += [f'{joint}/current', f'{joint}/position']
+        columns += [run.effort[:, k] / gain[k], run.position[:, k]]
+    path = folder / name
+    text = '\n'.join([','.join(header), *(','.join(map(repr, row)) for row in np.column_stack(
+        columns).tolist())])
+    path.write_bytes(gzip.compress(text.encode()) if name.endswith('.gz') else text.encode())
+    return path
+
+
+@pytest.mark.parametrize('name', ['run.csv', 'run.csv.gz'])
+def test_currents_times_gains_are_efforts(tmp_path: Path, name: str) -> None:
+    gain = (10.0, 4.0, 30.0)
+    model = arm.real_arm(tmp_path, **{'arm.gain': gain})
+    path = write_currents(tmp_path, model, gain, name)
+    run = read_recording(path, model.drives, gain=model.gain)
+    assert run.effort == pytest.approx(arm.record(model, arm.motion(20.0), NOISE).effort)
+    error = measure_residuals(model, [run])[0].error
+    assert np.sqrt(np.nanmean(error ** 2)) < 1.1 * NOISE
+    with pytest.raises(UnreadableFileError, match='currents of turn, swing, reach'):
+        read_recording(path, model.drives)
+
+
+def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
+        tmp_path: Path) -> None:
+    """Currents that a wrong gain made efforts of: the model with the right one explains them."""
+    gain, wrong = (10.0, 4.0, 30.0), (10.0, 4.2, 30.0)
+    real = arm.real_arm(tmp_path, **{'arm.gain': gain})
+    path = write_currents(tmp_path, real, gain, 'run.csv')
+    given = build_model({**real.values, 'arm.gain': wrong, 'tolerances.arm.gain': 0.1},
+                        real.source)
+    run = read_recording(path, given.drives, gain=given.gain)
+    found = diagnose(given, [run])
+    assert found.verdict == 'adequate'
+    after = {one.label: one.after for one in found.calibrated}
+    assert after['arm.gain[2]'] == pytest.approx(4.0, rel=0.01)
+
+
+def test_a_bag_in_amperes_is_multiplied_where_the_model_says_so(tmp_path: Path) -> None:
+    model = arm.real_arm(tmp_path, **{'arm.gain': (2.0, 2.0, 2.0), 'arm.effort_unit': 'A'})
+    run = arm.record(model, arm.motion(5.0), 0.0)
+    write_recording(tmp_path / 'bag.mcap', run)
+    read = read_recording(tmp_path / 'bag.mcap', model.drives, gain=model.gain,
+                          in_amperes=model.efforts_in_amperes)
+    assert read.effort == pytest.approx(2 * run.effort)
+
+
+def test_a_joint_that_stands_does_not_count(tmp_path: Path) -> None:
+    time = np.arange(0, 10, 0.01)
+    position = np.where(time < 3, 0.0, np.where(time < 6, np.cos(time - 3) - 1, np.cos(3) - 1))
+    rests = find_rests(position[:, None], 0.01, 0.01)[:, 0]
+    assert rests[time < 2.9].all()
+    assert rests[time > 6.2].all()
+    assert not rests[(time > 3.3) & (time < 5.8)].any()
+
+
+def test_a_reversal_is_no_rest() -> None:
+    time = np.arange(0, 20, 0.01)
+    assert not find_rests(0.3 * np.sin(0.8 * time)[:, None], 0.01, 0.01).any()
+
+
+def test_a_hidden_payload_is_named_alone_and_its_mass_is_right(tmp_path: Path) -> None:
+    given = arm.real_arm(tmp_path)
+    loaded = build_model({**given.values, 'effects.active': ['payload_mass'],
+                          'effects.payload_mass.mass': 1.2}, given.source)
+    assert isinstance(loaded, ArmModel)
+    found = diagnose(given, [arm.record(loaded, arm.motion(), NOISE)])
+    assert [one.name for one in found.effects] == ['payload_mass']
+    mass = found.effects[0].parameters['mass']
+    assert mass.value == pytest.approx(1.2, abs=3 * mass.std)
+    assert mass.unit == 'kg'
+
+
+def test_friction_on_a_turning_joint_has_its_units(tmp_path: Path) -> None:
+    real = arm.real_arm(tmp_path)
+    without = list(arm.FRICTION['friction.viscous'])
+    without[1] = 0.0
+    given = build_model({**real.values, 'friction.viscous': tuple(without)}, real.source)
+    found = diagnose(given, [arm.record(real, arm.motion(), NOISE)])
+    assert found.effects[0].name == 'viscous_friction'
+    assert found.effects[0].drives == ('swing',)
+    (value,) = found.effects[0].parameters.values()
+    assert value.value == pytest.approx(5.0, rel=0.05)
+    assert value.unit == 'N m s/rad'
+
+
+def test_commands_speak_of_torques(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('COLUMNS', '200')
+    real = arm.real_arm(tmp_path)
+    write_recording(tmp_path / 'run.csv', arm.record(real, arm.motion(15.0), NOISE))
+    model, run = str(tmp_path / 'arm.yaml'), str(tmp_path / 'run.csv')
+    assert main(['info', run, '--model', model]) == 0
+    said = capsys.readouterr().out
+    assert 'position [rad]' in said
+    assert 'effort [N m]' in said
+    assert 'effort [N]' in said  # of the prismatic joint
+    base = str(tmp_path / 'base.yaml')
+    assert main(['fit', run, '--model', model, '--output', base, '--details']) == 0
+    said = capsys.readouterr().out
+    assert 'N m s/rad' in said
+    assert 'held out' in said
+    assert main(['compare', run, '--model', base, '--json', str(tmp_path / 'c.json')]) == 0
+    assert 'noise accounts for it' in ' '.join(capsys.readouterr().out.split())

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The method on a real drive: EMPS. Its data is not part of the package."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_processes import executable
+
+from pprs_dynamics.inference.adoption.loop import adopt_all
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.physics.model.model_file import load_model
+
+DOCS = Path(__file__).parents[2] / 'docs'
+sys.path.insert(0, str(DOCS))
+
+import emps  # noqa: E402
+import real_drive  # noqa: E402
+
+DATA = emps.find_data()
+pytestmark = pytest.mark.skipif(
+    DATA is None, reason='no EMPS data in ../shared/data/emps or below PPRS_DATA')
+MODEL = DOCS.parent / 'config' / 'single_axis.yaml'
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with both runs as CSV, written by the script."""
+    folder = tmp_path_factory.mktemp('emps')
+    subprocess.run([sys.executable, DOCS / 'emps.py', str(DATA), folder], check=True, timeout=60)
+    return folder
+
+
+def pprs(folder: Path, *arguments: str) -> dict[str, object]:
+    done = subprocess.run([executable('pprs'), *arguments, '--model', str(MODEL), '--json',
+                           'result.json'], cwd=folder, capture_output=True, text=True, timeout=400)
+    assert done.returncode == 0, done.stderr
+    found: dict[str, object] = json.loads((folder / 'result.json').read_text())
+    return found
+
+
+def test_the_published_procedure_gives_the_published_numbers() -> None:
+    assert DATA is not None
+    run = emps.read_emps(DATA / emps.IDENTIFICATION)
+    *numbers, offset = real_drive.fit_published(run)
+    *published, published_offset = real_drive.PUBLISHED.values()
+    np.testing.assert_allclose(numbers, published, rtol=0.005)
+    assert offset == pytest.approx(published_offset, rel=0.02)
+    parameters = np.array([*numbers, offset])
+    assert real_drive.published_error(run, parameters) == pytest.approx(4.1, abs=0.1)
+    pulses = emps.read_emps(DATA / emps.PULSES)
+    assert real_drive.published_error(pulses, parameters) == pytest.approx(5.98, abs=0.1)
+
+
+def test_friction_by_direction_lowers_the_error_on_both_runs_as_published() -> None:
+    assert DATA is not None
+    run, pulses = (emps.read_emps(DATA / name) for name in (emps.IDENTIFICATION, emps.PULSES))
+    wide = real_drive.fit_published(run, asymmetric=True)
+    np.testing.assert_allclose(wide[1:3], list(real_drive.PUBLISHED_ASYMMETRIC.values()),
+                               rtol=0.02)
+    assert real_drive.published_error(run, wide) <= 3.2
+    assert real_drive.published_error(pulses, wide) <= 5.4
+
+
+def test_compare_tells_the_published_error(folder: Path) -> None:
+    found = pprs(folder, 'compare', 'DATA_EMPS.csv')
+    assert found['overall']['relative'] == pytest.approx(0.041, abs=0.001)  # type: ignore[index]
+
+
+def test_pulses_are_no_part_of_the_force() -> None:
+    assert DATA is not None
+    pulses = emps.read_emps(DATA / emps.PULSES)
+    content = emps.loadmat(DATA / emps.PULSES)
+    np.testing.assert_allclose(pulses.effort, 35.1507 * content['vir'], rtol=1e-5)
+
+
+def test_the_loop_lowers_the_error_on_a_run_that_it_never_saw() -> None:
+    assert DATA is not None
+    run, pulses = (emps.read_emps(DATA / name) for name in (emps.IDENTIFICATION, emps.PULSES))
+    model = load_model(MODEL)
+    diagnosis = diagnose(model, [run])
+    # Of all candidates the published effect lowers the error by far the most, from 4.1 to 3.1 %.
+    assert min(diagnosis.candidates, key=lambda one: one.error_after).name == 'asymmetric_friction'
+    walk = adopt_all(model, [run], diagnosis=diagnosis)
+    assert 'asymmetric_friction' in [step.effect for step in walk.adopted]
+    assert real_drive.error_of(model, pulses) > 5.9
+    assert real_drive.error_of(walk.model, pulses) <= 3.5

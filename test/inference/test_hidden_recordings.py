@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The recordings that the diagnosis is scored on, their strength, and what counts as right."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from cases_on_dask import here, read_outcomes
+
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.simulation.sensors import EffortNoise
+
+BENCHMARKS = Path(__file__).parents[2] / 'benchmarks'
+MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'score_table', 'score')
+
+
+@pytest.fixture(scope='module')
+def benchmarks() -> Iterator[dict[str, ModuleType]]:
+    """Yield the scripts, which are no package, with short recordings."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        modules = {name: importlib.import_module(name) for name in MODULES}
+        patch.setattr(modules['hidden_recordings'], 'DURATION', 8.0)
+        yield modules
+    for name in MODULES:
+        del sys.modules[name]
+
+
+@pytest.fixture(scope='module')
+def recordings(benchmarks: dict[str, ModuleType]) -> ModuleType:
+    return benchmarks['hidden_recordings']
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_random_motions_are_exact_and_keep_the_limits(
+    benchmarks: dict[str, ModuleType], seed: int,
+) -> None:
+    model = benchmarks['hidden_recordings'].tolerant_model(0.05)
+    path = benchmarks['hidden_motions'].draw_motion(model, seed, 8.0)
+    time = np.arange(0.0, 8.0, 0.001)
+    state = model.mechanism(path.motion(time))
+    model.limits.check_strokes(state.position)
+    for values, rates in ((state.position, state.velocity), (state.velocity, state.acceleration)):
+        differences = np.gradient(values, time, axis=0)[2:-2]
+        assert np.abs(differences - rates[2:-2]).max() < 1e-4 * np.abs(rates).max()
+    assert np.ptp(state.position, axis=0).min() > 0.01
+    if path.from_rest:
+        assert np.abs(state.velocity[[0]]).max() == 0.0
+    if path.period:
+        later = model.mechanism(path.motion(time + path.period))
+        np.testing.assert_allclose(later.position, state.position, atol=1e-9)
+
+
+def test_a_robot_with_nothing_hidden_is_explained_by_its_own_numbers(
+    recordings: ModuleType,
+) -> None:
+    case = recordings.Case('nothing', (), 3, width=1.0)
+    model, recording, truth = recordings.make_case(case)
+    robot = build_model({**model.values, **truth['robot']})
+    found = np.sqrt(np.mean(measure_residuals(robot, [recording])[0].error ** 2))
+    assert found < 1.1 * truth['noise_floor']
+    for key, value in truth['robot'].items():
+        off = np.divide(value, model.values[key]) - 1
+        assert 0 < np.abs(off).max() <= truth['tolerance']
+        assert model.values[f'tolerances.{key}'] == truth['tolerance']
+
+
+@pytest.mark.parametrize('names', [('drive_spring',), ('time_delay', 'payload_mass')])
+def test_a_case_has_the_strength_it_promises_and_repeats(
+    recordings: ModuleType, tmp_path: Path, names: tuple[str, ...],
+) -> None:
+    case = recordings.Case('effects', names, 3, 1.0)
+    model, recording, truth = recordings.make_case(case)
+    assert [effect['name'] for effect in truth['effects']] == list(names)
+    for effect in truth['effects']:
+        assert effect['snr'] == pytest.approx(1.0, rel=0.05)
+        pooled = np.sqrt(np.mean(np.square(effect['snr_by_drive'])))
+        assert pooled == pytest.approx(effect['snr'], rel=1e-6)
+    path = recordings.save_case(tmp_path, case)
+    kept, again, same = recordings.load_case(path)
+    assert same == truth
+    assert kept.values == model.values
+    np.testing.assert_array_equal(again.position, recording.position)
+    np.testing.assert_allclose(again.effort, recording.effort, rtol=1e-6)
+
+
+@pytest.mark.parametrize('noise', [0.0, 0.9, 0.997, '1/f'])
+def test_whitened_noise_is_white(benchmarks: dict[str, ModuleType], noise: float | str) -> None:
+    settings = benchmarks['hidden_recordings'].noise_settings(noise, 0.08)
+    whitening = benchmarks['hidden_strength'].Whitening(settings, 5)
+    samples = EffortNoise(settings, np.random.default_rng(6)).samples(100_000)
+    white = whitening(samples.reshape(-1, 5, 6).mean(axis=1))
+    assert np.sqrt(np.mean(white ** 2)) == pytest.approx(1.0, abs=0.01)
+    for lag in (1, 2, 5, 20):
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 0.02
+
+
+def test_what_the_tolerances_allow_is_no_effect(benchmarks: dict[str, ModuleType]) -> None:
+    strength, rng = benchmarks['hidden_strength'], np.random.default_rng(7)
+    settings = benchmarks['hidden_recordings'].noise_settings(0.0, 0.1)
+    columns = rng.normal(size=(3, 300, 6))
+    refit = strength.Refit(columns, np.array([0.5, 0.0, -1.0]), strength.Whitening(settings, 1))
+    # In tolerances: up to 1.5 and 1, and 0, are left upwards to take off.
+    assert refit.beyond(1.4 * columns[0] - 0.9 * columns[1]).strength() < 1e-3
+    size = np.sqrt(np.mean(columns[0, strength.WHITENING_ORDER:] ** 2)) / 0.1
+    assert refit.beyond(3.5 * columns[0]).strength() == pytest.approx(2 * size, rel=0.05)
+    free = rng.normal(size=(300, 6))
+    ray = refit.beyond(free)
+    assert ray.strength(ray.factor(2.0)) == pytest.approx(2.0, rel=1e-2)
+
+
+class Answer:
+    """What a diagnosis returns."""
+
+    remaining = np.zeros((3, 6))
+
+    def __init__(self, data: dict[str, Any]) -> None:
+        self.data = data
+
+    def to_json(self) -> dict[str, Any]:
+        return self.data
+
+
+def said(
+    verdict: str, *names: str, sets: tuple[list[str], ...] = (), **more: Any,
+) -> dict[str, Any]:
+    effects = [{'name': name, 'drives': ['lift_1'], 'parameters': {}, 'error_before': 1.0,
+                'error_after': 0.5, 'held_out_before': 1.0, 'held_out_after': 0.5}
+               for name in names]
+    return {'verdict': verdict, 'effects': effects, 'indistinguishable': list(sets),
+            'candidates': [], 'depends_on': [], 'suspects': [], **more}
+
+
+def test_the_score_appends_continues_and_counts_failures(
+    benchmarks: dict[str, ModuleType], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    score, file = benchmarks['score'], tmp_path / 'score.jsonl'
+    todo = [benchmarks['hidden_recordings'].Case('nothing', (), 3, width=w) for w in (0.5, 1, 2)]
+    calls = []
+
+    def diagnose(model: object, recordings: list[Any]) -> Answer:
+        calls.append(recordings[0].name)
+        if len(calls) == 2:
+            raise ValueError('no idea')
+        return Answer(said('adequate') if len(calls) == 1 else said('effect', 'base_tilt'))
+
+    score.run(todo[:2], diagnose, file, here)
+    with file.open('a') as stream:
+        stream.write('{"name": "cut sho')
+    score.run(todo, diagnose, file, here)
+    found = read_outcomes(file)
+    assert calls == [case.name for case in todo]
+    assert [outcome.get('judged', {}).get('claimed') for outcome in found] == [False, None, True]
+    assert 'no idea' in capsys.readouterr().out
+    table = benchmarks['score_table'].make_table(found)
+    assert '50.0 % (1/2;' in table
+    assert 'cases that ended in an error | 0 | 1 |' in table
+
+
+@pytest.mark.parametrize(('answer', 'right'), [
+    (said('effect', 'coulomb_friction'), {'first_or_set', 'alone_first', 'exact', 'drives'}),
+    (said('effect', 'coulomb_friction', 'base_tilt'), {'first_or_set', 'alone_first', 'drives'}),
+    (said('effect', 'base_tilt', 'coulomb_friction'), {'drives'}),
+    (said('ambiguous', 'load_friction', sets=(['load_friction', 'coulomb_friction'],)),
+     {'first_or_set'}),
+    (said('effect', 'load_friction'), {'wrong_alone'}),
+    (said('adequate'), set()),
+    (said('adequate', suspects=[{'name': 'coulomb_friction'}]), {'suspected'}),
+], ids=['right', 'added', 'second', 'set', 'wrong', 'missed', 'suspected'])
+def test_what_counts_as_right(
+    benchmarks: dict[str, ModuleType], answer: dict[str, Any], right: set[str],
+) -> None:
+    truth = {'effects': [{'name': 'coulomb_friction', 'drives': ['lift_1'], 'parameters': {}}]}
+    judged = benchmarks['score_table'].judge({'truth': truth, 'said': answer, 'row': 'effects'})
+    assert {key for key, value in judged.items() if value is True} - {'good'} == right
+
+
+@pytest.mark.parametrize(('variable', 'drive', 'right'), [
+    ('velocity of lift_2', 'slide_1', True), ('velocity of lift_1', 'slide_1', False),
+    ('velocity of lift_2', 'lift_2', False)])
+def test_the_variable_of_a_coupling_is_the_other_drives(
+    benchmarks: dict[str, ModuleType], variable: str, drive: str, right: bool,
+) -> None:
+    truth = {'effects': [{'name': 'drive_coupling', 'drives': ['slide_1'],
+                          'parameters': {'slide_1': {'coefficient': 5.0, 'source': 4.0}}}]}
+    answer = said('unknown', depends_on=[{'drive': drive, 'variable': variable,
+                                          'share_of_error': 0.5}])
+    judged = benchmarks['score_table'].judge({'truth': truth, 'said': answer, 'row': 'unknown'})
+    assert judged['good'] is right

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The criterion, against a brute-force evaluation of the likelihood that it stands for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from pprs_dynamics.inference.regression.base_columns import BaseColumn
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+
+SAMPLES, DRIVES, PERIOD = 240, 2, 0.01
+
+
+def made_up(seed: int = 0) -> tuple[Regression, list[Block]]:
+    """Return two drives with a shared base column and blocks on one and on both of them."""
+    rng = np.random.default_rng(seed)
+    error = np.cumsum(rng.normal(size=(SAMPLES, DRIVES)), axis=0) * 0.05 + rng.normal(
+        size=(SAMPLES, DRIVES))
+    residuals = Residuals(('a', 'b'), PERIOD * np.arange(SAMPLES), np.zeros(SAMPLES, dtype=int),
+                          error, np.zeros_like(error), {}, {}, PERIOD)
+    base = [BaseColumn({d: rng.normal(size=SAMPLES) for d in range(DRIVES)}, 1.0),
+            BaseColumn({1: rng.normal(size=SAMPLES)}, 4.0)]
+    regression = Regression(residuals, base)
+    blocks = [regression.block({0: rng.normal(size=(2, SAMPLES))}),
+              regression.block({d: rng.normal(size=(1, SAMPLES)) for d in (0, 1)}),
+              regression.block({1: rng.normal(size=(1, SAMPLES))}, is_fixed=True,
+                               precision=np.zeros((0, 0)))]
+    return regression, blocks
+
+
+def brute_force(regression: Regression, fit: JointFit) -> float:
+    """Return -2 ln of the marginal likelihood, from the covariance of all samples at once."""
+    columns = regression.columns
+    width = len(columns) + sum(block.size for block in fit.blocks)
+    X, y, S = [], [], []
+    for d, series in regression.series.items():
+        part = np.zeros((len(series), width))
+        for k, column in enumerate(columns):
+            if d in column.rows:
+                part[:, k] = series.transform(column.rows[d])
+        rest = series.transform(series.error)
+        for block in fit.blocks:
+            if d in block.rows and block.is_fixed:
+                rest = rest - block.rows[d][0]
+            elif d in block.rows:
+                part[:, fit.places[block]] = block.rows[d].T
+        X.append(part)
+        y.append(rest)
+        S.append(series.spread(1 / regression.weights(fit, d)))
+    prior = block_diag(np.diag([1 / column.precision for column in columns]),
+                       *(np.linalg.inv(block.precision) for block in fit.blocks if block.size))
+    X, y = np.concatenate(X), np.concatenate(y)
+    covariance = np.diag(np.concatenate(S)) + X @ prior @ X.T
+    sign, log_det = np.linalg.slogdet(covariance)
+    assert sign > 0
+    return float(log_det + y @ np.linalg.solve(covariance, y))
+
+
+def test_the_deviance_is_the_likelihood_with_the_coefficients_integrated_out() -> None:
+    regression, blocks = made_up()
+    for chosen in ([], blocks[:1], blocks[:2], blocks):
+        fit = regression.fit(chosen)
+        assert fit.deviance == pytest.approx(brute_force(regression, fit), abs=1e-5)
+
+
+def test_the_gain_of_a_block_is_the_fall_of_the_deviance_at_the_same_noise() -> None:
+    regression, blocks = made_up(1)
+    fit = regression.fit(blocks[:1])
+    for block in blocks[1:]:
+        after = regression.at((*blocks[:1], block), fit.amplitudes)
+        assert regression.gain(fit, block) == pytest.approx(fit.deviance - after.deviance,
+                                                            abs=1e-4)
+
+
+def test_coefficients_are_the_posterior_mean_and_spread() -> None:
+    rng = np.random.default_rng(2)
+    truth, inside = np.array([0.8, -0.5]), []
+    for _ in range(60):
+        rows = rng.normal(size=(2, 800))
+        error = (truth @ rows + rng.normal(size=800))[:, None]
+        residuals = Residuals(('a',), PERIOD * np.arange(800), np.zeros(800, dtype=int), error,
+                              np.zeros_like(error), {}, {}, PERIOD)
+        regression = Regression(residuals)
+        block = regression.block({0: rows})
+        fit = regression.fit((block,))
+        off = (fit.of(block) - truth) / np.sqrt(np.diag(fit.covariance))
+        inside += list(np.abs(off) < 1.96)
+    # 120 draws: 95 % with a standard error of 2 %.
+    assert 0.88 < np.mean(inside) < 1.0
+
+
+def test_no_step_of_the_fit_of_the_noise_goes_uphill() -> None:
+    regression, blocks = made_up(3)
+    fit = regression.fit(blocks)
+    for factor in (0.9, 1.1):
+        other = regression.at(tuple(blocks), fit.amplitudes * factor)
+        assert other.deviance > fit.deviance - 0.05
+
+
+def test_a_constant_under_slow_noise_is_worth_little_and_under_white_noise_much() -> None:
+    rng = np.random.default_rng(4)
+    gains = []
+    for slow in (0.0, 1.0):
+        walk = np.cumsum(rng.normal(size=4000)) * 0.03 * slow
+        error = (0.3 + 0.05 * rng.normal(size=4000) + walk - walk.mean())[:, None]
+        residuals = Residuals(('a',), PERIOD * np.arange(4000), np.zeros(4000, dtype=int), error,
+                              np.zeros_like(error), {}, {}, PERIOD)
+        regression = Regression(residuals)
+        fit = regression.fit(())
+        gains.append(regression.gain(fit, regression.block({0: np.ones((1, 4000))})))
+    assert gains[0] > 1000
+    assert gains[1] < 10
+
+
+def test_too_short_a_recording_is_a_sentence() -> None:
+    short = np.zeros((40, 1))
+    residuals = Residuals(('a',), PERIOD * np.arange(40), np.zeros(40, dtype=int), short, short,
+                          {}, {}, PERIOD)
+    with pytest.raises(ResidualsError, match=r'at most 40 samples .* must hold at least 100'):
+        Regression(residuals)

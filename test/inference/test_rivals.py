@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Rivals of an ambiguous answer, with their own values: a spring and a mass on one sine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import AxisModel
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.quantities import in_unit
+from pprs_dynamics.inference.diagnosis.rivals import rival_effects
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs.robot import AXIS
+
+MASS, VISCOUS, COULOMB, WIDTH = 20.0, 40.0, 6.0, 0.001
+SPRING, OMEGA = 55.0, 2 * np.pi * 0.5  # [N/m], [rad/s]
+NOISE = 0.05  # [N]
+
+
+@pytest.fixture(scope='module')
+def ambiguous() -> Diagnosis:
+    """Diagnose one sine, on which a spring is a negative mass."""
+    time = np.arange(0.0, 20.0, 0.004)
+    q, q_dot = 0.08 * np.sin(OMEGA * time), 0.08 * OMEGA * np.cos(OMEGA * time)
+    force = (MASS * -OMEGA ** 2 * q + VISCOUS * q_dot + COULOMB * np.tanh(q_dot / WIDTH)
+             + SPRING * q + NOISE * np.random.default_rng(3).standard_normal(len(time)))
+    model = build_model({'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
+                         'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
+    assert isinstance(model, AxisModel)
+    return diagnose(model, [Recording.from_arrays('sine', time, q[:, None], None, force[:, None],
+                                                  (AXIS,))])
+
+
+def test_a_rival_has_the_value_that_explains_the_same(ambiguous: Diagnosis) -> None:
+    assert ambiguous.verdict == 'ambiguous'
+    best = ambiguous.effects[0]
+    rivals = rival_effects(ambiguous)
+    assert {best.name} | {one.name for one in rivals} >= {'drive_spring', 'drive_inertia'}
+    values = {one.name: one.parameters for one in (best, *rivals)}
+    spring = values['drive_spring'][f'{AXIS}.stiffness']
+    mass = values['drive_inertia'][f'{AXIS}.mass']
+    assert spring.value == pytest.approx(SPRING, abs=4 * spring.std)
+    assert mass.value == pytest.approx(-SPRING / OMEGA ** 2, abs=4 * mass.std)
+    for rival in rivals:
+        if rival.name in ('drive_spring', 'drive_inertia'):
+            left = rival.force - best.force
+            assert np.sqrt(np.mean(left ** 2)) < 0.1 * np.sqrt(np.mean(best.force ** 2))
+            assert rival.error_after == pytest.approx(best.error_after, rel=0.05)
+            assert rival.held_out_after == pytest.approx(best.held_out_after, rel=0.05)
+            assert 0 <= rival.cost < 10
+
+
+def test_each_rival_of_the_answer_is_put_into_words(ambiguous: Diagnosis) -> None:
+    rivals = rival_effects(ambiguous)
+    words = word_diagnosis(ambiguous, rivals=rivals)
+    named = {name for names in ambiguous.indistinguishable for name in names[1:]}
+    assert {one.name for one in rivals} == named
+    assert len(words.rivals) == len(rivals)
+    for said, rival in zip(words.rivals, rivals, strict=True):
+        assert f'{in_unit(rival.held_out_after)} on held-out data' in said.why
+    assert 'this data cannot tell which' in words.headline
+    assert 'next-experiment' in words.command

@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The search, against an exhaustive one on small catalogues, and around effects that bend."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics.inference.regression import design as design_module
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.expansion import (
+    exact_forces,
+    fitted_model,
+    linear_prediction,
+    select,
+    squared,
+)
+from pprs_dynamics.inference.search.form import without_remainders
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs.robot import AXIS, DRIVES
+
+AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
+               'friction.reversal_velocity': 0.001}
+SMALL = ('coulomb_friction', 'viscous_friction', 'quadratic_friction', 'effort_offset',
+         'drive_spring', 'drive_inertia', 'effort_gain')
+MODEL = DriveModel.load()
+TIME = np.arange(6000) * 0.002
+
+
+def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float = 0.3,
+                   ) -> Recording:
+    """Return a recording of an axis that has some effects which its model has not."""
+    values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
+              for key, value in block.items()}
+    model = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
+    assert isinstance(model, AxisModel)
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, 20, 0.002)
+    omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
+    phase = omega * time + rng.uniform(0, 2 * np.pi, (3, 1))
+    size = np.array([0.08, 0.04, 0.015])[:, None]
+    q = (size * np.sin(phase)).sum(0)[:, None]
+    from pprs_dynamics import AxisMotion
+    motion = AxisMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
+                        -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
+    force = model.measured(model.drive_forces(motion)).total
+    return Recording.from_arrays('axis', time, q, None,
+                                 force + noise * rng.normal(size=force.shape), (AXIS,))
+
+
+@pytest.fixture
+def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(design_module, 'catalogue', lambda: {
+        name: CATALOGUE[name] for name in SMALL})
+
+
+@pytest.mark.usefixtures('small_catalogue')
+@pytest.mark.parametrize(('hidden', 'seed'), [
+    ({}, 0), ({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1),
+    ({'coulomb_friction': {'force': 0.6}, 'drive_inertia': {'mass': 1.0}}, 2),
+    ({'viscous_friction': {'coefficient': 6.0}, 'effort_offset': {'force': 0.5},
+      'effort_gain': {'gain': 0.05}}, 3),
+    ({'quadratic_friction': {'coefficient': 30.0}, 'drive_spring': {
+        'stiffness': 20.0, 'position': -0.05}}, 4)])
+def test_the_search_ends_at_the_best_of_all_sets(
+        hidden: dict, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # All sets within one design, those that would be expanded around, too.
+    monkeypatch.setattr(Search, 'is_beyond_point', False)
+    design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
+    search = Search(design, DECISIONS, with_unknown=False)
+    found = search.run()
+    exhaustive = Search(design, DECISIONS, with_unknown=False)
+    best = exhaustive.evaluate(())
+    library = exhaustive.library
+    every: list[EffectCandidate] = []
+    for name in SMALL:
+        effect = CATALOGUE[name]
+        assert issubclass(effect, DriveEffect)
+        if design.acts_on(effect, 0):
+            every += [library.candidate(effect, [library.placed(effect, 0, {}, names)])
+                      for names in effect.variants]
+    for size in (1, 2, 3, 4):
+        for chosen in combinations(every, size):
+            if len({one.name for one in chosen}) == size:
+                best = min(best, exhaustive.evaluate(chosen), key=lambda one: one.cost)
+    assert found.cost < best.cost + 0.2
+    assert {one.name for one in found.effects} == {one.name for one in best.effects}
+    assert {one.name for one in found.effects} == set(hidden)
+
+
+@pytest.mark.usefixtures('small_catalogue')
+def test_what_does_not_pay_in_a_set_is_pruned() -> None:
+    recording = axis_recording({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1)
+    search = Search(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS,
+                    with_unknown=False)
+    search.evaluate(())
+    spring, drag, gain = (search.library.candidate(CATALOGUE[name], [search.library.placed(
+        CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
+        for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
+    assert names(search.pruned(search.evaluate((spring, drag, gain)))) == ['drive_spring']
+    assert search.pruned(search.evaluate(())).candidates == ()
+
+
+def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -> Recording:
+    """Return a recording of the paper's robot with effects, {name: {drive or key: ...}}."""
+    values = {}
+    for name, block in effects.items():
+        for key, value in block.items():
+            if isinstance(value, dict):
+                values |= {f'effects.{name}.{key}.{p}': v for p, v in value.items()}
+            else:
+                values[f'effects.{name}.{key}'] = value
+    model = build_model({**MODEL.values, 'effects.active': list(effects), **values})
+    forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
+    said = model.measured(forces)
+    rng = np.random.default_rng(seed)
+    return Recording.from_arrays('made', TIME, forces.mechanism.position + model.position_error,
+                                 effort=said.total + noise * rng.normal(size=said.total.shape))
+
+
+def names(found: CandidateSet) -> list[str]:
+    return sorted(candidate.name for candidate in found.candidates)
+
+
+@pytest.mark.parametrize('effects', [
+    {'homing_error': {drive: {'zero': 0.004} for drive in DRIVES[:2]}},
+    {'time_delay': {drive: {'delay': 0.012} for drive in DRIVES}},
+    {'base_tilt': {'x': 0.12, 'y': -0.08}}, {'payload_offset': {'x': 0.03, 'y': 0.0, 'z': 0.02}},
+    {'time_delay': {drive: {'delay': 0.008} for drive in DRIVES},
+     'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}}],
+    ids=lambda effects: '+'.join(effects))
+def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
+    recording = recording_of(effects)
+    selection = select(MODEL, [recording], DECISIONS)
+    _, found, _ = without_remainders(selection.last, selection.best)
+    assert names(found) == sorted(effects)
+    # Around the last point the linear forces are those of the model that is handed on.
+    last = selection.last
+    exact = exact_forces(last.design, fitted_model(last, found))
+    assert squared(last, found, exact - linear_prediction(last, found)) < 50
+
+
+@pytest.mark.parametrize(('viscous', 'stands_out'), [(0.02, False), (0.08, True)])
+def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
+        viscous: float, stands_out: bool) -> None:
+    # Both are less than a tenth of what the drag is.
+    recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
+                              'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
+    selection = select(MODEL, [recording], DECISIONS)
+    assert names(selection.best) == ['platform_drag', 'revolute_friction']
+    _, found, remainders = without_remainders(selection.last, selection.best)
+    assert ('revolute_friction' in names(found)) is stands_out
+    assert [one.candidate.name for one in remainders] == ['revolute_friction'] * (not stands_out)
+
+
+def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
+    wrench = {'force_x': 6.0, 'force_y': -4.0, 'force_z': 5.0, 'moment_x': 0.1, 'moment_y': 0.1,
+              'moment_z': 0.0}
+    model = build_model({**MODEL.values, 'effects.active': ['external_wrench'],
+                         **{f'effects.external_wrench.{k}': v for k, v in wrench.items()}})
+    forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
+    plain = MODEL.drive_forces(Excitation().motion(TIME).with_time(TIME))
+    rng = np.random.default_rng(3)
+    for follows in (True, False):
+        # Friction as if the wrench did not load the guides: a preload is all they feel.
+        total = forces.total if follows else plain.total + forces.parts['external_wrench']
+        recording = Recording.from_arrays('made', TIME, forces.mechanism.position,
+                                          effort=total + 0.05 * rng.normal(size=total.shape))
+        selection = select(MODEL, [recording], DECISIONS)
+        _, found, _ = without_remainders(selection.last, selection.best)
+        assert names(found) == ['external_wrench'], follows
+
+
+def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
+    hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
+              'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
+    found = select(MODEL, [recording_of(hidden)], DECISIONS)
+    assert names(found.best) == ['coulomb_friction', 'viscous_friction']
+    # One that is both is told with its cost.
+    assert found.ranked[0] is found.best
+    both = next(one for one in found.ranked if names(one) == ['asymmetric_friction'])
+    assert both.cost > found.best.cost
+
+
+def test_one_cause_wins_over_several_that_imitate_it() -> None:
+    found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).best
+    assert names(found) == ['rod_mass']
+
+
+def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
+    recording = recording_of({}, 0.05)
+    effort = recording.effort.copy()
+    effort[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * TIME)
+    found = select(MODEL, [Recording.from_arrays('made', TIME, recording.position, effort=effort)],
+                   DECISIONS).best
+    assert not found.effects
+    assert [c.drives for c in found.unknowns] == [(3,)]
+    assert found.unknowns[0].pattern.scale == pytest.approx(6.1, rel=0.001)
+
+
+def test_every_decision_has_a_unit_and_a_reason() -> None:
+    table = DECISIONS.table()
+    assert len(table) <= 15
+    for name, value, unit, decides, reason in table:
+        assert unit, name
+        assert decides, name
+        assert len(reason) > 5, name
+        assert value == getattr(Decisions(), name)

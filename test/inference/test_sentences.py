@@ -1,0 +1,417 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a diagnosis is put into: sentences, the terminal, and what is drawn of it."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up_diagnosis import (
+    NOISE,
+    SUSPECT,
+    calibration,
+    found_effect,
+    made_up_diagnosis,
+    made_up_residuals,
+    ranked_sets,
+    statement,
+    within_model_error,
+)
+from rich.console import Console
+
+from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
+from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.error_steps import error_steps
+from pprs_dynamics.inference.diagnosis.found_effects import RankedSet
+from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
+from pprs_dynamics.inference.diagnosis.partial import partial_residual
+from pprs_dynamics.inference.diagnosis.quantities import (
+    change,
+    name_drives,
+    percent,
+    with_uncertainty,
+)
+from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
+from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+VARIABLES = (*OWN, *PLATFORM, 'velocity', 'direction', 'time', 'frequency', 'position of lift_1',
+             'velocity of slide_3')
+
+
+def one_effect(**changes: Any) -> Diagnosis:
+    return made_up_diagnosis(effects=(found_effect('coulomb_friction'),), **changes)
+
+
+def ambiguous() -> Diagnosis:
+    return made_up_diagnosis(
+        'ambiguous', effects=(found_effect('base_tilt', None),),
+        indistinguishable=(('base_tilt', 'external_wrench'),))
+
+
+def unknown() -> Diagnosis:
+    return made_up_diagnosis('unknown', depends_on=(statement(),))
+
+
+def everything() -> Diagnosis:
+    """Return a diagnosis with something in every place, on many drives."""
+    return made_up_diagnosis(
+        'unknown', effects=(found_effect('stribeck_friction', DRIVES),
+                            found_effect('asymmetric_friction', DRIVES[:5]),
+                            found_effect('payload_offset', None)),
+        indistinguishable=(('payload_offset', 'external_wrench'),), depends_on=(statement(),),
+        suspects=(SUSPECT,), within_model_error=(within_model_error('stribeck_friction'),),
+        calibrated=(calibration(),), warnings=('effort of slide_1 looks filtered',))
+
+
+def test_an_effect_is_told_with_drive_values_errors_and_its_card() -> None:
+    words = word_diagnosis(one_effect())
+    assert words.headline == ('The model lacks coulomb_friction on lift_2. With it the error falls '
+                              'from 0.25 N to 0.051 N, which is the noise.')
+    finding = words.effects[0]
+    assert '(F) 0.600 ± 0.020 N' in finding.what
+    assert 'from 0.25 N to 0.051 N' in finding.why
+    assert 'Evidence 120' in finding.why
+    card = CATALOGUE['coulomb_friction'].card
+    assert finding.cause[1:-1] == card.causes[1:]
+    assert finding.confirm[1:-1] == card.confirm[1:]
+    assert words.command == ('pprs adopt coulomb_friction RECORDING --output '
+                             'with_coulomb_friction.yaml')
+
+
+def test_blocks_are_told_as_the_weaker_evidence_and_another_recording_is_not() -> None:
+    blocks = word_diagnosis(one_effect()).effects[0].why
+    assert 'blocks of the same recording' in blocks
+    assert 'weaker evidence' in blocks
+    other = word_diagnosis(one_effect(held_out_on='validation')).effects[0].why
+    assert 'weaker' not in other
+    assert '--validate, which took no part in the fit, it falls from 0.26 N to 0.056 N' in other
+
+
+def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
+    worse = made_up_diagnosis(effects=(found_effect('hysteresis', held_out_after=0.3),))
+    words = word_diagnosis(worse)
+    assert 'lacks' not in words.headline
+    assert 'hysteresis was fitted as well, but the error on held-out' in words.headline
+    assert 'Fitted, but not confirmed: hysteresis' in words.effects[0].what
+    assert 'do not adopt it' in words.effects[0].why
+    assert words.following.startswith('Do not add hysteresis')
+    assert 'adopt' not in words.command
+
+
+def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:
+    above = made_up_diagnosis(effects=(found_effect('coulomb_friction', error_after=0.08),))
+    headline = word_diagnosis(above).headline
+    assert 'which is the noise' not in headline
+    assert 'The noise is 0.05 N' in headline
+
+
+def test_ambiguous_names_all_and_says_how_to_tell_them_apart() -> None:
+    words = word_diagnosis(ambiguous())
+    assert 'base_tilt or external_wrench: this data cannot tell which' in words.headline
+    assert 'from external_wrench' in words.effects[0].remarks[0]
+    assert words.command == 'pprs next-experiment RECORDING --output next.csv'
+
+
+def test_adequate_claims_no_more_than_the_noise_allows() -> None:
+    words = word_diagnosis(made_up_diagnosis('adequate'))
+    assert words.headline.startswith('Nothing is missing beyond noise, which is 0.05 N rms.')
+    assert 'could still hide' in words.headline
+    assert words.effects == words.unexplained == ()
+
+
+def test_unknown_names_drive_variable_shape_and_share_and_nothing_of_the_catalogue() -> None:
+    words = word_diagnosis(unknown())
+    assert words.headline == ('Something is missing that no effect of the catalogue explains: on '
+                              'slide_1, depending on position.')
+    finding = words.unexplained[0]
+    for part in ('slide_1', 'position', 'a shift within a range', '41%'):
+        assert part in finding.what
+    assert not any(name in finding.what for name in CATALOGUE)
+    assert finding.cause
+    assert finding.confirm
+
+
+@pytest.mark.parametrize('variable', VARIABLES)
+def test_every_variable_has_words_a_lead_and_a_picture(variable: str) -> None:
+    found = statement(variable=variable, limits=(0.0, 1.0) if variable == 'frequency' else None)
+    diagnosis = made_up_diagnosis('unknown', depends_on=(found,))
+    finding = word_diagnosis(diagnosis).unexplained[0]
+    assert finding.cause != finding.confirm
+    picture = unknown_picture(diagnosis, found)
+    assert picture is not None
+    assert all(np.isfinite(np.asarray(curve.y, dtype=float)).all() for curve in picture.data)
+
+
+def test_suspects_ask_for_another_recording() -> None:
+    words = word_diagnosis(made_up_diagnosis('adequate', suspects=(SUSPECT,)))
+    assert words.suspects[0].startswith('effort_offset on slide_3')
+    assert 'slow noise would explain the same' in words.suspects[0]
+    assert 'repeat the recording' in words.suspects[0]
+    assert words.following.startswith('Repeat the recording')
+
+
+def test_a_number_within_its_tolerance_is_calibrated_and_one_beyond_is_not() -> None:
+    values = build_model({**default_parameters(), 'tolerances.masses.payload': 0.05})
+    told = [word_diagnosis(made_up_diagnosis('adequate', model=values,
+                                             calibrated=(calibration(after),))).calibrated[0]
+            for after in (1.02, 1.2)]
+    assert 'masses.payload: 1 kg becomes 1.0200 ± 0.0040 kg, within its tolerance' in told[0]
+    assert 'beyond its tolerance' in told[1]
+
+
+def test_negative_friction_is_said_to_be_impossible() -> None:
+    for value, sure in ((-0.6, True), (-0.015, False)):
+        diagnosis = made_up_diagnosis(effects=(found_effect('coulomb_friction', value=value),))
+        remark = word_diagnosis(diagnosis).effects[0].remarks[0]
+        assert 'is negative' in remark
+        assert 'There is no negative friction' in remark
+        assert ('zero is within its uncertainty' not in remark) is sure
+    assert word_diagnosis(one_effect()).effects[0].remarks == ()
+
+
+def test_dry_asymmetric_friction_is_also_told_as_the_two_that_it_equals() -> None:
+    found = found_effect('asymmetric_friction', only=('force_forward',))
+    remarks = word_diagnosis(made_up_diagnosis(effects=(found,))).effects[0].remarks
+    # 0.6 N forwards and 0 backwards.
+    assert any('coulomb_friction of 0.3 N plus effort_offset of 0.3 N' in one for one in remarks)
+    viscous = found_effect('asymmetric_friction', only=('viscous_forward',))
+    assert word_diagnosis(made_up_diagnosis(effects=(viscous,))).effects[0].remarks == ()
+
+
+def test_an_effect_of_measurement_is_never_a_command() -> None:
+    for name, told in (('effort_gain', True), ('coulomb_friction', False)):
+        what = word_diagnosis(made_up_diagnosis(effects=(found_effect(name),))).effects[0].what
+        assert ('never a command' in what) is told
+
+
+def test_what_is_within_model_error_names_the_effect_whose_it_is_and_its_size() -> None:
+    words = word_diagnosis(one_effect(within_model_error=(within_model_error(),)))
+    assert words.within_model_error[0].startswith(
+        'hysteresis on lift_2, 0.021 N rms, is within the model error of coulomb_friction')
+
+
+@pytest.mark.parametrize('name', CATALOGUE)
+def test_every_effect_of_the_catalogue_is_told_with_all_its_parameters(name: str) -> None:
+    drives = DRIVES[:1] if issubclass(CATALOGUE[name], DriveEffect) else None
+    words = word_diagnosis(made_up_diagnosis(effects=(found_effect(name, drives),)))
+    for parameter in CATALOGUE[name].parameters:
+        assert f'{parameter.description} ({parameter.symbol})' in words.effects[0].what
+
+
+@pytest.mark.parametrize(('value', 'std', 'unit', 'text'), [
+    (0.0102, 0.0002, 'm/s', '10.20 ± 0.40 mm/s'), (1.2345, 0.05, 'N', '1.23 ± 0.10 N'),
+    (0.5, 0.01, 'rad', '28.6 ± 1.1°'), (0.004, 0.0001, 's', '4.00 ± 0.20 ms'),
+    (12.0, 0.7, 's', '12.0 ± 1.4 s'), (1234.0, 60.0, 'N/m', '1230 ± 120 N/m'),
+    (0.043, 0.001, '1', '0.0430 ± 0.0020'), (0.25, 0.0, 'kg', '0.25 kg'),
+    (0.002, 0.0005, 'kg m^2', '0.0020 ± 0.0010 kg m²'),
+    (1.0, float('inf'), 'N', '1 N (not determined)'),
+    (-0.2, 0.004, 'kg', '-0.2000 ± 0.0080 kg')])
+def test_values_are_read_with_the_digits_that_are_known(
+    value: float, std: float, unit: str, text: str,
+) -> None:
+    assert with_uncertainty(value, std, unit) == text
+
+
+def test_drives_are_named_together_where_they_are_all() -> None:
+    assert name_drives(DRIVES[::-1], DRIVES) == 'all six drives'
+    assert name_drives(('lift_3', 'lift_1', 'lift_2'), DRIVES) == 'all three lifts'
+    assert name_drives(('lift_3', 'slide_1'), DRIVES) == 'slide_1 and lift_3'
+    assert name_drives(('axis',), ('axis',)) == 'axis'
+
+
+def printed(diagnosis: Diagnosis, width: int, details: bool) -> str:
+    file = io.StringIO()
+    Console(file=file, width=width).print(diagnosis_view(
+        diagnosis, word_diagnosis(diagnosis), details))
+    return file.getvalue()
+
+
+def in_one_line(text: str) -> str:
+    return re.sub(r'[\s│]+', ' ', text)
+
+
+@pytest.mark.parametrize('width', [80, 120])
+@pytest.mark.parametrize('make', [one_effect, ambiguous, unknown, everything])
+def test_with_details_the_terminal_shows_everything_within_its_width(
+    make: Any, width: int,
+) -> None:
+    diagnosis = make()
+    words = word_diagnosis(diagnosis)
+    text = printed(diagnosis, width, details=True)
+    assert max(map(len, text.splitlines())) <= width
+    assert '…' not in text, 'nothing is cut off'
+    shown = in_one_line(text)
+    for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
+                     *words.within_model_error, *words.warnings):
+        assert sentence in shown
+    for finding in (*words.effects, *words.unexplained):
+        for sentence in (finding.what, finding.why, finding.cause, finding.confirm,
+                         *finding.remarks):
+            assert sentence in shown
+
+
+@pytest.mark.parametrize('make', [one_effect, ambiguous, unknown, everything])
+def test_verdict_fall_and_next_step_fit_25_lines_of_80_columns(make: Any) -> None:
+    diagnosis = replace(make(), sets=ranked_sets('coulomb_friction', 'hysteresis'))
+    words = word_diagnosis(diagnosis)
+    text = printed(diagnosis, 80, details=False)
+    # The command adds a finding of a recording and the name of the page.
+    assert len(text.splitlines()) <= 25 - 2
+    for part in (words.headline, words.following, words.command,
+                 'Runner-up hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'):
+        assert part in in_one_line(text)
+
+
+def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
+    diagnosis = one_effect(sets=(
+        *ranked_sets('coulomb_friction', 'hysteresis'),
+        RankedSet((), 120.4), RankedSet((('unknown, position', ('lift_2',)),), 130.0)))
+    assert set_rows(diagnosis) == [
+        ('coulomb_friction on lift_2', 'the best'), ('hysteresis on lift_2', '+7'),
+        ('nothing missing', '+120'), ('a pattern depending on position on lift_2', '+130')]
+    page = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a'])
+    assert '>hysteresis on lift_2</td>' in page.html()
+
+
+@pytest.mark.parametrize(('second', 'said'), [
+    (('hysteresis',), 'hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'),
+    (('coulomb_friction', 'hysteresis'), 'hysteresis on lift_2 as well, cost +7'),
+    ((), 'without coulomb_friction on lift_2, cost +7')])
+def test_the_runner_up_is_told_by_what_it_has_instead(second: tuple[str, ...], said: str) -> None:
+    best, = ranked_sets('coulomb_friction')
+    diagnosis = one_effect(sets=(best, RankedSet(
+        tuple((name, ('lift_2',)) for name in second), 7.0)))
+    assert runner_up(diagnosis) == said
+    assert runner_up(one_effect()) == ''
+
+
+def test_effects_that_are_only_on_other_drives_in_the_runner_up_are_told_once() -> None:
+    every = tuple(DRIVES)
+    best = RankedSet((('hysteresis', every), ('coulomb_friction', ('lift_2',))), 0.0)
+    second = RankedSet((('hysteresis', every[:4]), ('load_friction', ('lift_2',))), 12.0)
+    assert runner_up(one_effect(sets=(best, second))) == (
+        'load_friction on lift_2 instead of coulomb_friction on lift_2, '
+        'hysteresis on other drives, cost +12')
+    alone = RankedSet((('hysteresis', every[:1]), ('coulomb_friction', ('lift_2',))), 12.0)
+    assert runner_up(one_effect(sets=(best, alone))) == (
+        'hysteresis on slide_1 instead of hysteresis on all six drives, cost +12')
+
+
+def test_one_pattern_on_all_drives_is_one_finding() -> None:
+    line = tuple(statement(drive, 'frequency', 'line', (7.0, 7.1)) for drive in DRIVES)
+    words = word_diagnosis(made_up_diagnosis('unknown', depends_on=line))
+    assert [finding.title for finding in words.unexplained] == [
+        'unknown on slide_1, slide_2, slide_3, lift_1, lift_2 and lift_3, at one frequency']
+    assert 'place' not in words.headline
+
+
+def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:
+    found = found_effect('external_wrench', None)
+    rival = RivalEffect('base_tilt', found.effect, None, found.parameters, 0.0521, 0.0533, 3.24,
+                        found.force, made_up_residuals().error)
+    words = word_diagnosis(ambiguous(), rivals=(rival,))
+    said, = words.rivals
+    assert 'In place of base_tilt, external_wrench would explain' in said.what
+    assert '0.600 ± 0.020 N' in said.what
+    assert '0.0521 N' in said.why
+    assert '3.2 above the best' in said.why
+    assert said.confirm[1:-1] == CATALOGUE['external_wrench'].card.confirm[1:]
+    html = diagnosis_page(ambiguous(), words, made_up_residuals(), ['a'], (), (rival,)).html()
+    card = html[html.index('<h3>or external_wrench'):]
+    assert 'class="plot"' in card[:card.index('</section>')]
+
+
+def test_commands_hold_the_real_names_as_a_shell_takes_them() -> None:
+    files = GivenFiles(('my run.mcap', 'b.csv'), ('held.csv',), 'robot.yaml')
+    words = word_diagnosis(one_effect(), files)
+    assert words.command == (
+        "pprs adopt coulomb_friction 'my run.mcap' b.csv --validate held.csv --model robot.yaml "
+        '--output with_coulomb_friction.yaml')
+    assert word_diagnosis(ambiguous(), files).command == (
+        "pprs next-experiment 'my run.mcap' b.csv --model robot.yaml --output next.csv")
+
+
+@pytest.mark.parametrize(('before', 'after', 'said'), [
+    (0.25, 0.051, 'falls from 0.25 N to 0.051 N'),
+    (0.86512, 0.86488, 'falls from 0.8651 N to 0.8649 N'),
+    (0.865, 0.868, 'does not fall (0.865 N before, 0.868 N after)'),
+    (1234.5, 12.3, 'falls from 1234 N to 12.3 N')])
+def test_an_error_falls_by_digits_that_show_it_or_not_at_all(
+    before: float, after: float, said: str,
+) -> None:
+    assert change(before, after) == said
+
+
+@pytest.mark.parametrize(('share', 'text'), [
+    (1.3, '130%'), (0.41, '41%'), (0.0123, '1.2%'), (0.0995, '10%'), (float('nan'), 'none')])
+def test_shares_are_read_without_powers_of_ten(share: float, text: str) -> None:
+    assert percent(share) == text
+
+
+def test_the_steps_of_the_error_end_where_comparisons_do() -> None:
+    diagnosis = everything()
+    after = made_up_residuals()
+    steps = error_steps(diagnosis, after)
+    assert [step.label for step in steps] == [
+        'model as given', 'stribeck_friction', 'asymmetric_friction', 'payload_offset']
+    assert steps[0].overall == pytest.approx(np.sqrt(np.mean(diagnosis.residuals.error ** 2)))
+    np.testing.assert_allclose(steps[-1].drives, np.sqrt(np.mean(after.error ** 2, axis=0)))
+    # The second of them does not sit on lift_3.
+    assert steps[2].drives[5] == pytest.approx(steps[1].drives[5])
+
+
+def test_numbers_that_move_are_a_step_of_their_own() -> None:
+    diagnosis = one_effect()
+    shifted = replace(diagnosis.residuals, measured=diagnosis.residuals.measured + 0.2)
+    steps = error_steps(replace(diagnosis, residuals=shifted), made_up_residuals())
+    assert [step.label for step in steps] == ['model as given', 'its own numbers',
+                                              'coulomb_friction']
+
+
+def test_an_effect_is_drawn_along_what_it_depends_on_with_noise_as_uncertainty() -> None:
+    part = partial_residual(one_effect(), one_effect().effects[0])
+    assert DRIVES[part.drive] == 'lift_2'
+    assert part.variable == 'velocity'
+    assert part.profile is not None
+    off = np.abs(part.profile.mean - part.fitted)
+    assert np.all(off < 5 * part.profile.uncertainty)
+    assert part.profile.uncertainty.max() < NOISE
+    np.testing.assert_allclose(part.force, 0.6 * np.sign(
+        made_up_residuals().variables['velocity'][:, 4]))
+
+
+def test_the_shape_of_what_remains_is_the_one_that_was_planted() -> None:
+    residuals = made_up_residuals()
+    lead = residuals.variables['position'][:, 3]
+    remaining = residuals.error.copy()
+    remaining[:, 0] += 10 * lead
+    found = statement(variable='position of lift_1', limits=None)
+    before, planted = (unknown_picture(one, found) for one in (
+        unknown(), replace(unknown(), remaining=remaining)))
+    curve, shape = before.data[0], planted.data[0]
+    # Positions are drawn in mm.
+    np.testing.assert_allclose(shape.y - curve.y, 10 * shape.x / 1e3, atol=0.03)
+
+
+def test_the_page_escapes_what_comes_from_files() -> None:
+    words = word_diagnosis(everything())
+    html = diagnosis_page(everything(), words, made_up_residuals(), ['<script>alert(1)</script>'],
+                          ['<b>']).html()
+    assert '<script>alert(1)' not in html
+    assert '&lt;script&gt;alert(1)' in html
+    assert 'Held out: &lt;b&gt;' in html

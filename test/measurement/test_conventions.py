@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Units, signs and order of drives: mistakes are recognised, and nothing else is called one."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from ros_processes import executable
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.residuals.conventions import find_mistakes
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
+
+ROOT = Path(__file__).parents[2]
+BENCHMARKS, DOCS = ROOT / 'benchmarks', ROOT / 'docs'
+MODEL = DriveModel.load()
+AXIS = AxisModel.load()
+RATE, DURATION = 250.0, 10.0
+NOISE = 0.05  # [N]
+Arrays = tuple[Array, Array, Array, Array]
+
+
+def robot(model: DriveModel = MODEL, seed: int = 0, path: str = 'excitation') -> Arrays:
+    """Time, position, velocity and effort of a robot that may differ from the model."""
+    rng = np.random.default_rng(seed)
+    curve = Excitation(DURATION, seed) if path == 'excitation' else HelicalPath()
+    motion = curve.motion(np.arange(0.0, curve.duration, 1 / RATE))
+    forces = model.drive_forces(motion)
+    state = forces.mechanism
+    return (motion.time, np.round(state.position, 6),
+            state.velocity + rng.normal(0, 1e-4, state.velocity.shape),
+            forces.total + rng.normal(0, NOISE, forces.total.shape))
+
+
+def axis() -> Arrays:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, DURATION, 1 / RATE)[:, None]
+    rate = 2 * np.pi * 0.4
+    position, velocity = 0.1 * np.sin(rate * time), 0.1 * rate * np.cos(rate * time)
+    acceleration = -0.1 * rate ** 2 * np.sin(rate * time)
+    effort = AXIS.drive_forces(AxisMotion(position, velocity, acceleration, time[:, 0])).total
+    return time[:, 0], position, velocity, effort + rng.normal(0, 1.0, effort.shape)
+
+
+def recording(arrays: Arrays, drives: tuple[str, ...] = DRIVES) -> Recording:
+    time, position, velocity, effort = arrays
+    return Recording.from_arrays('run', time, position, velocity, effort, drives)
+
+
+def told(arrays: Arrays) -> list[str]:
+    return [finding.what for finding in find_mistakes(MODEL, recording(arrays))]
+
+
+def scaled(time: float = 1.0, motion: float | list[float] = 1.0,
+           effort: float | list[float] = 1.0) -> Callable[[Arrays], Arrays]:
+    return lambda a: (a[0] * time, a[1] * motion, a[2] * motion, a[3] * effort)
+
+
+def ordered(*columns: int) -> Callable[[Arrays], Arrays]:
+    order = list(columns)
+    return lambda a: (a[0], a[1][:, order], a[2][:, order], a[3][:, order])
+
+
+def backwards(a: Arrays) -> Arrays:
+    return a[0], a[1][::-1], -a[2][::-1], a[3][::-1]
+
+
+MINUS, TIMES = 'looks like minus what the model says', 'times what the model says'
+MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
+    'kN': (scaled(effort=1e-3), [f'effort of all drives looks like 0.001 {TIMES}, as if .* kN']),
+    'mN': (scaled(effort=1e3), [f'effort of all drives looks like 1000 {TIMES}, as if .* mN']),
+    'sign': (scaled(effort=-1.0), [f'effort of all drives {MINUS}']),
+    'kN, sign': (scaled(effort=-1e-3), [f'effort of all drives looks like -0.001 {TIMES}']),
+    'sign of slides': (scaled(effort=[-1, -1, -1, 1, 1, 1]), [f'effort of the slides {MINUS}']),
+    'sign of a slide': (scaled(effort=[1, -1, 1, 1, 1, 1]), [f'effort of slide_2 {MINUS}']),
+    'sign of a lift': (scaled(effort=[1, 1, 1, 1, 1, -1]), [f'effort of lift_3 {MINUS}']),
+    'a lift in kN': (scaled(effort=[1, 1, 1, 1e-3, 1, 1]), [f'of lift_1 looks like 0.001 {TIMES}']),
+    'ms': (scaled(time=1e3), ['times look like milliseconds: .* 1000 times too slow']),
+    'us': (scaled(time=1e6), ['times look like microseconds']),
+    'ns': (scaled(time=1e9), ['times look like nanoseconds']),
+    'mm': (scaled(motion=1e3), ['positions of all drives look like millimetres']),
+    'cm': (scaled(motion=1e2), ['positions of all drives look like centimetres']),
+    'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]), ['positions of the lifts .*milli']),
+    'a slide in mm': (scaled(motion=[1, 1e3, 1, 1, 1, 1]), ['position of slide_2 .* millimetres']),
+    'negated': (scaled(motion=-1.0), ['positions of all drives look negated']),
+    'slides negated': (scaled(motion=[-1, -1, -1, 1, 1, 1]), ['positions of the slides .*negated']),
+    'lifts negated': (scaled(motion=[1, 1, 1, -1, -1, -1]), ['positions of the lifts .* negated']),
+    'a slide negated': (scaled(motion=[1, 1, -1, 1, 1, 1]), ['position of slide_3 looks negated']),
+    'a slide counts the other way': (
+        scaled(motion=[-1, 1, 1, 1, 1, 1], effort=[-1, 1, 1, 1, 1, 1]),
+        ['position of slide_1 looks negated', f'effort of slide_1 {MINUS}']),
+    'lifts for slides': (ordered(3, 4, 5, 0, 1, 2), ['another order: .*slide_1 like lift_1']),
+    'chain by chain': (ordered(0, 3, 1, 4, 2, 5), ['another order: .*slide_2 like lift_1']),
+    'last to first': (ordered(5, 4, 3, 2, 1, 0), ['drives look recorded in another order']),
+    'slides in another order': (ordered(1, 0, 2, 3, 4, 5), ['slide_2 like slide_1']),
+    'backwards': (backwards, ['played backwards: friction drives the motion']),
+    'mm and ms': (scaled(time=1e3, motion=1e3), ['times look like milli', 'look like millimetres']),
+    'mm and kN': (scaled(motion=1e3, effort=1e-3), ['look like millimetres', 'as if .* kN']),
+    'ms and sign': (scaled(time=1e3, effort=-1.0), ['look like milliseconds', MINUS])}
+
+
+def expect(found: list[str], patterns: list[str]) -> None:
+    assert len(found) == len(patterns), found
+    for text, pattern in zip(found, patterns, strict=True):
+        assert re.search(pattern, text), (text, pattern)
+
+
+@pytest.mark.parametrize('mistake', MISTAKES)
+def test_a_mistake_is_said_in_one_sentence_each(mistake: str) -> None:
+    change, patterns = MISTAKES[mistake]
+    expect(told(change(robot())), patterns)
+
+
+@pytest.mark.parametrize('mistake', ['kN', 'sign', 'ms', 'mm', 'negated', 'lifts for slides'])
+def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -> None:
+    lacking = build_model({**MODEL.values, 'masses.payload': 1.3, 'effects.active': [
+        'viscous_friction'], 'effects.viscous_friction.slide_2.coefficient': 5.0})
+    assert isinstance(lacking, DriveModel)
+    change, patterns = MISTAKES[mistake]
+    expect(told(change(robot(lacking, 3))), patterns)
+
+
+@pytest.mark.parametrize('path', ['excitation', 'helix'])
+@pytest.mark.parametrize('seed', range(3))
+def test_nothing_is_said_of_what_is_right(seed: int, path: str) -> None:
+    time, position, velocity, effort = robot(seed=seed, path=path)
+    assert told((time, position, velocity, effort)) == []
+    assert told((time + 1.7e9, position, velocity, effort)) == []
+    bare = Recording.from_arrays('bare', time, position)
+    assert find_mistakes(MODEL, bare) == ()
+
+
+@pytest.fixture(scope='module')
+def benchmark() -> Iterator[ModuleType]:
+    """The script that makes recordings with hidden effects, with short ones."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        module = importlib.import_module('hidden_recordings')
+        patch.setattr(module, 'DURATION', 6.0)
+        yield module
+    sys.modules.pop('hidden_recordings')
+
+
+@pytest.mark.parametrize('name', HIDDEN_EFFECTS)
+def test_no_hidden_effect_is_called_a_mistake(benchmark: ModuleType, name: str) -> None:
+    place = benchmark.scene(11, 0.0)
+    read = place.plant.readings([draw_effect(name, np.random.default_rng(4), 4.0)])
+    part = slice(benchmark.LEAD, None)
+    time = place.motion.time[part]
+    effort = read.effort[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
+    found = find_mistakes(place.model, Recording.from_arrays(
+        name, time - time[0], np.round(read.position[part], 6), None, effort))
+    assert found == ()
+
+
+@pytest.mark.parametrize('gain', [0.15, 0.5, 2.0, 8.0])
+def test_a_gain_that_the_catalogue_knows_is_no_unit(gain: float) -> None:
+    time, position, velocity, effort = robot()
+    assert told((time, position, velocity, effort * gain)) == []
+    assert told((time, position, velocity, effort * [1, 1, gain, 1, gain, 1])) == []
+
+
+@pytest.mark.parametrize('offset', [0.005, -0.03])
+def test_a_zero_that_is_off_is_no_mistake_of_units(offset: float) -> None:
+    time, position, velocity, effort = robot()
+    assert told((time, position + np.eye(6)[0] * offset, velocity, effort)) == []
+
+
+def test_a_recording_of_another_robot_is_told_nothing_false() -> None:
+    other = build_model({**MODEL.values, 'geometry.rod_length': 0.36, 'masses.payload': 3.0,
+                         'friction.drives.coulomb': (0.2,) * 6})
+    assert isinstance(other, DriveModel)
+    assert told(robot(other)) == []
+
+
+def test_a_robot_at_rest_tells_the_sign_of_its_lifts_and_nothing_false() -> None:
+    time, position, velocity, effort = robot()
+    rest = (time, np.repeat(position[:1], len(time), axis=0), 0 * velocity,
+            np.repeat(effort[:1], len(time), axis=0) + np.random.default_rng(2).normal(
+                0, NOISE, effort.shape))
+    assert told(rest) == []
+    assert all(MINUS in text for text in told((*rest[:3], -rest[3])))
+
+
+def test_drives_without_efforts_do_not_keep_others_from_being_told() -> None:
+    time, position, velocity, effort = robot()
+    effort[:, [0, 4]] = np.nan
+    assert told((time, position, velocity, effort)) == []
+    (text,) = told((time, position, velocity, -effort))
+    assert text == 'the effort of slide_2, slide_3, lift_1, lift_3 looks like minus what the ' \
+                   'model says'
+
+
+def test_positions_far_out_of_their_stroke_tell_it_without_efforts() -> None:
+    time, position, _, _ = robot()
+    (finding,) = find_mistakes(MODEL, Recording.from_arrays('mm', time, 1e3 * position))
+    assert 'far out of the stroke, as if they were in millimetres' in finding.text
+
+
+@pytest.mark.parametrize(('factor', 'word'), [(-1.0, 'minus'), (1e3, '1000 times')])
+def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: str) -> None:
+    time, position, velocity, effort = robot()
+    expect(told((time, position, factor * velocity, effort)),
+           [f'velocity of all drives is {word} the derivative of the position'])
+    velocity[:, 3:] *= factor
+    expect(told((time, position, velocity, effort)), [f'velocity of the lifts is {word}'])
+
+
+AXIS_MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
+    'right': (scaled(), []), 'kN': (scaled(effort=1e-3), ['of axis looks like 0.001 times']),
+    'sign': (scaled(effort=-1.0), [r'of axis looks like minus .* \(or its position is negated\)']),
+    'ms': (scaled(time=1e3), ['milliseconds']), 'mm': (scaled(motion=1e3), ['millimetres']),
+    'backwards': (backwards, ['backwards'])}
+
+
+@pytest.mark.parametrize('mistake', AXIS_MISTAKES)
+def test_a_single_axis_tells_the_same(mistake: str) -> None:
+    change, patterns = AXIS_MISTAKES[mistake]
+    found = find_mistakes(AXIS, recording(change(axis()), ('axis',)))
+    expect([finding.what for finding in found], patterns)
+
+
+def test_a_real_drive_is_called_right() -> None:
+    sys.path.insert(0, str(DOCS))
+    import emps
+
+    data = emps.find_data()
+    if data is None:
+        pytest.skip('no EMPS data in ../shared/data/emps or below PPRS_DATA')
+    for name in (emps.IDENTIFICATION, emps.PULSES):
+        run = emps.read_emps(data / name)
+        assert find_mistakes(AXIS, run) == ()
+        (finding,) = find_mistakes(AXIS, Recording.from_arrays(
+            'minus', run.time, run.position, None, -run.effort, ('axis',)))
+        assert MINUS in finding.what
+
+
+def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
+    write_recording(tmp_path / 'minus.csv', recording(scaled(effort=-1.0)(robot())))
+    write_recording(tmp_path / 'mm.csv', recording(scaled(motion=1e3)(robot())))
+    for command in ('info', 'compare'):
+        done = subprocess.run([executable('pprs'), command, 'minus.csv'], cwd=tmp_path,
+                              capture_output=True, text=True, timeout=100)
+        assert done.returncode == 0, done.stderr
+        said = ' '.join(done.stdout.split())
+        assert 'the effort of all drives looks like minus what the model says' in said
+        assert 'nothing wrong found' not in said
+    done = subprocess.run([executable('pprs'), 'info', 'mm.csv'], cwd=tmp_path,
+                          capture_output=True, text=True, timeout=100)
+    assert 'look like millimetres' in ' '.join(done.stdout.split())
+    # No mechanism follows such positions: the sentence is about their unit, not about a pose.
+    for command in (('compare', 'mm.csv'), ('diagnose', 'minus.csv', '--validate', 'mm.csv'),
+                    ('adopt', 'viscous_friction', 'mm.csv', '--output', 'x.yaml'),
+                    ('next-experiment', 'mm.csv', '--output', 'x.csv')):
+        done = subprocess.run([executable('pprs'), *command], cwd=tmp_path, capture_output=True,
+                              text=True, timeout=100)
+        assert done.returncode == 2
+        assert done.stderr == (f'pprs {command[0]}: mm.csv: the positions of all drives look '
+                               'like millimetres, must be metres\n')

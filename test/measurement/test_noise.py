@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The noise spectrum: it is that of the noise, whatever its colour, and so are its bands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.measurement.residuals.noise import NoiseShapes, NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+
+PERIOD = 0.01
+
+
+def ar1(phi: float, samples: int, rng: np.random.Generator) -> np.ndarray:
+    """Return AR(1) noise of unit variance, long after its start."""
+    warm = int(12 / (1 - phi))
+    y = lfilter([1.0], [1.0, -phi], rng.normal(size=samples + warm))[warm:]
+    return np.asarray(y * np.sqrt(1 - phi ** 2))
+
+
+def recording(noise: np.ndarray, segment: np.ndarray | None = None) -> Residuals:
+    """Return drives that are left with nothing but noise (N, D)."""
+    samples, width = noise.shape
+    return Residuals(tuple(f'drive_{k}' for k in range(width)), PERIOD * np.arange(samples),
+                     np.zeros(samples, dtype=int) if segment is None else segment, noise,
+                     np.zeros_like(noise), {}, {}, PERIOD)
+
+
+def fitted(noise: np.ndarray) -> tuple[Regression, JointFit]:
+    regression = Regression(recording(noise))
+    return regression, regression.fit(())
+
+
+def ar1_power(phi: float, frequency: np.ndarray) -> np.ndarray:
+    """Return the variance of a DCT coefficient of AR(1) noise of unit variance."""
+    return (1 - phi ** 2) / np.abs(1 - phi * np.exp(-2j * np.pi * frequency * PERIOD)) ** 2
+
+
+@pytest.mark.parametrize('phi', [0.0, 0.6, 0.9, 0.98, 0.997])
+def test_the_spectrum_is_that_of_ar1_noise_at_every_frequency(phi: float) -> None:
+    rng = np.random.default_rng(1)
+    frequency = np.geomspace(0.1, 40, 12)
+    found = []
+    for _ in range(4):
+        regression, fit = fitted(np.stack([ar1(phi, 4000, rng) for _ in range(6)], axis=1))
+        found += [noise.power(frequency) for noise in regression.noise(fit).values()]
+    ratio = np.array(found) / ar1_power(phi, frequency)
+    # 24 records; the lowest of these frequencies has a few dozen coefficients in each.
+    assert np.median(ratio, axis=0) == pytest.approx(np.ones(12), abs=0.35)
+    rms = [noise.rms for noise in regression.noise(fit).values()]
+    assert np.median(rms) == pytest.approx(1.0, rel=0.25 if phi > 0.99 else 0.06)
+
+
+def test_noise_1_over_f_is_followed_over_three_decades() -> None:
+    rng = np.random.default_rng(2)
+    samples = 4000
+    spectrum = np.fft.rfft(rng.normal(size=(8 * samples, 6)), axis=0)
+    spectrum /= np.sqrt(np.maximum(np.arange(len(spectrum)), 1))[:, None]
+    noise = np.fft.irfft(spectrum, axis=0)[:samples]
+    regression, fit = fitted(noise / noise.std())
+    powers = np.median([one.power(np.array([0.1, 1.0, 10.0]))
+                        for one in regression.noise(fit).values()], axis=0)
+    assert powers[0] / powers[1] == pytest.approx(10, rel=0.5)
+    assert powers[1] / powers[2] == pytest.approx(10, rel=0.5)
+
+
+@pytest.mark.parametrize('phi', [0.0, 0.9, 0.97])
+def test_whitened_noise_is_white_of_unit_variance_also_across_segments(phi: float) -> None:
+    rng = np.random.default_rng(3)
+    noise = np.concatenate([ar1(phi, 1500, rng), ar1(phi, 2500, rng)])[:, None]
+    segment = (np.arange(4000) >= 1500).astype(int)
+    regression = Regression(recording(noise, segment))
+    fit = regression.fit(())
+    white = regression.whitened(fit, 0, noise[:, 0])
+    assert white.var() == pytest.approx(1, abs=0.1)
+    for lag in (1, 5, 50):
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 0.07
+
+
+@pytest.mark.parametrize('start', [1e-4, 1e4])
+def test_the_fit_ends_at_the_same_spectrum_from_bad_starts(start: float) -> None:
+    rng = np.random.default_rng(4)
+    noise = np.stack([0.7 * ar1(0.98, 4000, rng) + 0.3 * rng.normal(size=4000)
+                      for _ in range(2)], axis=1)
+    regression, usual = fitted(noise)
+    shape = usual.amplitudes.shape
+    lopsided = start * np.geomspace(1, 1e3, shape[1]) * np.ones(shape)
+    other = regression.fit((), lopsided)
+    assert other.deviance == pytest.approx(usual.deviance, abs=0.5)
+    again = regression.fit((), usual.amplitudes)
+    assert again.deviance == pytest.approx(usual.deviance, abs=0.1)
+
+
+def test_a_vibration_is_no_noise() -> None:
+    rng = np.random.default_rng(5)
+    time = PERIOD * np.arange(4000)
+    noise = 0.05 * rng.normal(size=(4000, 1))
+    line = 0.9 * np.sin(2 * np.pi * 6.1 * time)[:, None]
+    regression, fit = fitted(noise + line)
+    power = regression.noise(fit)[0].power(np.array([6.1]))[0]
+    # The line puts 0.4 N^2 into three of 4000 coefficients: a hundred times what S can follow.
+    assert power < 0.01 * 4000 * 0.9 ** 2 / 6
+
+
+def test_a_constant_takes_no_part_in_the_fit() -> None:
+    rng = np.random.default_rng(6)
+    noise = ar1(0.9, 4000, rng)[:, None]
+    _, without = fitted(noise)
+    _, beside = fitted(noise + 5.0)
+    spectra = [fit.spectra[0, 1:] for fit in (without, beside)]
+    np.testing.assert_allclose(spectra[1], spectra[0], rtol=0.05)
+    assert beside.deviance > without.deviance + 1000
+
+
+@pytest.mark.parametrize('phi', [0.0, 0.9, 0.97])
+def test_effective_samples_of_ar1_noise_follow_its_correlation(phi: float) -> None:
+    rng = np.random.default_rng(7)
+    found = []
+    for _ in range(3):
+        regression, fit = fitted(np.stack([ar1(phi, 8000, rng) for _ in range(3)], axis=1))
+        found += [one.effective_samples(8000) for one in regression.noise(fit).values()]
+    assert np.median(found) == pytest.approx(8000 * (1 - phi) / (1 + phi), rel=0.3)
+
+
+def test_covariance_and_rms_are_those_of_the_spectrum() -> None:
+    noise = NoiseSpectrum(np.array([0.5, 4.0]), np.array([0.3, 40.0, 2.0]), PERIOD)
+    frequency = (np.arange(200_000) + 0.5) / 200_000 * 0.5 / PERIOD
+    assert noise.rms ** 2 == pytest.approx(np.mean(noise.power(frequency)), rel=1e-4)
+    lags = noise.covariance(400, PERIOD)
+    for lag in (20, 100):
+        direct = np.mean(noise.power(frequency) * np.cos(2 * np.pi * frequency * lag * PERIOD))
+        assert lags[lag] == pytest.approx(direct, abs=0.01 * lags[0])
+    # Means over five samples have a fifth of the white part, and what is slow as before.
+    assert noise.rms_at(5 * PERIOD) < noise.rms
+    assert noise.rms_at(5 * PERIOD) ** 2 == pytest.approx(noise.rms ** 2 - 0.8 * 0.3, rel=1e-6)
+
+
+def test_a_regression_spends_leverage_and_does_not_hide_noise_by_it() -> None:
+    rng = np.random.default_rng(8)
+    found = []
+    for _ in range(5):
+        noise = rng.normal(size=(1000, 1))
+        regression = Regression(recording(noise))
+        columns = regression.block({0: rng.normal(size=(200, 1000))})
+        fit = regression.fit((columns,))
+        found.append(regression.noise(fit)[0].rms)
+    # Without leverage it would be sqrt(1 - 200 / 1000) = 0.89.
+    assert np.mean(found) == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_transform_keeps_squares_and_can_be_inverted() -> None:
+    rng = np.random.default_rng(9)
+    noise = rng.normal(size=(2000, 1))
+    series = DriveSeries(recording(noise), 0, FrequencyBands.of(20.0, PERIOD))
+    coefficients = series.transform(noise[:, 0])
+    assert coefficients @ coefficients == pytest.approx(series.error @ series.error)
+    np.testing.assert_allclose(series.inverse(coefficients), series.error, atol=1e-12)
+    a, b = rng.normal(size=(2, 3, len(series)))
+    np.testing.assert_allclose(series.products(a, b).sum(axis=0), a @ b.T, atol=1e-9)
+    assert series.sums(a).sum(axis=-1) == pytest.approx(a.sum(axis=-1))
+    assert series.counts.sum() == len(series)
+
+
+def test_short_gaps_are_bridged_and_long_ones_start_anew() -> None:
+    rng = np.random.default_rng(10)
+    noise = rng.normal(size=(3000, 1))
+    holed = noise.copy()
+    holed[100:104] = np.nan
+    holed[1500:1600] = np.nan
+    residuals = replace(recording(noise), measured=holed)
+    series = DriveSeries(residuals, 0, FrequencyBands.for_residuals(residuals))
+    assert len(series.stretches) == 2
+    assert not series.known.all()
+    assert np.isfinite(series.error).all()
+    shapes = NoiseShapes.of(series.bands)
+    assert shapes.at_bands.shape == (len(shapes.corners) + 1, len(series.bands))
+
+
+@pytest.mark.parametrize(('settings', 'most'), [
+    (SensorSettings(white_noise=0.08, coloured_noise=0.0), 0.0),
+    (SensorSettings(white_noise=0.04, coloured_noise=0.07, noise_correlation=0.999), 0.04),
+    (SensorSettings(white_noise=0.0, coloured_noise=0.0, pink_noise=0.08), 0.12)])
+def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: float) -> None:
+    beyond = []
+    for seed in range(8):
+        noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
+        _, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
+        beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
+    assert np.mean(beyond) <= most

@@ -1,0 +1,689 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""From measured drive positions to motion and treated effort, against simulated truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from random_states import ELBOWS, paper_model, random_robot, smooth_motion
+from scipy.spatial.transform import Rotation
+
+from pprs_dynamics import PlatformMotion
+from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion import followed_motion
+from pprs_dynamics.measurement.motion.differentiation import (
+    SHORTEST_WINDOW,
+    LocalPolynomial,
+    Stretch,
+    choose_smoothing,
+    position_noise,
+    representative,
+)
+from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
+from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
+from pprs_dynamics.measurement.motion.reconstruction import reconstruct, treated_forces, with_zeros
+from pprs_dynamics.measurement.motion.sampling_grid import find_grid
+from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs import forward_motion
+from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.physics.three_pprs.forward_motion import (
+    find_pose_jumps,
+    follow_branch,
+    platform_rates,
+    solve_forward_motion,
+)
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
+
+RATE, RESOLUTION, DURATION = 500.0, 1e-6, 8.0  # [Hz, m, s]
+STEP = 1 / RATE
+# What reconstruction alone may add to the forces [N rms], every drive.
+FORCE_ERROR = 0.005
+# Highest frequency [Hz], amplitude [m], tilt [rad]: accelerations of drives up to 6 m/s^2.
+MOTIONS = [(0.5, 0.06, 0.15), (1.0, 0.06, 0.15), (2.0, 0.03, 0.08), (3.0, 0.03, 0.08)]
+MODEL = paper_model()
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A motion, its drives and forces, exactly."""
+
+    time: np.ndarray
+    drives: object
+    force: np.ndarray
+
+
+def motion_from_poses(path, time):
+    """Return a path's motion with rates by central differences of its poses.
+
+    However the path differentiates itself, this is the motion that its poses make.
+    """
+    h = 1e-3
+    around = {k: path.motion(time + k * h) for k in (-2, -1, 0, 1, 2)}
+    back = Rotation.from_quat(np.array(around[0].orientation)).inv()
+    x = {k: np.concatenate((pose.position, (Rotation.from_quat(
+        np.array(pose.orientation)) * back).as_rotvec()), axis=1) for k, pose in around.items()}
+    first = (8 * (x[1] - x[-1]) - (x[2] - x[-2])) / (12 * h)
+    # Of rotation vectors about the pose itself, derivatives are omega and epsilon.
+    second = (16 * (x[1] + x[-1]) - (x[2] + x[-2]) - 30 * x[0]) / (12 * h * h)
+    return PlatformMotion(around[0].position, around[0].orientation, first[:, :3], first[:, 3:],
+                          second[:, :3], second[:, 3:], time)
+
+
+def truth_at(time, frequency=1.0, amplitude=0.06, tilt=0.15, seed=1):
+    """Return what the paper's robot does and needs at times within 0..DURATION."""
+    path = Excitation(DURATION + 1, seed, amplitude, tilt, frequency)
+    motion = motion_from_poses(path, np.asarray(time) + 0.5)
+    return Truth(np.asarray(time), solve_inverse_kinematics(MODEL.robot.geometry, motion),
+                 MODEL.drive_forces(motion).total)
+
+
+@cache
+def truth(frequency=1.0, amplitude=0.06, tilt=0.15, seed=1):
+    """Return the truth at equal steps; without what is at rest at either end."""
+    return truth_at(np.arange(0, DURATION, STEP), frequency, amplitude, tilt, seed)
+
+
+def encoder(position):
+    """Return positions as an encoder reads them."""
+    return np.round(position / RESOLUTION) * RESOLUTION
+
+
+def recording_of(real, effort=None, velocity=None, time=None, position=None):
+    """Return a recording of a truth; the effort is the true force unless given."""
+    return Recording.from_arrays(
+        'simulated', real.time if time is None else time,
+        encoder(real.drives.position) if position is None else position, velocity,
+        real.force if effort is None else effort)
+
+
+def force_error(recording, found=None):
+    """Return model minus effort, both treated, (M, 6) [N]; effort is the model's own."""
+    found = found or reconstruct(MODEL, recording)
+    return treated_forces(MODEL, found)['total'] - found.treat(found.effort)
+
+
+def rms(values, axis=0):
+    """Return the root of the mean square."""
+    return np.sqrt(np.mean(np.square(values), axis=axis))
+
+
+# Forward motion ------------------------------------------------------------------------------
+
+@pytest.mark.parametrize('elbow', ELBOWS)
+def test_platform_rates_are_differences_of_forward_kinematics(elbow):
+    geometry = random_robot(np.random.default_rng(3), elbow).geometry
+    home = solve_inverse_kinematics(
+        geometry, smooth_motion(np.array([0.3]), elbow)).position
+    rng, t = np.random.default_rng(4), np.linspace(0, 2, 40)
+    frequency, phase = rng.uniform(2, 5, 6), rng.uniform(0, 6, 6)
+    size = 0.01
+
+    def drives(time, derivative=0):
+        angle = frequency * time[:, None] + phase + derivative * np.pi / 2
+        return home * (derivative == 0) + size * frequency ** derivative * np.sin(angle)
+
+    class Path:
+
+        def motion(self, time):
+            found = solve_forward_kinematics(geometry, drives(time))
+            return PlatformMotion.at_rest(found.position, found.orientation)
+
+    expected = motion_from_poses(Path(), t)
+    found = solve_forward_motion(geometry, drives(t), drives(t, 1), drives(t, 2)).motion
+    # Poses are known to 1e-13; over h^2 = 1e-6 that is 1e-7. Truncation: h^4 of 5 rad/s.
+    for name, tolerance in (('position', 1e-12), ('linear_velocity', 1e-9),
+                            ('angular_velocity', 1e-8), ('linear_acceleration', 1e-6),
+                            ('angular_acceleration', 1e-5)):
+        assert_allclose(getattr(found, name), getattr(expected, name), rtol=0, atol=tolerance)
+    assert np.abs(found.angular_velocity).max() > 0.1
+
+
+@pytest.mark.parametrize('elbow', ELBOWS)
+def test_forward_motion_undoes_inverse_kinematics(elbow):
+    geometry = random_robot(np.random.default_rng(5), elbow).geometry
+    motion = smooth_motion(np.linspace(0, 6, 3000), elbow)
+    chains = solve_inverse_kinematics(geometry, motion)
+    found = solve_forward_motion(geometry, chains.position, chains.velocity, chains.acceleration)
+    assert_allclose(found.motion.position, motion.position, rtol=0, atol=1e-11)
+    assert_allclose(found.motion.rotation, motion.rotation, rtol=0, atol=1e-11)
+    for name in ('linear_velocity', 'angular_velocity', 'linear_acceleration',
+                 'angular_acceleration'):
+        assert_allclose(getattr(found.motion, name), getattr(motion, name), rtol=0, atol=1e-9)
+    assert not found.near_branch.any()
+
+
+@pytest.mark.parametrize('fault', ['batch fails', 'one pose on another branch'])
+def test_the_branch_is_followed_where_solving_at_once_goes_wrong(monkeypatch, fault):
+    geometry = MODEL.robot.geometry
+    q = truth().drives.position[:800]
+    expected = follow_branch(geometry, q)
+    calls = []
+
+    def spoilt(geometry, q, seed=None):
+        calls.append(len(q))
+        found = solve_forward_kinematics(geometry, q, seed)
+        if len(q) > 1 and (seed is None or len(seed) == 1):
+            if fault == 'batch fails':
+                raise ConvergenceError(3, 'no pose', 'be one')
+            found.position[4] += 0.05
+        return found
+
+    monkeypatch.setattr(forward_motion, 'solve_forward_kinematics', spoilt)
+    followed = follow_branch(geometry, q)
+    assert 1 in calls  # some were followed one by one
+    assert_allclose(followed.position, expected.position, rtol=0, atol=1e-11)
+    assert_allclose(followed.rotation, expected.rotation, rtol=0, atol=1e-11)
+
+
+def test_drives_that_cannot_close_are_named_with_sample_and_time():
+    real = truth()
+    q = real.drives.position.copy()
+    q[2000:] += np.linspace(0, 1, len(q) - 2000)[:, None] * [1, 0, 0, 0, 0, 0]
+    with pytest.raises(ConvergenceError, match=r'at \d\.\d+ s no pose') as caught:
+        reconstruct(MODEL, recording_of(real, position=encoder(q)))
+    assert 2000 < caught.value.sample < len(q)
+
+
+def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
+    motion = motion_from_poses(Excitation(3.0), np.arange(0.2, 2.5, STEP))
+    assert not find_pose_jumps(motion).any()
+    moved = motion.position.copy()
+    moved[400:] += [0, 1e-3, 0]
+    turned = (Rotation.from_rotvec([0, 0, 0.01]) * Rotation.from_quat(
+        np.array(motion.orientation[700:]))).as_quat()
+    jumping = PlatformMotion(
+        moved, np.concatenate((motion.orientation[:700], turned)), motion.linear_velocity,
+        motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration,
+        motion.time)
+    assert np.flatnonzero(find_pose_jumps(jumping)).tolist() == [400, 700]
+
+
+def test_a_jump_between_two_chunks_is_told(monkeypatch):
+    geometry, real = MODEL.robot.geometry, truth()
+    count = 0
+
+    def hopping(*args):
+        nonlocal count
+        found, count = solve_forward_motion(*args), count + 1
+        if count == 1:
+            return found
+        motion = found.motion
+        return replace(found, motion=PlatformMotion(
+            motion.position + np.array([0.01, 0, 0]), motion.orientation, motion.linear_velocity,
+            motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
+
+    monkeypatch.setattr(followed_motion, 'solve_forward_motion', hopping)
+    monkeypatch.setattr(followed_motion, 'CHUNK', 3000)
+    found = reconstruct(geometry, recording_of(real))
+    assert found.jumps.tolist() == [3000]
+    assert any(f'first at {found.time[3000]:.6g} s' in note for note in found.notes)
+
+
+# Differentiation -----------------------------------------------------------------------------
+
+@pytest.mark.parametrize('window', [17, 61, 401])
+def test_local_polynomials_are_exact_for_polynomials_of_their_order(window):
+    t = np.arange(window + 200) * STEP
+    polynomial = np.polynomial.Polynomial([0.2, 1, -2, 3, -4, 5, -6, 7], domain=[0, t[-1]])
+    filter_ = LocalPolynomial(window, STEP)
+    inner = slice(filter_.half, -filter_.half)
+    found = filter_.differentiated(np.stack((polynomial(t), 2 * polynomial(t)), axis=1))
+    for derivative, tolerance in ((0, 1e-13), (1, 1e-10), (2, 1e-7)):
+        expected = polynomial.deriv(derivative)(t)[inner] if derivative else polynomial(t)[inner]
+        assert_allclose(found[derivative], np.stack((expected, 2 * expected), axis=1), rtol=0,
+                        atol=tolerance * max(1.0, np.abs(expected).max()))
+
+
+def test_smoothing_has_no_delay_and_halves_power_at_its_cut_off():
+    filter_ = LocalPolynomial(61, STEP)
+    t = np.arange(2000) * STEP
+    wave = np.sin(2 * np.pi * filter_.cut_off * t)[:, None]
+    smooth, rate, _ = filter_.differentiated(wave)
+    inner = wave[filter_.half:-filter_.half]
+    gain = float(np.sum(smooth * inner) / np.sum(inner * inner))
+    assert gain == pytest.approx(np.sqrt(0.5), abs=0.01)
+    assert_allclose(smooth, gain * inner, rtol=0, atol=1e-9)  # no phase
+    assert abs(np.mean(rate * inner)) < 1e-2 * np.std(rate)
+
+
+def test_noise_comes_out_as_its_gain_says_and_is_known_from_the_data():
+    noise = np.random.default_rng(7).normal(scale=1e-6, size=(40_000, 3))
+    filter_ = LocalPolynomial(41, STEP)
+    for derivative, values in enumerate(filter_.differentiated(noise)):
+        # 40 000 samples, correlated over some ten: 2 %.
+        assert_allclose(values.std(axis=0), 1e-6 * filter_.noise_gain(derivative), rtol=0.1)
+    real = truth(3.0, 0.03, 0.08).drives.position
+    found = position_noise([Stretch(encoder(real), STEP)])
+    assert_allclose(found, RESOLUTION / np.sqrt(12), rtol=0.05)
+
+
+@pytest.mark.parametrize('resolution', [1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize('motion', MOTIONS)
+def test_window_from_the_data_is_nearly_the_best(motion, resolution):
+    real = truth(*motion).drives
+    q = np.round(real.position / resolution) * resolution
+    chosen = choose_smoothing([Stretch(q, STEP)])
+
+    def error(window):
+        filter_ = LocalPolynomial(window, STEP)
+        inner = slice(filter_.half, -filter_.half)
+        return rms(filter_.filtered(q, 2) - real.acceleration[inner], axis=None)
+
+    found = error(chosen.polynomial(STEP).window)
+    best = min(error(window) for window in range(SHORTEST_WINDOW, 400, 12))
+    assert found < 1.25 * best
+    # What it says to remain is what remains, but for quantisation that is no white noise.
+    assert rms(chosen.acceleration_error, axis=None) == pytest.approx(found, rel=0.5)
+    assert f'{chosen.polynomial(STEP).window} samples' in chosen.text
+
+
+def test_a_window_that_is_asked_for_is_taken():
+    found = reconstruct(MODEL, recording_of(truth()), window=0.122)
+    assert found.smoothing.polynomial(STEP).window == 61
+    assert any('as asked for' in note for note in found.notes)
+
+
+def test_choice_looks_at_parts_of_a_long_recording_only():
+    long = Stretch(np.zeros((1_000_000, 1)), STEP)
+    parts = representative([long])
+    assert sum(len(part.position) for part in parts) <= 80_000
+    assert representative(parts[:3]) == parts[:3]
+
+
+# The figure that counts ----------------------------------------------------------------------
+
+@pytest.mark.parametrize('motion', MOTIONS)
+def test_reconstruction_alone_costs_less_than_5_mN_on_every_drive(motion):
+    real = truth(*motion)
+    error = rms(force_error(recording_of(real)))
+    print(f'{motion}: {1e3 * error.max():.2f} mN of {rms(real.force).min():.1f} N')
+    assert np.all(error < FORCE_ERROR)
+
+
+def test_smoothed_motion_is_the_true_one():
+    real = truth(3.0, 0.03, 0.08)
+    found = reconstruct(MODEL, recording_of(real))
+    assert_allclose(found.position, real.drives.position[found.index], rtol=0, atol=1e-6)
+    # Friction turns over within 1 mm/s: a fiftieth of that does not move a reversal.
+    assert rms(found.velocity - real.drives.velocity[found.index]).max() < 2e-5
+    assert rms(found.acceleration - real.drives.acceleration[found.index]).max() < 3e-3
+    assert not found.near_branch.any()
+    assert not len(found.jumps)
+
+
+def test_zeros_elsewhere_are_those_of_a_whole_new_reconstruction():
+    recording = recording_of(truth())
+    shift = np.array([0.004, 0.0, -0.002, 0.001, 0.0, 0.003])
+    names = ['slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3']
+    moved = build_model({**MODEL.values, 'effects.active': ['homing_error'], **{
+        f'effects.homing_error.{name}.zero': float(by)
+        for name, by in zip(names, shift, strict=True)}})
+    assert_allclose(moved.position_error, shift)
+    whole, quick = reconstruct(moved, recording), with_zeros(
+        reconstruct(MODEL, recording), moved, shift)
+    assert_allclose(quick.position, whole.position, rtol=0, atol=1e-15)
+    for name in ('position', 'linear_velocity', 'angular_velocity', 'linear_acceleration'):
+        assert_allclose(getattr(quick.motion, name), getattr(whole.motion, name), rtol=0,
+                        atol=1e-10)
+    assert_allclose(treated_forces(moved, quick)['total'], treated_forces(moved, whole)['total'],
+                    rtol=0, atol=1e-9)
+
+
+# Treatment -----------------------------------------------------------------------------------
+
+def test_model_and_effort_get_the_same_operation():
+    # The model's forces run through chunks and parts; the same forces as "effort" do not.
+    real = truth()
+    found = reconstruct(MODEL, recording_of(real))
+    forces = MODEL.drive_forces(found.motion)
+    treated = treated_forces(MODEL, found)
+    assert_allclose(treated['total'], found.treat(forces.total), rtol=0, atol=1e-12)
+    assert_allclose(sum(treated[name] for name in forces.parts), treated['total'], rtol=0,
+                    atol=1e-12)
+    for values in (np.ones(len(found)), found.time, np.sign(found.velocity)):
+        pieces = [chunk.treat(values[chunk.samples]) for chunk in found.chunks(173)]
+        assert_array_equal(np.concatenate(pieces), found.treat(values))
+    assert_allclose(found.treat(3 * found.velocity + 2), 3 * found.treat(found.velocity) + 2,
+                    rtol=0, atol=1e-14)
+
+
+def test_treating_only_one_side_makes_false_friction_at_reversals():
+    real = truth(2.0, 0.03, 0.08)
+    found = reconstruct(MODEL, recording_of(real))
+    middles = found.treat.starts + found.block // 2
+    both = force_error(None, found)
+    one = MODEL.drive_forces(found.motion[middles]).total - found.treat(found.effort)
+    slow = np.abs(found.velocity[middles]) < 0.005
+    assert np.abs(one[slow]).max() > 0.1
+    assert rms(one[slow], None) > 5 * rms(one[~slow], None)
+    assert rms(one, None) > 10 * rms(both, None)
+
+
+def test_missing_efforts_take_their_blocks_out_and_nothing_else():
+    real = truth()
+    effort = real.force.copy()
+    effort[1003, 2] = np.nan
+    effort[2000:2100, 4] = np.nan
+    whole, holed = (reconstruct(MODEL, recording_of(real, F)) for F in (real.force, effort))
+    before, after = whole.treat(whole.effort), holed.treat(holed.effort)
+    touched = whole.treat(np.isnan(effort[whole.index]).astype(float)) > 0
+    assert touched[:, 2].sum() == 1
+    assert 20 <= touched[:, 4].sum() <= 21
+    assert not touched[:, [0, 1, 3, 5]].any()
+    assert_array_equal(np.isnan(after), touched)
+    assert_array_equal(after[~touched], before[~touched])
+    assert_array_equal(whole.position, holed.position)
+
+
+def test_efforts_that_come_less_often_than_positions_are_compared_sample_by_sample():
+    real = truth()
+    effort = np.full_like(real.force, np.nan)
+    effort[::4] = real.force[::4]
+    found = reconstruct(MODEL, recording_of(real, effort))
+    assert found.block == 1
+    error = force_error(None, found)
+    assert np.isfinite(error).sum() == np.isfinite(effort[found.index]).sum() > 0
+    assert np.sqrt(np.nanmean(error ** 2)) < 2 * FORCE_ERROR  # single samples, not means
+    assert any('less often' in note for note in found.notes)
+
+
+def test_blocks_last_a_hundredth_of_a_second_at_any_rate():
+    assert [block_length(1 / rate) for rate in (50, 100, 250, 500, 1000)] == [1, 1, 2, 5, 10]
+
+
+def test_values_of_another_length_are_refused_by_the_treatment():
+    with pytest.raises(ValueError, match='7 samples'):
+        Treatment(np.array([0, 5]), 10)(np.zeros((7, 6)))
+
+
+# Edges and segments --------------------------------------------------------------------------
+
+def test_edges_are_dropped_at_both_ends_of_every_segment_and_blocks_stay_within():
+    real = truth()
+    keep = np.r_[0:1500, 1600:3000, 3200:3260, 3500:4000]  # the third is too short
+    found = reconstruct(MODEL, recording_of(
+        real, real.force[keep], time=real.time[keep], position=encoder(real.drives.position[keep])))
+    half = found.smoothing.polynomial(STEP).half
+    assert len(found.segments) == 3
+    for segment, (first, end) in zip(found.segments, ((0, 1500), (1600, 3000), (3500, 4000)),
+                                     strict=True):
+        original = keep[found.index[segment]]
+        assert original[0] == first + half
+        assert end - half - found.block < original[-1] < end - half
+        assert_array_equal(np.diff(original), 1)
+        assert segment.start in found.treat.starts
+    assert_array_equal(np.diff(found.treat.starts), found.block)
+    assert len(found) + found.dropped in (len(keep), len(keep) - 60)
+    assert rms(force_error(None, found)).max() < FORCE_ERROR
+
+
+def test_effects_with_memory_run_through_a_segment_and_start_afresh_in_the_next():
+    real = truth()
+    model = paper_model({'effects.active': ['hysteresis'],
+                         'effects.hysteresis.lift_1.force': 1.0,
+                         'effects.hysteresis.lift_1.distance': 1e-3})
+    keep = np.r_[0:2000, 2200:4000]
+    found = reconstruct(model, recording_of(
+        real, real.force[keep], time=real.time[keep], position=encoder(real.drives.position[keep])))
+    expected = []
+    for segment in found.segments:
+        motion = found.motion[segment].with_time(found.time[segment])
+        expected.append(model.drive_forces(motion).parts['hysteresis'])
+    treated = treated_forces(model, found)['hysteresis']
+    assert_allclose(treated, found.treat(np.concatenate(expected)), rtol=0, atol=1e-12)
+    assert np.abs(treated).max() > 0.5
+
+
+@pytest.mark.parametrize('samples', [10, 30, 60])
+def test_a_recording_that_is_too_short_is_refused_in_a_sentence(samples):
+    real = truth()
+    recording = Recording('short', Recording.from_arrays('', real.time, real.drives.position)
+                          .drives, real.time[:samples], real.drives.position[:samples], None,
+                          real.force[:samples], segments=(slice(0, samples),))
+    with pytest.raises(MotionError, match=rf'{samples} samples'):
+        reconstruct(MODEL, recording, window=0.2)
+
+
+def test_a_single_axis_is_smoothed_but_has_no_platform():
+    real = truth()
+    recording = Recording.from_arrays(
+        'axis', real.time, encoder(real.drives.position[:, :1]), real.drives.velocity[:, :1],
+        drives=('axis',))
+    found = smooth_drives(recording)
+    assert rms(found.velocity - real.drives.velocity[found.index, :1]) < 1e-5
+    assert any('velocities of axis' in note for note in found.notes)
+    with pytest.raises(MotionError, match='they are axis, must be slide_1'):
+        reconstruct(MODEL, recording)
+
+
+def test_progress_rises_to_the_whole():
+    seen = []
+    reconstruct(MODEL, recording_of(truth()), progress=lambda done, total: seen.append(
+        done / total))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+
+# Stamps --------------------------------------------------------------------------------------
+
+JITTER = 1e-4  # [s rms]: at 0.1 m/s ten times the resolution of the encoder
+
+
+def jittered(rng):
+    """Return equal steps, and the same with jitter, strictly increasing."""
+    time = np.arange(0, DURATION, STEP)
+    return time, time + np.clip(rng.normal(scale=JITTER, size=len(time)), -4e-4, 4e-4)
+
+
+def test_samples_that_were_taken_when_the_stamps_say_are_read_so():
+    _, stamps = jittered(np.random.default_rng(11))
+    real = truth_at(stamps, 2.0, 0.03, 0.08)
+    found = reconstruct(MODEL, recording_of(real))
+    assert any('smoother when the stamps are taken as true' in note for note in found.notes)
+    assert rms(force_error(None, found)).max() < FORCE_ERROR
+
+
+def test_samples_at_equal_steps_with_late_stamps_are_read_so():
+    _, stamps = jittered(np.random.default_rng(12))
+    real = truth(2.0, 0.03, 0.08)
+    found = reconstruct(MODEL, recording_of(real, time=stamps))
+    assert any('steps are taken as equal' in note for note in found.notes)
+    assert rms(force_error(None, found)).max() < FORCE_ERROR
+
+
+def test_jitter_that_cannot_matter_is_not_mentioned():
+    real = truth()
+    time = real.time + 1e-7 * np.sin(1e4 * real.time)
+    assert find_grid(time, encoder(real.drives.position))[1] == ''
+
+
+def test_lost_samples_are_bridged_in_positions_and_stay_unknown_in_efforts():
+    real = truth(2.0, 0.03, 0.08)
+    keep = np.ones(len(real.time), dtype=bool)
+    keep[np.random.default_rng(13).choice(np.arange(10, 3990, 7), 60, replace=False)] = False
+    found = reconstruct(MODEL, recording_of(
+        real, real.force[keep], time=real.time[keep], position=encoder(real.drives.position)[keep]))
+    assert len(found.segments) == 1
+    assert any('60 lost samples' in note for note in found.notes)
+    assert_array_equal(found.effort, real.force[keep][found.index])
+    assert rms(force_error(None, found)).max() < FORCE_ERROR
+    lengths = np.diff(np.append(found.treat.starts, len(found)))
+    assert set(lengths) == {found.block - 1, found.block}
+
+
+def test_segments_of_different_rates_are_each_smoothed_over_the_same_time():
+    real = truth(2.0, 0.03, 0.08)
+    keep = np.r_[0:2000, 2000:4000:2]
+    found = reconstruct(MODEL, recording_of(
+        real, real.force[keep], time=real.time[keep], position=encoder(real.drives.position[keep])))
+    assert len(found.segments) == 2
+    ends = [real.time[keep][found.index[part.start]] for part in found.segments]
+    assert ends[0] == pytest.approx(found.smoothing.duration / 2, abs=2 * STEP)
+    assert ends[1] - real.time[2000] == pytest.approx(found.smoothing.duration / 2, abs=3 * STEP)
+    assert rms(force_error(None, found)).max() < FORCE_ERROR
+
+
+# Recorded velocities -------------------------------------------------------------------------
+
+VELOCITIES = {
+    # name: (velocity from the truth, whether velocities and accelerations are better so)
+    'exact': (lambda real, rng: real.velocity, (True, True)),
+    # The window leaves 2.5 um/s and 1.4e-4 m/s^2 of differentiated positions; of these noises a
+    # fifth, and 8.5 times them as accelerations.
+    'noise of 2 um/s': (
+        lambda real, rng: real.velocity + rng.normal(scale=2e-6, size=real.velocity.shape),
+        (True, True)),
+    'noise of 60 um/s': (
+        lambda real, rng: real.velocity + rng.normal(scale=6e-5, size=real.velocity.shape),
+        (False, False)),
+    'noise of 1 mm/s': (
+        lambda real, rng: real.velocity + rng.normal(scale=1e-3, size=real.velocity.shape),
+        (False, False)),
+    'one sample late': (lambda real, rng: np.roll(real.velocity, 1, axis=0), (False, False)),
+    'one per cent too large': (lambda real, rng: 1.01 * real.velocity, (False, False)),
+    'differences of the encoder': (
+        lambda real, rng: np.diff(encoder(real.position), axis=0, prepend=0) / STEP,
+        (False, False)),
+}
+
+
+@pytest.mark.parametrize('kind', list(VELOCITIES))
+def test_recorded_velocities_are_used_only_where_they_are_better(kind):
+    make, better = VELOCITIES[kind]
+    real = truth()
+    velocity = make(real.drives, np.random.default_rng(14))
+    found = reconstruct(MODEL, recording_of(real, velocity=velocity))
+    assert_array_equal(found.from_recorded, np.transpose([better] * 6))
+    assert any('recorded velocities' in note for note in found.notes)
+    alone = reconstruct(MODEL, recording_of(real))
+    for name, used in zip(('velocity', 'acceleration'), better, strict=True):
+        if used:
+            with_it, without = (rms(getattr(r, name) - getattr(real.drives, name)[r.index], None)
+                                for r in (found, alone))
+            assert with_it < 0.75 * without
+        else:
+            assert_array_equal(getattr(found, name), getattr(alone, name))
+    assert rms(force_error(None, found)).max() < FORCE_ERROR
+
+
+def test_velocities_are_judged_drive_by_drive_and_a_missing_one_is_not_used():
+    real = truth()
+    velocity = real.drives.velocity.copy()
+    velocity[:, 3] *= 1.02
+    velocity[500, 5] = np.nan
+    found = reconstruct(MODEL, recording_of(real, velocity=velocity))
+    assert found.from_recorded.tolist() == [[True, True, True, False, True, False]] * 2
+    assert np.isfinite(found.velocity).all()
+    assert any('velocities of slide_1, slide_2, slide_3, lift_2 come from recorded' in note
+               for note in found.notes)
+
+
+# Live ----------------------------------------------------------------------------------------
+
+def play(recording, polynomial, block):
+    """Return live samples, and the blocks of effort and velocity in each stretch."""
+    live = LiveReconstruction(polynomial)
+    samples, stretches = [], []
+    for time, q, F in zip(recording.time, recording.position, recording.effort, strict=True):
+        sample = live.push(time, q, F)
+        if sample is None:
+            continue
+        if sample.is_start:
+            stretches.append([])
+        samples.append(sample)
+        stretches[-1].append(np.concatenate((sample.effort, sample.velocity)))
+    blocks = []
+    for stretch in stretches:
+        whole = len(stretch) // block * block
+        blocks.append(Treatment(np.arange(0, whole, block), whole)(np.array(stretch[:whole])))
+    return live, samples, np.concatenate(blocks)
+
+
+def test_live_and_offline_agree_to_rounding_across_a_gap():
+    real = truth()
+    keep = np.r_[0:1303, 1400:2500]
+    effort = real.force[keep]
+    effort[700, 1] = np.nan
+    recording = recording_of(real, effort, time=real.time[keep],
+                             position=encoder(real.drives.position[keep]))
+    found = reconstruct(MODEL, recording)
+    live, samples, blocks = play(recording, found.smoothing.polynomial(STEP), found.block)
+    assert live.gaps == 1
+    assert [k for k, sample in enumerate(samples) if sample.is_start] == [
+        0, 1303 - 2 * live.polynomial.half]
+    by_time = {sample.time: sample for sample in samples}
+    online = [by_time[time] for time in found.time]
+    # Stamps of the recording set its step to 1e-12, relative; FFT rounds to 1e-16 of 0.3 m,
+    # times the weights of the second derivative.
+    for name, tolerance in (('position', 1e-14), ('velocity', 1e-11), ('acceleration', 1e-8)):
+        assert_allclose([getattr(sample, name) for sample in online], getattr(found, name),
+                        rtol=0, atol=tolerance)
+    assert_array_equal([sample.effort for sample in online], found.effort)
+    offline = np.concatenate((found.treat(found.effort), found.treat(found.velocity)), axis=1)
+    assert_allclose(blocks, offline, rtol=0, atol=1e-11)
+    assert np.isnan(blocks).sum() == 1
+
+
+def test_live_platform_motion_is_that_of_the_recording():
+    real = truth()
+    recording = recording_of(real)
+    found = reconstruct(MODEL, recording)
+    polynomial = found.smoothing.polynomial(STEP)
+    _, samples, _ = play(replace(recording, time=recording.time[:400],
+                                 position=recording.position[:400],
+                                 effort=recording.effort[:400]), polynomial, found.block)
+    seed = None
+    for k, sample in enumerate(samples[:50]):
+        seed = solve_forward_motion(
+            MODEL.robot.geometry, sample.position[None], sample.velocity[None],
+            sample.acceleration[None], seed).motion
+        assert_allclose(seed.position[0], found.motion.position[k], rtol=0, atol=1e-11)
+        assert_allclose(seed.linear_acceleration[0], found.motion.linear_acceleration[k], rtol=0,
+                        atol=1e-6)
+
+
+def test_live_leaves_out_positions_that_are_none_and_starts_again():
+    polynomial = LocalPolynomial(17, STEP)
+    live = LiveReconstruction(polynomial)
+    for k in range(40):
+        q = np.full(6, np.nan) if k == 20 else np.full(6, 0.1 * k)
+        sample = live.push(k * STEP, q, np.zeros(6))
+        assert (sample is not None) == (16 <= k < 20 or k >= 37)
+        if sample is not None:
+            assert_allclose(sample.velocity, 0.1 / STEP, rtol=1e-9)
+    assert live.gaps == 1
+
+
+def test_rates_of_a_platform_at_rest_are_zero():
+    home = PlatformMotion.at_rest((0, 0, 0.5))
+    motion = platform_rates(MODEL.robot.geometry, home, np.zeros((1, 6)), np.zeros((1, 6)))
+    assert_array_equal(motion.linear_acceleration, 0)
+    assert_array_equal(motion.angular_acceleration, 0)
+
+
+@pytest.mark.parametrize('late', [False, True])
+def test_uneven_stamps_are_taken_as_true_or_as_late_whichever_is_smoother(late):
+    rng = np.random.default_rng(3)
+    even = np.arange(0, 4.0, 0.01)
+    stamps = even + rng.uniform(-1e-3, 1e-3, len(even))
+    taken = even if late else stamps
+    speed, turn = 0.8, 2.0  # [rad, rad/s] of a joint
+    polynomial = LocalPolynomial(13, 0.01)
+    live, found = LiveReconstruction(polynomial), []
+    for k, stamp in enumerate(stamps):
+        sample = live.push(stamp, [speed * np.sin(turn * taken[k])], [0.0])
+        if sample is not None:
+            found.append((speed * turn ** 2 * -np.sin(turn * taken[k - polynomial.half]),
+                          sample.acceleration[0]))
+    true, seen = np.array(found).T
+    # Samples at wrong times would leave 0.2 rad/s^2 here: a millisecond at 1.6 rad/s.
+    assert rms(seen - true) < 0.02

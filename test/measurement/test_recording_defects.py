@@ -1,0 +1,363 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Defects of recordings: what is dropped, sorted, split or kept, and what is said of it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_up_recordings import (
+    QUANTITIES,
+    STEP,
+    SUFFIXES,
+    assert_same,
+    by_own_writer,
+    judged,
+    kinds,
+    measured,
+    message,
+    states_of,
+    the,
+    the_one,
+    write_plain_bag,
+)
+
+from pprs_dynamics.errors import MotionError
+from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
+from pprs_dynamics.measurement.files.samples import POLICY
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_sound_recording_has_nothing_to_tell(seed: int) -> None:
+    # Pauses, slow and fast motion, jitter of a tenth of a step.
+    arrays = measured(4000, seed=seed)
+    rng = np.random.default_rng(seed)
+    arrays['time'] = arrays['time'] + rng.uniform(-0.1, 0.1, 4000) * STEP
+    pause = slice(1000, 2000)
+    arrays['position'][pause] = arrays['position'][1000] + 1e-6 * rng.integers(-1, 2, (1000, 6))
+    arrays['position'][2000:] += arrays['position'][1999] - arrays['position'][2000]
+    recording = judged(arrays)
+    assert recording.findings == ()
+    assert recording.segments == (slice(0, 4000),)
+
+
+def test_non_finite_times_and_positions_are_dropped() -> None:
+    arrays = measured()
+    arrays['time'][[100, 200]] = np.nan, np.inf
+    arrays['position'][300, 0], arrays['position'][[301, 400], 4] = np.nan, -np.inf
+    recording = judged(arrays)
+    assert the_one(recording, 'non_finite_time').count == 2
+    finding = the_one(recording, 'non_finite_position')
+    assert finding.count == 3
+    assert finding.spans == ((0.6, 0.602), (0.8, 0.8))
+    assert finding.drives == ('slide_1', 'lift_2')
+    kept = np.setdiff1d(np.arange(1000), [100, 200, 300, 301, 400])
+    np.testing.assert_array_equal(recording.effort, arrays['effort'][kept])
+    assert the_one(recording, 'lost_samples').count == 5
+    assert recording.segments == (slice(0, 995),)
+
+
+def test_late_stamps_are_sorted_in() -> None:
+    arrays = measured()
+    order = np.arange(1000)
+    order[200:202], order[500:505] = [201, 200], [503, 500, 501, 502, 504]
+    recording = judged({name: values[order] for name, values in arrays.items()})
+    assert_same(recording, arrays)
+    assert the(recording, 'unordered_stamps').count == 4
+    assert the(recording, 'unordered_stamps').spans == ((0.4, 0.4), (1.0, 1.004))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), reach=st.integers(1, 5))
+def test_any_disorder_within_reach_is_undone(seed: int, reach: int) -> None:
+    arrays = measured(200)
+    shift = np.random.default_rng(seed).uniform(0, reach, 200)
+    order = np.argsort(np.arange(200) + shift, kind='stable')
+    recording = judged({name: values[order] for name, values in arrays.items()})
+    assert_same(recording, arrays)
+    assert recording.segments == (slice(0, 200),)
+
+
+def test_shuffled_rows_are_sorted() -> None:
+    arrays = measured()
+    order = np.random.default_rng(0).permutation(1000)
+    recording = judged({name: values[order] for name, values in arrays.items()})
+    assert_same(recording, arrays)
+    assert kinds(recording) == {'unordered_stamps'}
+    assert recording.segments == (slice(0, 1000),)
+
+
+@pytest.mark.parametrize('back', [0.2, 2.0, 1.7e9])
+def test_a_clock_that_is_set_back_splits(back: float) -> None:
+    arrays = measured()
+    arrays['time'] = arrays['time'] + np.where(np.arange(1000) < 600, back, 0.0)
+    recording = judged(arrays)
+    finding = the(recording, 'clock_reset')
+    assert finding.count == 1
+    assert finding.spans == ((1.2, 1.2),)
+    assert recording.segments == (slice(0, 600), slice(600, 1000))
+    np.testing.assert_array_equal(recording.position, arrays['position'])
+
+
+def test_a_single_stamp_of_another_clock_is_not_sorted_in() -> None:
+    arrays = measured()
+    arrays['time'][500] -= 5
+    recording = judged(arrays)
+    assert kinds(recording) == {'clock_reset', 'gap', 'short_segment'}
+    assert recording.segments == (slice(0, 500), slice(501, 1000))
+
+
+def test_segments_stay_in_place_when_samples_before_them_are_dropped() -> None:
+    arrays = measured()
+    arrays['time'][600:] -= 1
+    arrays['time'][100] = arrays['time'][99]
+    recording = judged(arrays)
+    assert kinds(recording) == {'clock_reset', 'duplicate_stamps', 'lost_samples'}
+    assert recording.segments == (slice(0, 599), slice(599, 999))
+
+
+def test_stamps_from_before_the_clock_was_set_do_not_cost_digits(tmp_path: Path) -> None:
+    arrays = measured(600)
+    states = states_of(arrays, time=arrays['time'] + 1_700_000_000)
+    states[0] = message(0, DRIVES, *(arrays[name][0] for name in QUANTITIES))
+    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
+    assert recording.epoch == 1_700_000_000
+    assert recording.segments == (slice(1, 600),)
+    # The test itself made these stamps from floats of seconds since 1970, good to 0.24 us.
+    assert np.abs(np.diff(recording.time[1:]) - STEP).max() < 1e-6
+    assert kinds(recording) == {'gap', 'short_segment'}
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_a_clock_that_is_set_back_survives_a_round_trip(suffix: str, tmp_path: Path) -> None:
+    arrays = measured(900)
+    arrays['time'] = np.tile(arrays['time'][:300], 3)
+    path = by_own_writer(suffix)(tmp_path, arrays)
+    recording = read_recording(path)
+    assert_same(recording, arrays)
+    assert the(recording, 'clock_reset').count == 2
+    assert recording.segments == (slice(0, 300), slice(300, 600), slice(600, 900))
+
+
+def test_of_equal_stamps_the_first_sample_is_kept() -> None:
+    arrays = measured()
+    order = np.sort(np.concatenate((np.arange(1000), [10, 10, 700])))
+    doubled = {name: values[order] for name, values in arrays.items()}
+    doubled['effort'][[11, 12]] = 99
+    recording = judged(doubled)
+    assert_same(recording, arrays)
+    finding = the(recording, 'duplicate_stamps')
+    assert finding.count == 3
+    assert finding.spans == ((0.02, 0.02), (1.4, 1.4))
+
+
+def test_of_equal_stamps_in_shuffled_rows_the_first_of_the_file_is_kept() -> None:
+    arrays = measured()
+    order = np.random.default_rng(2).permutation(1000)
+    shuffled = {name: values[order] for name, values in arrays.items()}
+    shuffled['time'] = STEP * (order // 2)
+    recording = judged(shuffled)
+    place = np.argsort(order)
+    first = np.where(place[::2] < place[1::2], np.arange(0, 1000, 2), np.arange(1, 1000, 2))
+    np.testing.assert_array_equal(recording.effort, arrays['effort'][first])
+
+
+@pytest.mark.parametrize('length', [1, 2, 3])
+def test_spikes_of_position_are_dropped(length: int) -> None:
+    arrays = measured()
+    arrays['position'][400:400 + length, 3] += 0.03
+    recording = judged(arrays)
+    finding = the_one(recording, 'position_spike')
+    assert (finding.count, finding.drives) == (length, ('lift_1',))
+    assert finding.spans == ((pytest.approx(0.8), pytest.approx(0.8 + STEP * (length - 1))),)
+    assert kinds(recording) == {'position_spike', 'lost_samples'}
+    assert the_one(recording, 'lost_samples').count == length
+    kept = np.setdiff1d(np.arange(1000), np.arange(400, 400 + length))
+    np.testing.assert_array_equal(recording.position, arrays['position'][kept])
+    assert recording.segments == (slice(0, 1000 - length),)
+
+
+def test_a_position_that_jumps_splits() -> None:
+    arrays = measured()
+    arrays['position'][500:, 1] -= 0.03
+    recording = judged(arrays)
+    finding = the(recording, 'position_jump')
+    assert (finding.count, finding.drives) == (1, ('slide_2',))
+    assert finding.spans == ((1.0, 1.0),)
+    # What the drive moved in that step comes on top.
+    size = float(re.search(r'jumps 1 time, by up to (\S+) m', finding.text)[1])    # type: ignore[index]
+    assert size == pytest.approx(-0.03, abs=0.001)
+    assert recording.segments == (slice(0, 500), slice(500, 1000))
+
+
+@pytest.mark.parametrize('factor', [0.25, 0.5, 2, 5])
+def test_a_rate_that_changes_splits_where_it_changes(factor: float) -> None:
+    arrays = measured()
+    steps = np.full(1000, STEP)
+    steps[450:] *= factor
+    arrays['time'] = np.cumsum(steps)
+    recording = judged(arrays)
+    finding = the(recording, 'changing_rate')
+    assert finding.spans == ((arrays['time'][449], arrays['time'][449]),)
+    assert f'from 500 Hz to {500 / factor:.4g} Hz' in finding.text
+    assert recording.segments == (slice(0, 449), slice(449, 1000))
+    assert [round(part.rate) for part in describe(recording).segments] == [500, 500 / factor]
+
+
+def test_gaps_split_and_lost_samples_do_not() -> None:
+    arrays = measured()
+    gone = [100, 300, 301, *range(500, 509), *range(700, 710)]
+    kept = np.setdiff1d(np.arange(1000), gone)
+    recording = judged({name: values[kept] for name, values in arrays.items()})
+    assert kinds(recording) == {'gap', 'lost_samples'}
+    lost = the_one(recording, 'lost_samples')
+    # Nine lost samples make a step of 20 ms, no longer than a cubic can bridge; ten make a gap.
+    assert lost.count == 1 + 2 + 9
+    np.testing.assert_allclose(lost.spans, [(0.198, 0.202), (0.598, 0.604), (0.998, 1.018)])
+    gap = the_one(recording, 'gap')
+    assert gap.count == 1
+    np.testing.assert_allclose(gap.spans, [(1.398, 1.42)])
+    assert recording.segments == (slice(0, 688), slice(688, 978))
+
+
+def test_one_late_stamp_is_not_a_lost_sample() -> None:
+    arrays = measured()
+    arrays['time'][500] += 0.7 * STEP
+    assert judged(arrays).findings == ()
+
+
+def test_irregular_steps_are_told() -> None:
+    arrays = measured(5000)
+    arrays['time'] = arrays['time'] + np.random.default_rng(0).uniform(0, 0.9, 5000) * STEP
+    assert 'irregular_steps' in kinds(judged(arrays))
+    # Losing samples at random does not make stamps irregular.
+    kept = np.sort(np.random.default_rng(1).choice(5000, 4500, replace=False))
+    lossy = judged({name: values[kept] for name, values in measured(5000).items()})
+    assert the(lossy, 'lost_samples').count == kept[-1] - kept[0] + 1 - 4500
+
+
+def test_milliseconds_taken_for_seconds_are_told() -> None:
+    arrays = measured()
+    arrays['time'] = 1000 * arrays['time']
+    assert 'one sample in 2 s' in the(judged(arrays), 'slow_rate').text
+
+
+def test_efforts_that_are_not_finite_count_as_not_measured() -> None:
+    arrays = measured()
+    arrays['effort'][10:20, 2], arrays['effort'][15:40, 5], arrays['effort'][90, 0] = (
+        np.nan, np.inf, -np.inf)
+    recording = judged(arrays)
+    finding = the(recording, 'effort_not_measured')
+    assert finding.count == 10 + 25 + 1
+    assert finding.spans == ((0.02, 0.078), (0.18, 0.18))
+    assert finding.drives == ('slide_1', 'slide_3', 'lift_3')
+    assert 'lift_3 (2.5 % of the samples)' in finding.text
+    assert np.isnan(recording.effort).sum() == 36
+    np.testing.assert_array_equal(recording.position, arrays['position'])
+    assert np.isinf(arrays['effort']).sum() == 26, 'the caller keeps his own array'
+
+
+def test_missing_velocities_are_told_per_drive() -> None:
+    arrays = measured()
+    arrays['velocity'][:, 1] = np.nan
+    recording = judged(arrays)
+    finding = the(recording, 'missing_velocity')
+    assert (finding.count, finding.drives) == (1000, ('slide_2',))
+    assert 'slide_2 (all)' in finding.text
+    assert the(judged({**arrays, 'velocity': None}), 'missing_velocity').count == 1000
+
+
+@pytest.mark.parametrize('quantity', QUANTITIES)
+def test_values_that_never_change_are_told(quantity: str) -> None:
+    arrays = measured()
+    arrays[quantity][:, 4] = 0.25
+    finding = the(judged(arrays), f'constant_{quantity}')
+    assert (finding.count, finding.drives) == (1, ('lift_2',))
+    assert f'the {quantity} of lift_2 is 0.25' in finding.text
+
+
+def test_an_effort_that_stands_still_while_its_drive_moves_is_told() -> None:
+    arrays = measured()
+    arrays['effort'][200:600, 3] = 1.5
+    finding = the(judged(arrays), 'constant_effort')
+    assert (finding.count, finding.drives) == (1, ('lift_1',))
+    assert finding.spans == ((0.4, pytest.approx(1.198)),)
+    # At rest a coarse sensor may well say the same for long.
+    arrays['position'][200:600, 3] = arrays['position'][200, 3]
+    arrays['position'][600:, 3] += arrays['position'][599, 3] - arrays['position'][600, 3]
+    assert judged(arrays).findings == ()
+
+
+def test_repeated_messages_are_told() -> None:
+    arrays = measured()
+    for name in QUANTITIES:
+        arrays[name][300:360] = arrays[name][300]
+        arrays[name][700:705] = arrays[name][700]
+    recording = judged(arrays)
+    finding = the_one(recording, 'frozen_samples')
+    assert finding.count == 59
+    assert finding.spans == ((0.6, pytest.approx(0.718)),)
+
+
+def test_a_robot_at_rest_without_efforts_is_not_called_frozen() -> None:
+    arrays = {**measured(), 'effort': None, 'velocity': None}
+    arrays['position'][300:500] = arrays['position'][300]
+    arrays['position'][500:] += arrays['position'][499] - arrays['position'][500]
+    assert kinds(judged(arrays)) == {'effort_not_measured', 'missing_velocity'}
+
+
+def test_segments_too_short_to_filter_are_not_used() -> None:
+    arrays = measured()
+    arrays['time'][100:119] += 1
+    arrays['time'][119:] += 2
+    recording = judged(arrays)
+    finding = the_one(recording, 'short_segment')
+    assert finding.count == 1
+    np.testing.assert_allclose(finding.spans, [(1.2, 1.236)])
+    assert recording.segments == (slice(0, 100), slice(119, 1000))
+    assert len(recording.time) == 1000
+
+
+def test_a_short_recording_is_told_and_kept() -> None:
+    assert the(judged(measured(99)), 'too_short').count == 1
+    recording = judged(measured(5))
+    assert kinds(recording) >= {'short_segment', 'too_short'}
+    assert recording.segments == ()
+    assert len(recording.time) == 5
+
+
+@settings(max_examples=60, deadline=None)
+@given(times=st.lists(st.one_of(st.floats(), st.floats(0, 3).map(lambda t: round(t, 2))),
+                      min_size=1, max_size=80), seed=st.integers(0, 99))
+def test_whatever_the_stamps_segments_are_ordered_and_everything_is_finite(
+    times: list[float], seed: int,
+) -> None:
+    position = np.random.default_rng(seed).choice([0, 0, 1, 1e9, np.nan], (len(times), 1),
+                                                  p=[0.4, 0.2, 0.2, 0.15, 0.05])
+    try:
+        recording = Recording.from_arrays('x', np.array(times), position, drives=('axis',))
+    except MotionError:
+        assert not np.any(np.isfinite(times) & np.isfinite(position[:, 0]))
+        return
+    assert np.all(np.isfinite(recording.time))
+    assert np.all(np.isfinite(recording.position))
+    for part in recording.segments:
+        assert np.all(np.diff(recording.time[part]) > 0)
+    starts = [part.start for part in recording.segments]
+    assert starts == sorted(starts)
+
+
+def test_every_defect_of_the_policy_is_planted_in_a_test() -> None:
+    folder = Path(__file__).parent
+    text = ''.join((folder / f'test_recording{end}.py').read_text() for end in ('s', '_defects'))
+    planted = {kind for kind in POLICY
+               if re.search(rf"(the|the_one)\([^'\n]*'{kind}'\)|'{kind}' in kinds", text)}
+    planted |= {f'constant_{quantity}' for quantity in QUANTITIES} | {'short_segment'}
+    assert planted == set(POLICY)

@@ -1,0 +1,592 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings: one reader for bags and CSV, and every file told that is none."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import re
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from made_up_recordings import (
+    QUANTITIES,
+    STATE,
+    STEP,
+    STEP_NS,
+    STORE,
+    SUFFIXES,
+    Arrays,
+    assert_same,
+    by_own_writer,
+    judged,
+    kinds,
+    measured,
+    message,
+    states_of,
+    table,
+    the,
+    the_one,
+    write_plain_bag,
+)
+from rclpy.serialization import serialize_message
+from rosbags.rosbag2 import StoragePlugin
+from sensor_msgs.msg import JointState
+
+from pprs_dynamics.errors import MissingLibraryError, MotionError, UnreadableFileError
+from pprs_dynamics.measurement.files.joint_state_cdr import Layout, serialised
+from pprs_dynamics.measurement.files.message_blocks import MOST_LAYOUTS, JointStateBlocks
+from pprs_dynamics.measurement.files.recording import (
+    Recording,
+    describe,
+    read_recording,
+    write_recording,
+)
+from pprs_dynamics.measurement.files.samples import POLICY
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+# ---------------------------------------------------------------------------------- formats
+
+
+def by_rosbags(storage: StoragePlugin) -> Callable[[Path, Arrays], Path]:
+    return lambda folder, arrays: write_plain_bag(
+        folder / 'bag', {'/pprs/joint_states': states_of(arrays)}, storage)
+
+
+def by_pandas(folder: Path, arrays: Arrays) -> Path:
+    table(arrays).to_csv(folder / 'pandas.csv', index=False)
+    return folder / 'pandas.csv'
+
+
+WRITERS = {**{f'own{suffix}': by_own_writer(suffix) for suffix in SUFFIXES},
+           'rosbags_mcap': by_rosbags(StoragePlugin.MCAP),
+           'rosbags_sqlite3': by_rosbags(StoragePlugin.SQLITE3), 'pandas': by_pandas}
+
+
+@pytest.mark.parametrize('write', WRITERS.values(), ids=WRITERS)
+def test_every_writer_gives_the_same_arrays_and_nothing_to_tell(
+    write: Callable[[Path, Arrays], Path], tmp_path: Path,
+) -> None:
+    arrays = measured(700)
+    recording = read_recording(write(tmp_path, arrays))
+    assert_same(recording, arrays)
+    assert recording.findings == ()
+    assert recording.segments == (slice(0, 700),)
+    assert recording.drives == DRIVES
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_efforts_that_were_not_measured_and_absent_velocities_survive_a_round_trip(
+    suffix: str, tmp_path: Path,
+) -> None:
+    arrays = {**measured(600), 'velocity': None}
+    arrays['effort'][50:60, 2] = np.nan
+    path = by_own_writer(suffix)(tmp_path, arrays)
+    recording = read_recording(path)
+    assert_same(recording, arrays)
+    assert kinds(recording) == {'effort_not_measured', 'missing_velocity'}
+    again = by_own_writer(suffix)(tmp_path / 'again' if suffix == '' else tmp_path, arrays)
+    assert_same(read_recording(again), arrays)
+
+
+@pytest.mark.parametrize('suffix', ['.mcap', '.db3', ''])
+def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
+    suffix: str, tmp_path: Path,
+) -> None:
+    arrays = measured(300)
+    stamps = 1_763_000_123_456_789_123 + STEP_NS * np.arange(300)
+    source = write_plain_bag(tmp_path / 'source', {
+        '/joint_states': [message(int(stamp), DRIVES, *(arrays[name][k] for name in QUANTITIES))
+                          for k, stamp in enumerate(stamps)]})
+    recording = read_recording(source)
+    assert recording.epoch == 1_763_000_123
+    # As floats of seconds since 1970 they would be 120 ns off.
+    np.testing.assert_array_equal(np.rint(1e9 * recording.time).astype(int),
+                                  stamps - 1_763_000_123 * 10**9)
+    write_recording(tmp_path / f'copy{suffix}', recording)
+    copy = read_recording(tmp_path / f'copy{suffix}')
+    assert copy.epoch == recording.epoch
+    np.testing.assert_array_equal(copy.time, recording.time)
+
+
+@settings(max_examples=40, deadline=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(values=st.lists(st.floats(-1e3, 1e3), min_size=25, max_size=60),
+       steps=st.floats(1e-4, 0.3))
+def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float) -> None:
+    time = 0.1 + steps * np.arange(len(values))
+    effort = np.array(values)[:, None]
+    recording = Recording.from_arrays('x', time, np.sin(time)[:, None], effort / 7, effort,
+                                      ('axis',))
+    write_recording(tmp_path / 'x.csv', recording)
+    assert_same(read_recording(tmp_path / 'x.csv', ('axis',)),
+                {'time': time, 'position': np.sin(time)[:, None], 'velocity': effort / 7,
+                 'effort': effort})
+
+
+@settings(max_examples=30, deadline=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(order=st.permutations(range(19)))
+def test_csv_columns_may_stand_in_any_order(tmp_path: Path, order: list[int]) -> None:
+    arrays = measured(30)
+    columns = table(arrays)
+    columns.iloc[:, order].to_csv(tmp_path / 'x.csv', index=False)
+    assert_same(read_recording(tmp_path / 'x.csv'), arrays)
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_a_single_axis_is_read_by_its_own_drive(suffix: str, tmp_path: Path) -> None:
+    arrays = measured(200, ('axis',))
+    write_recording(tmp_path / f'x{suffix}', Recording.from_arrays('x', **arrays, drives=('axis',)))
+    recording = read_recording(tmp_path / f'x{suffix}', drives=('axis',))
+    assert_same(recording, arrays)
+    with pytest.raises(UnreadableFileError, match=r'slide_1.*axis'):
+        read_recording(tmp_path / f'x{suffix}')
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_progress_rises_to_the_total(suffix: str, tmp_path: Path) -> None:
+    arrays = measured(9000)
+    write_recording(tmp_path / f'x{suffix}', judged(arrays))
+    calls: list[tuple[int, int]] = []
+    read_recording(tmp_path / f'x{suffix}', progress=lambda *call: calls.append(call))
+    done = [call[0] for call in calls]
+    assert done == sorted(done)
+    assert calls[-1][0] == calls[-1][1] > 0
+    assert len({total for _, total in calls}) == 1
+
+
+# ------------------------------------------------------------------------------------- bags
+
+
+def test_drives_are_found_by_name_among_other_joints_in_any_order(tmp_path: Path) -> None:
+    arrays = measured(600)
+    names = ('gripper', *DRIVES[::-1], 'door')
+    wide = {name: np.column_stack((np.ones(600), arrays[name][:, ::-1], np.zeros(600)))
+            for name in QUANTITIES}
+    path = write_plain_bag(tmp_path / 'bag', {
+        '/joint_states': states_of({'time': arrays['time'], **wide}, names)})
+    recording = read_recording(path)
+    assert_same(recording, arrays)
+    assert the(recording, 'ignored_joints').count == 2
+    assert 'door, gripper' in the(recording, 'ignored_joints').text
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), orders=st.integers(1, 40), big_endian=st.booleans())
+def test_reading_bytes_by_layout_agrees_with_rosbags(
+    seed: int, orders: int, big_endian: bool,
+) -> None:
+    # Any number of joints and orders, sequences that are absent, names of any length.
+    shuffle = random.Random(seed)
+    joints = [*DRIVES, *('x' * k for k in range(1, shuffle.randint(1, 5)))]
+    choices = [shuffle.sample(joints, len(joints)) for _ in range(orders)]
+    data = []
+    for k in range(120):
+        names = shuffle.choice(choices)
+        if shuffle.random() < 0.1:
+            names = names[:-1]
+        arrays = [[shuffle.gauss(0, 1) for _ in names] if shuffle.random() < 0.9 else []
+                  for _ in QUANTITIES]
+        state = message(shuffle.randrange(2**31 * 10**9), names, *arrays)
+        little = not (big_endian and k % 3 == 0)
+        data.append(bytes(STORE.serialize_cdr(state, STATE, little_endian=little)))
+    received = list(range(120))
+    fast, slow = JointStateBlocks(DRIVES), JointStateBlocks(DRIVES, use_layouts=False)
+    for blocks in (fast, slow):
+        blocks.add(data[:70], received[:70])
+        blocks.add(data[70:], received[70:])
+    assert fast.names == slow.names == set(joints)
+    assert 0 < fast.samples == slow.samples < 120 or fast.samples == slow.samples
+    for found, expected in zip(fast.arrays(), slow.arrays(), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_more_orders_of_names_than_layouts_are_kept_are_read_all_the_same() -> None:
+    orders = [DRIVES[k:] + DRIVES[:k] for k in range(6)]
+    orders += [order[::-1] for order in orders] + [(*order, 'x') for order in orders]
+    assert len(orders) > MOST_LAYOUTS
+    blocks = JointStateBlocks(DRIVES)
+    data = [bytes(STORE.serialize_cdr(
+        message(k, order, [float(f'{k}.{sorted(order).index(name)}') for name in order],
+                [], [1.0] * len(order)), STATE)) for k, order in enumerate(orders * 3)]
+    blocks.add(data, range(len(data)))
+    stamps, _, position, velocity, effort = blocks.arrays()
+    np.testing.assert_array_equal(stamps, np.arange(len(data)))
+    place = [float(f'0.{sorted(DRIVES).index(name)}') for name in DRIVES]
+    np.testing.assert_allclose(position - np.arange(len(data))[:, None], [place] * len(data),
+                               atol=1e-12)
+    assert np.all(np.isnan(velocity))
+    assert np.all(effort == 1)
+
+
+@pytest.mark.parametrize('absent', [(), ('velocity',), ('effort',), ('velocity', 'effort')])
+@pytest.mark.parametrize('frame', ['', 'a', 'base', 'world_1'])
+def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str) -> None:
+    # rmw_fastrtps leaves bytes behind the message where a sequence is empty.
+    values = {name: [] if name in absent else [1.5, -2.5, 3.5] for name in QUANTITIES}
+    state = JointState(name=['b', 'other', 'a'], **values)
+    state.header.stamp.sec, state.header.stamp.nanosec = 12, 345
+    state.header.frame_id = frame
+    blocks = JointStateBlocks(('a', 'b'))
+    blocks.add([serialize_message(state)] * 3, [0, 1, 2])
+    stamps, _, *arrays = blocks.arrays()
+    assert stamps.tolist() == [12 * 10**9 + 345] * 3
+    for name, array in zip(QUANTITIES, arrays, strict=True):
+        expected = [np.nan, np.nan] if name in absent else [3.5, 1.5]
+        np.testing.assert_array_equal(array, [expected] * 3)
+
+
+@pytest.mark.parametrize('velocity', [True, False])
+@pytest.mark.parametrize('names', [('axis',), DRIVES, ('a', 'bb', 'ccc', 'dddd', 'eeeee')])
+def test_our_bytes_are_those_of_rosbags(names: tuple[str, ...], velocity: bool) -> None:
+    values = np.random.default_rng(3).normal(size=(3, 4, len(names)))
+    stamps = np.array([0, 1, 10**9 - 1, 2**31 * 10**9 - 1])
+    rows = serialised(names, stamps, values[0], values[1] if velocity else None, values[2])
+    for k, stamp in enumerate(stamps):
+        state = message(int(stamp), names, values[0, k], values[1, k] if velocity else [],
+                        values[2, k])
+        state.header.frame_id = ''
+        assert rows[k].tobytes() == bytes(STORE.serialize_cdr(state, STATE))
+
+
+def test_a_layout_is_told_from_another_by_every_byte_that_makes_it() -> None:
+    data = bytearray(STORE.serialize_cdr(message(7, DRIVES, *np.ones((3, 6))), STATE))
+    layout = Layout.of(bytes(data))
+    assert layout is not None
+    changeable = set(range(len(data))) - set(layout.fixed.tolist())
+    # Stamp 8, options 2, 'base' and its end 5; the rest are the values and their padding.
+    assert len(changeable) <= 8 + 2 + 5 + 3 * 6 * 8 + 6 * 3 + 3 * 7
+    for place in layout.fixed.tolist():
+        changed = data.copy()
+        changed[place] ^= 1
+        assert not layout.matches(np.frombuffer(bytes(changed), np.uint8)[None])[0]
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.binary(max_size=200), start=st.booleans())
+def test_no_bytes_break_the_reader_of_messages(data: bytes, start: bool) -> None:
+    blocks = JointStateBlocks(DRIVES)
+    blocks.add([b'\x00\x01\x00\x00' + data if start else data], [0])
+    assert blocks.samples == 0
+
+
+def test_messages_without_all_drives_are_ignored_and_told(tmp_path: Path) -> None:
+    arrays = measured(60)
+    states = states_of(arrays)
+    half = [message(k, DRIVES[:3], np.ones(3), [], []) for k in range(20)]
+    mixed = [state for pair in zip(states, half, strict=False) for state in pair] + states[20:]
+    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': mixed}))
+    assert_same(recording, arrays)
+    assert the_one(recording, 'incomplete_messages').count == 20
+
+
+def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> None:
+    left, right = measured(50, seed=1), measured(50, seed=2)
+    path = write_plain_bag(tmp_path / 'bag', {
+        '/left/joint_states': states_of(left), '/right/joint_states': states_of(right),
+        '/silent/joint_states': [], '/left/wanted': states_of(left)})
+    with pytest.raises(UnreadableFileError, match='/left/joint_states, /right/joint_st') as told:
+        read_recording(path)
+    assert 'silent' not in str(told.value)
+    assert_same(read_recording(path, topic='/right/joint_states'), right)
+    assert_same(read_recording(path, topic='left/wanted'), left)
+    with pytest.raises(UnreadableFileError, match='no sensor_msgs/JointState on /nowhere'):
+        read_recording(path, topic='/nowhere')
+    with pytest.raises(UnreadableFileError, match='no messages'):
+        read_recording(path, topic='/silent/joint_states')
+
+
+def test_one_storage_file_without_metadata_is_read_and_two_are_not(tmp_path: Path) -> None:
+    arrays = measured(600)
+    path = by_own_writer('')(tmp_path, arrays)
+    (path / 'metadata.yaml').unlink()
+    recording = read_recording(path)
+    assert_same(recording, arrays)
+    assert the(recording, 'no_metadata').count == 1
+    (path / 'second.mcap').write_bytes((path / 'recording.mcap').read_bytes())
+    with pytest.raises(UnreadableFileError, match=r'metadata\.yaml'):
+        read_recording(path)
+
+
+def test_header_stamps_of_0_are_replaced_by_times_of_recording(tmp_path: Path) -> None:
+    arrays = measured(600)
+    states = states_of(arrays, time=np.zeros(600))
+    recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
+    assert_same(recording, arrays)
+    assert the(recording, 'receive_times').count == 600
+
+
+def test_without_rosbags_bags_are_refused_in_one_sentence_and_csv_still_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    arrays = measured(100)
+    bag, text = by_own_writer('.mcap')(tmp_path, arrays), by_own_writer('.csv')(tmp_path, arrays)
+    monkeypatch.setitem(__import__('sys').modules, 'rosbags.rosbag2', None)
+    for action in (lambda: read_recording(bag),
+                   lambda: write_recording(tmp_path / 'new.db3', judged(arrays))):
+        with pytest.raises(MissingLibraryError, match=r'rosbags.*pprs_dynamics\[bags\]'):
+            action()
+    assert_same(read_recording(text), arrays)
+
+
+def test_bags_are_not_overwritten_and_files_are_replaced(tmp_path: Path) -> None:
+    first, second = measured(100, seed=1), measured(50, seed=2)
+    for suffix in ('.csv', '.mcap', '.db3'):
+        for arrays in (first, second):
+            write_recording(tmp_path / f'x{suffix}', judged(arrays))
+        assert_same(read_recording(tmp_path / f'x{suffix}'), second)
+    write_recording(tmp_path / 'bag', judged(first))
+    with pytest.raises(UnreadableFileError, match='exists already'):
+        write_recording(tmp_path / 'bag', judged(second))
+    assert_same(read_recording(tmp_path / 'bag'), first)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ['bag', 'x.csv', 'x.db3', 'x.mcap']
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_what_cannot_be_written_is_told(suffix: str, tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(UnreadableFileError, match='cannot be written'):
+        write_recording(tmp_path / 'file' / f'x{suffix}', judged(measured(30)))
+
+
+def test_times_before_0_cannot_be_stamps_of_ros(tmp_path: Path) -> None:
+    arrays = measured(30)
+    arrays['time'] = arrays['time'] - 1
+    with pytest.raises(UnreadableFileError, match='-1 to'):
+        write_recording(tmp_path / 'x.mcap', judged(arrays))
+
+
+# -------------------------------------------------------------------------------------- CSV
+
+
+TEXTS: dict[str, Callable[[str], str]] = {
+    'byte order mark': lambda text: '\ufeff' + text,
+    'CRLF': lambda text: text.replace('\n', '\r\n'),
+    'semicolons': lambda text: text.replace(',', ';'),
+    'tabs': lambda text: text.replace(',', '\t'),
+    'quotes': lambda text: re.sub(r'[^,\n]+', r'"\g<0>"', text),
+    'blanks': lambda text: text.replace(',', ' , '),
+    'empty lines': lambda text: text.replace('\n', '\n\n') + '\n \n',
+    'no last line end': lambda text: text.rstrip('\n'),
+    'time of PlotJuggler': lambda text: text.replace('time', '__time'),
+}
+
+
+@pytest.mark.parametrize('change', TEXTS.values(), ids=TEXTS)
+def test_csv_dialects_are_read_alike(change: Callable[[str], str], tmp_path: Path) -> None:
+    arrays = measured(40)
+    arrays['effort'][3:5] = np.nan
+    arrays['effort'][7, 5] = np.nan
+    text = change(table(arrays).to_csv(index=False))
+    (tmp_path / 'x.csv').write_bytes(text.encode())
+    assert_same(read_recording(tmp_path / 'x.csv'), arrays)
+
+
+def test_other_columns_are_ignored_and_told_even_where_they_hold_words(tmp_path: Path) -> None:
+    arrays = measured(40)
+    columns = table(arrays)
+    columns.insert(0, 'phase', ['up, and "down"'] * 40)
+    columns['gripper/position'] = 1.0
+    columns.to_csv(tmp_path / 'x.csv')
+    recording = read_recording(tmp_path / 'x.csv')
+    assert_same(recording, arrays)
+    finding = the_one(recording, 'ignored_columns')
+    assert finding.count == 3
+    assert all(name in finding.text for name in ('(no name)', 'phase', 'gripper/position'))
+
+
+def test_prefixes_of_other_tools_are_accepted_where_they_are_unambiguous(tmp_path: Path) -> None:
+    left, right = measured(40, seed=1), measured(40, seed=2)
+    one = table(left, prefix='/joint_states/')
+    one.to_csv(tmp_path / 'one.csv', index=False)
+    assert_same(read_recording(tmp_path / 'one.csv'), left)
+    pd.concat([one, table(right).drop(columns='time')], axis=1).to_csv(
+        tmp_path / 'plain.csv', index=False)
+    assert_same(read_recording(tmp_path / 'plain.csv'), right)
+    two = pd.concat([table(left, prefix='/left/joint_states/'),
+                     table(right, prefix='/right/joint_states/').drop(columns='time')], axis=1)
+    two.to_csv(tmp_path / 'two.csv', index=False)
+    with pytest.raises(UnreadableFileError, match='/left/joint_states, /right/joint_states'):
+        read_recording(tmp_path / 'two.csv')
+    assert_same(read_recording(tmp_path / 'two.csv', topic='/right/joint_states'), right)
+
+
+def test_rows_that_belong_to_other_topics_leave_the_motion_as_it_is(tmp_path: Path) -> None:
+    # PlotJuggler writes all series into one table, a row per stamp of any of them.
+    arrays = measured(600)
+    columns = table(arrays)
+    other = pd.DataFrame({'time': arrays['time'] + STEP / 3, 'battery': 1.0})
+    pd.concat([columns, other]).sort_values('time').to_csv(tmp_path / 'x.csv', index=False)
+    recording = read_recording(tmp_path / 'x.csv')
+    assert_same(recording, arrays)
+    assert the_one(recording, 'non_finite_position').count == 600
+    assert kinds(recording) == {'non_finite_position', 'ignored_columns'}
+
+
+MISTAKES = {
+    'no time': (lambda text: text.replace('time', 'zeit', 1), 'must hold time'),
+    'no drive': (lambda text: text.replace('lift_2', 'hub_2'), 'no lift_2/position; .*hub_2'),
+    'a word': (lambda text: text.replace('\n0.01,', '\nsoon,'), "row 7, column time .*'soon'"),
+    'a decimal comma': (
+        lambda text: text.replace(',', ';').replace('\n0.01;', '\n0,01;'), 'decimal comma'),
+    'a short row': (lambda text: text[:-40], 'row 41 holds 13 cells, but the header 19'),
+    'a long row': (lambda text: text.rstrip() + ',1\n', 'row 41 holds 20 cells'),
+    'no rows': (lambda text: text.split('\n')[0], 'no samples below the header'),
+    'a column twice': (lambda text: text.replace('lift_1/velocity', 'lift_1/position'),
+                       "'lift_1/position' stands twice"),
+    'time twice': (lambda text: text.replace('slide_1/velocity', 'time'), "'time' stands twice"),
+    'no position anywhere': (lambda text: re.sub(r'(?m)^([0-9][^,]*),[^,]*', r'\1,', text),
+                             'none of its 40 samples'),
+}
+
+
+@pytest.mark.parametrize(('change', 'words'), MISTAKES.values(), ids=MISTAKES)
+def test_mistakes_in_a_csv_are_one_sentence_with_the_place(
+    change: Callable[[str], str], words: str, tmp_path: Path,
+) -> None:
+    arrays = {name: values.round(3) for name, values in measured(40).items()}
+    (tmp_path / 'x.csv').write_text(change(table(arrays).to_csv(index=False)))
+    with pytest.raises(UnreadableFileError, match=words) as told:
+        read_recording(tmp_path / 'x.csv')
+    assert '\n' not in str(told.value)
+    assert str(told.value).startswith(str(tmp_path / 'x.csv'))
+
+
+# ---------------------------------------------------------------------------- foreign files
+
+
+def damaged(suffix: str, share: float) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        path = by_own_writer(suffix)(folder, measured(5000))
+        path.write_bytes(path.read_bytes()[:int(share * path.stat().st_size)])
+        return path
+    return make
+
+
+def content(name: str, data: bytes) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        (folder / name).write_bytes(data)
+        return folder / name
+    return make
+
+
+def without_joint_states(folder: Path) -> Path:
+    text = STORE.types['std_msgs/msg/String']('hello')
+    return write_plain_bag(folder / 'bag', {'/joint_states': [
+        bytes(STORE.serialize_cdr(text, 'std_msgs/msg/String'))]}, msgtype='std_msgs/msg/String')
+
+
+def empty_folder(folder: Path) -> Path:
+    (folder / 'empty').mkdir()
+    return folder / 'empty'
+
+
+def other_metadata(folder: Path) -> Path:
+    return content('metadata.yaml', b'a: [1')(folder).parent
+
+
+NOISE = random.Random(5).randbytes(4000)
+JPEG = b'\xff\xd8\xff\xe0\x00\x10JFIF\x00\x01' + NOISE
+FOREIGN = {
+    'missing': lambda folder: folder / 'nothing.csv',
+    **{f'{kind}{suffix}': content(f'x{suffix}', data) for suffix in ('.csv', '.mcap', '.db3')
+       for kind, data in (('noise', NOISE), ('jpeg', JPEG), ('empty', b''), ('zeros', bytes(999)))},
+    'text': content('x.csv', b'Dear robot,\nhow are you?\n'),
+    'UTF-16': content('x.csv', 'time,axis/position\n1,2\n'.encode('utf-16')),
+    'noise after rows': content('x.csv', b'time,' + b','.join(
+        f'{drive}/position'.encode() for drive in DRIVES) + b'\n0,1,2,3,4,5,6\n' + NOISE),
+    **{f'{share} of {suffix}': damaged(suffix, share) for suffix in ('.mcap', '.db3')
+       for share in (0.0001, 0.1, 0.5, 0.9, 0.9999)},
+    'header of a db3': content('x.db3', b'SQLite format 3\x00' + NOISE),
+    'header of an mcap': content('x.mcap', b'\x89MCAP0\r\n' + NOISE),
+    'mcap under another name': content('x.csv', b'\x89MCAP0\r\n' + NOISE),
+    'no joint states': without_joint_states,
+    'empty folder': empty_folder,
+    'other metadata': other_metadata,
+}
+
+
+@pytest.mark.parametrize('make', FOREIGN.values(), ids=FOREIGN)
+def test_foreign_and_damaged_files_are_one_sentence(
+    make: Callable[[Path], Path], tmp_path: Path,
+) -> None:
+    path = make(tmp_path)
+    with pytest.raises(UnreadableFileError) as told:
+        read_recording(path)
+    assert str(told.value).startswith(f'{path}: ')
+    assert '\n' not in str(told.value)
+    assert len(str(told.value)) < len(str(path)) + 300
+
+
+@settings(max_examples=60, deadline=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(share=st.floats(0, 1), value=st.integers(1, 255), suffix=st.sampled_from(['.mcap', '.db3']))
+def test_a_changed_byte_in_a_bag_is_an_error_of_ours_or_none(
+    tmp_path: Path, share: float, value: int, suffix: str,
+) -> None:
+    path = by_own_writer(suffix)(tmp_path, measured(60))
+    data = bytearray(path.read_bytes())
+    data[int(share * (len(data) - 1))] ^= value
+    path.write_bytes(data)
+    # Bytes of values are data like any other; only a traceback would be a fault.
+    with contextlib.suppress(UnreadableFileError):
+        read_recording(path)
+
+
+# ------------------------------------------------------------------------------ description
+
+
+def test_a_recording_is_described_by_its_rates_ranges_and_findings() -> None:
+    arrays = measured()
+    arrays['time'][500:] += 10
+    arrays['effort'][:250, 0] = np.nan
+    summary = describe(judged(arrays))
+    assert (summary.samples, summary.used) == (1000, 1000)
+    assert (summary.start, summary.end) == (0, pytest.approx(11.998))
+    assert summary.duration == pytest.approx(2 * 0.998)
+    assert summary.rate == pytest.approx(500)
+    assert [part.samples for part in summary.segments] == [500, 500]
+    first = summary.drives['slide_1']
+    assert first.measured == 0.75
+    assert first.position == (arrays['position'][:, 0].min(), arrays['position'][:, 0].max())
+    assert first.effort == (arrays['effort'][250:, 0].min(), arrays['effort'][250:, 0].max())
+    assert {finding.kind for finding in summary.findings} == {'gap', 'effort_not_measured'}
+    bare = describe(judged({**arrays, 'velocity': None, 'effort': None}))
+    assert bare.drives['lift_3'].velocity is None
+    assert bare.drives['lift_3'].effort is None
+
+
+def test_findings_are_one_sentence_each() -> None:
+    arrays = measured()
+    arrays['effort'][:, 0], arrays['position'][4, 0] = np.nan, np.nan
+    arrays['time'][500:] -= 0.5
+    texts = [finding.text for finding in judged(arrays).findings]
+    assert len(texts) == 4
+    for text in texts:
+        assert '\n' not in text
+        assert any(text.endswith(f'; {action}') for action in POLICY.values())
+
+
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    arrays = measured(30)
+    with pytest.raises(MotionError, match=r'effort: its shape is \(29, 6\)'):
+        judged({**arrays, 'effort': arrays['effort'][1:]})
+    with pytest.raises(MotionError, match='no sample is finite'):
+        judged({**arrays, 'time': np.full(30, np.nan)})
+
+
+def test_an_encapsulation_of_another_kind_has_no_layout() -> None:
+    data = bytes(STORE.serialize_cdr(message(7, DRIVES, *np.ones((3, 6))), STATE))
+    assert Layout.of(data) is not None
+    assert Layout.of(b'\x00\x07' + data[2:]) is None
+    assert Layout.of(data[:-1]) is None
+    assert Layout.of(data[:12] + struct.pack('<I', 2**31) + data[16:]) is None

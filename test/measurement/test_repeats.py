@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The same samples under two names: told by info, refused where they would count twice."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_recordings import judged, measured
+from ros_processes import executable
+
+from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
+from pprs_dynamics.measurement.files.repeats import shared_samples
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('repeats')
+    run = judged(measured())
+    for name in ('run.csv', 'copy.csv', 'same.mcap', 'same.db3'):
+        write_recording(folder / name, run)
+    write_recording(folder / 'other.csv', judged(measured(seed=1)))
+    return folder
+
+
+def pprs(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *arguments], cwd=folder, capture_output=True,
+                          text=True, timeout=100)
+
+
+def part_of(recording: Recording, samples: slice) -> Recording:
+    return Recording.from_arrays('part', recording.time[samples], recording.position[samples],
+                                 None, recording.effort[samples])
+
+
+@pytest.mark.parametrize('name', ['copy.csv', 'same.mcap', 'same.db3'])
+def test_the_same_samples_in_another_file_or_format_are_found(folder: Path, name: str) -> None:
+    first, second = read_recording(folder / 'run.csv'), read_recording(folder / name)
+    assert shared_samples(first, second) == len(second.time)
+
+
+def test_clocks_and_cuts_hide_nothing(folder: Path) -> None:
+    run = read_recording(folder / 'run.csv')
+    later = replace(run, time=run.time + 5.0, epoch=1_700_000_000)
+    assert shared_samples(run, later) == len(run.time)
+    assert shared_samples(run, part_of(run, slice(200, 500))) == 300
+    assert shared_samples(part_of(run, slice(200, 500)), run) == 300
+
+
+def test_the_same_motion_with_other_noise_is_another_recording(folder: Path) -> None:
+    run, other = read_recording(folder / 'run.csv'), read_recording(folder / 'other.csv')
+    assert shared_samples(run, other) == 0
+    noise = np.random.default_rng(3).normal(0, 0.01, run.effort.shape)
+    assert shared_samples(run, replace(run, effort=run.effort + noise)) == 0
+    # The two halves of one recording share nothing.
+    assert shared_samples(part_of(run, slice(0, 500)), part_of(run, slice(500, 1000))) == 0
+
+
+def test_recordings_of_a_robot_at_rest_are_alike_and_no_repeats() -> None:
+    time = np.arange(500) * 0.002
+    still = np.full((500, 6), 0.1)
+    one, other = (Recording.from_arrays(name, time, still, None, np.ones((500, 6)))
+                  for name in 'ab')
+    assert shared_samples(one, other) == 0
+
+
+REFUSED = {
+    ('compare', 'run.csv', 'copy.csv'): 'every recording may be given once',
+    ('compare', 'run.csv', 'other.csv', 'same.mcap'): 'every recording may be given once',
+    ('diagnose', 'run.csv', 'run.csv'): 'every recording may be given once',
+    ('next-experiment', 'run.csv', 'copy.csv', '--output', 'x.csv'): 'may be given once',
+    ('diagnose', 'run.csv', '--validate', 'copy.csv'): 'held out must be another recording',
+    ('diagnose', 'run.csv', '--validate', 'run.csv'): 'held out must be another recording',
+    ('adopt', 'viscous_friction', 'run.csv', '--validate', 'other.csv', '--validate', 'other.csv',
+     '--output', 'x.yaml'): 'held out must be another recording'}
+
+
+@pytest.mark.parametrize('arguments', REFUSED, ids=' '.join)
+def test_what_is_given_twice_is_refused(folder: Path, arguments: tuple[str, ...]) -> None:
+    done = pprs(folder, *arguments)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert 'all of its 1000 samples are those of ' in done.stderr
+    assert REFUSED[arguments] in done.stderr
+
+
+def test_info_says_what_repeats(folder: Path) -> None:
+    done = pprs(folder, 'info', 'run.csv', 'other.csv', 'same.db3')
+    assert done.returncode == 0
+    assert ('! same.db3: all of its 1000 samples are those of run.csv, too'
+            in ' '.join(done.stdout.split()))
+
+
+def test_what_is_read_is_never_written_over(folder: Path) -> None:
+    before = (folder / 'run.csv').read_bytes()
+    for arguments in (('next-experiment', 'run.csv', '--output', 'run.csv'),
+                      ('simulate', '--path', 'run.csv', '--output', 'run.csv')):
+        done = pprs(folder, *arguments)
+        assert done.returncode == 2
+        assert 'it is read, too, but what is written must be another file' in done.stderr
+    assert (folder / 'run.csv').read_bytes() == before

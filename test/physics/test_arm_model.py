@@ -1,0 +1,293 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Serial arms from a URDF: torques against a second engine, refusals, files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import made_up_arm as arm
+import mujoco
+import numpy as np
+import pytest
+import yaml
+
+from pprs_dynamics import ArmModel, JointMotion, PprsError, load_model
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.measurement.files.recording import Recording, read_for, write_recording
+from pprs_dynamics.measurement.residuals.conventions import find_mistakes
+from pprs_dynamics.measurement.residuals.readings import readings
+from pprs_dynamics.physics.effects.drive_effect import DriveRange
+from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
+from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
+from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
+from pprs_dynamics.physics.effects.laws.payload_inertia import PayloadInertia
+from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
+from pprs_dynamics.physics.effects.laws.payload_moment import PayloadMoment
+from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.physics.model.model_fingerprint import fingerprint
+from pprs_dynamics.physics.model.model_writer import write_model
+
+SAMPLES = 40
+
+
+def states(seed: int = 1) -> JointMotion:
+    random = np.random.default_rng(seed)
+    return JointMotion(*random.uniform(-1, 1, size=(3, SAMPLES, 3)) * [[[1.5]], [[3]], [[8]]])
+
+
+def mujoco_torques(text: str, motion: JointMotion, gravity: tuple[float, ...] = (0, 0, -9.81),
+                   ) -> np.ndarray:
+    """Return inverse dynamics by MuJoCo, which reads the same URDF by a parser of its own."""
+    extension = '<mujoco><compiler balanceinertia="false" discardvisual="true"/></mujoco></robot>'
+    model = mujoco.MjModel.from_xml_string(text.replace('</robot>', extension))
+    model.opt.gravity = gravity
+    model.opt.disableflags |= (mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    data = mujoco.MjData(model)
+    found = np.empty_like(motion.position)
+    for k in range(len(motion)):
+        data.qpos, data.qvel, data.qacc = (motion.position[k], motion.velocity[k],
+                                           motion.acceleration[k])
+        mujoco.mj_inverse(model, data)
+        found[k] = data.qfrc_inverse
+    return found
+
+
+def test_torques_are_those_of_mujoco(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    motion = states()
+    assert model.drive_forces(motion).total == pytest.approx(
+        mujoco_torques(arm.urdf(), motion), abs=1e-9)
+
+
+def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
+    mass, centre, inertia = 2.5, np.array([0.03, -0.05, 0.08]), (0.02, 0.03, 0.025)
+    body = ('<link name="load"><inertial><mass value="2.5"/><origin xyz="0.03 -0.05 0.08"/>'
+            '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            '<joint name="grip" type="fixed"><parent link="flange"/><child link="load"/></joint>')
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    about_tool = np.diag(inertia) + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    xx, yy, zz = np.diag(about_tool)
+    effects = (PayloadMass({'mass': mass}),
+               PayloadMoment(dict(zip('xyz', mass * centre, strict=True))),
+               PayloadInertia({'xx': xx, 'yy': yy, 'zz': zz, 'xy': about_tool[0, 1],
+                               'xz': about_tool[0, 2], 'yz': about_tool[1, 2]}))
+    motion = states()
+    state = model.mechanism(motion)
+    for effect in effects:
+        state = effect.apply(state)
+    assert state.rigid_force == pytest.approx(
+        mujoco_torques(arm.urdf(more=body), motion), abs=1e-9)
+
+
+def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    motion = states()
+    tilted = BaseTilt({'x': 0.1, 'y': 0.0}).apply(model.mechanism(motion))
+    gravity = (0.0, 9.81 * np.sin(0.1), -9.81 * np.cos(0.1))
+    assert tilted.rigid_force == pytest.approx(
+        mujoco_torques(arm.urdf(), motion, gravity), abs=1e-9)
+
+
+def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    rest = JointMotion(states().position, *np.zeros((2, SAMPLES, 3)))
+    names = [p.name for p in ExternalWrench.parameters]
+    wrench = ExternalWrench({name: 9.81 if name == 'force_z' else 0.0 for name in names})
+    state = model.mechanism(rest)
+    assert wrench.force(state) == pytest.approx(PayloadMass({'mass': 1.0}).force(state), abs=1e-9)
+
+
+def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
+    motion = states()
+    rows = model.arm.regressor(motion.position, motion.velocity, motion.acceleration)
+    assert rows @ model.arm.inertial.ravel() == pytest.approx(
+        model.drive_forces(motion).total, abs=1e-9)
+
+
+def test_joints_in_another_order_permute_the_torques(tmp_path: Path) -> None:
+    motion = states()
+    order = [2, 0, 1]
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    other = ArmModel.load(arm.write_arm(tmp_path, joints=tuple(arm.JOINTS[k] for k in order)))
+    moved = JointMotion(*(values[:, order] for values in (
+        motion.position, motion.velocity, motion.acceleration)))
+    assert other.drive_forces(moved).total == pytest.approx(
+        model.drive_forces(motion).total[:, order], abs=1e-12)
+
+
+def test_joints_that_are_left_out_stand_at_zero(tmp_path: Path) -> None:
+    motion = states()
+    held = JointMotion(*(values * [1, 0, 1] for values in (
+        motion.position, motion.velocity, motion.acceleration)))
+    part = ArmModel.load(arm.write_arm(tmp_path, joints=('turn', 'reach')))
+    found = part.drive_forces(JointMotion(*(values[:, [0, 2]] for values in (
+        held.position, held.velocity, held.acceleration)))).total
+    whole = ArmModel.load(arm.write_arm(tmp_path))
+    assert found == pytest.approx(whole.drive_forces(held).total[:, [0, 2]], abs=1e-9)
+
+
+def test_friction_armature_and_offset_add_up(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    real = arm.real_arm(tmp_path, **{'arm.armature': (1.0, 2.0, 3.0)})
+    motion = states()
+    v = motion.velocity
+    expected = (np.array([1, 2, 3]) * motion.acceleration
+                + np.array(arm.FRICTION['friction.viscous']) * v
+                + np.array(arm.FRICTION['friction.coulomb']) * np.tanh(v / 0.01)
+                + np.array(arm.FRICTION['friction.offset']))
+    assert real.drive_forces(motion).total - model.drive_forces(motion).total == pytest.approx(
+        expected, abs=1e-9)
+
+
+TRANSMISSION = ('<transmission name="t"><type>transmission_interface/DifferentialTransmission'
+                '</type><joint name="turn"/><joint name="swing"/></transmission>')
+FLOATING = ('<link name="world"/><joint name="free" type="floating"><parent link="world"/>'
+            '<child link="stand"/></joint>')
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    (arm.urdf(kind='continuous'), 'continuous'),
+    (arm.urdf(mimic='<mimic joint="turn"/>'), 'mimics turn'),
+    (arm.urdf(more=TRANSMISSION), 'transmission'),
+    (arm.urdf(more=FLOATING), 'floating'),
+])
+def test_what_is_not_covered_is_refused_in_a_sentence(tmp_path: Path, text: str,
+                                                      words: str) -> None:
+    path = arm.write_arm(tmp_path, text)
+    with pytest.raises(ModelError, match=words) as error:
+        load_model(path)
+    assert str(error.value).count('\n') == 0
+    assert str(error.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(('old', 'new', 'words'), [
+    ('tool: flange', 'tool: flansch', 'flansch.*be a link of the URDF'),
+    ('tool: flange', 'tool: stand', 'that arm.joints move'),
+    ('base: stand', 'base: beam', 'that none of arm.joints moves'),
+    ('swing', 'sving', 'turn, swing, reach'),
+    ('urdf: made_up.urdf', 'urdf: none.urdf', 'none.urdf'),
+    ('urdf: made_up.urdf', 'urdf: arm.yaml', 'XML'),
+    ('joints: [turn, swing, reach]', 'joints: []', 'at least one joint'),
+    ('joints: [turn, swing, reach]', 'joints: [turn, turn]', 'once'),
+    ('base: stand', 'base: stand\n      gain: [1.0, 2.0]', 'list of 3 numbers'),
+    ('base: stand', 'base: stand\n      gane: [1.0, 2.0, 3.0]', 'did you mean arm.gain'),
+])
+def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: str,
+                                               words: str) -> None:
+    path = arm.write_arm(tmp_path)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(PprsError, match=words):
+        load_model(path)
+
+
+def test_effects_say_where_they_act(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path)
+    path.write_text(path.read_text() + '    effects:\n      rod_mass: {mass: 0.1}\n')
+    with pytest.raises(ModelError, match='acts in a serial arm'):
+        load_model(path)
+    with pytest.raises(ModelError, match='acts in a 3-PPRS'):
+        load_model_with_payload_moment()
+
+
+def load_model_with_payload_moment() -> None:
+    from pprs_dynamics import DriveModel
+    from pprs_dynamics.physics.model.model_file import build_model
+    build_model({**DriveModel.load().values, 'effects.payload_moment.x': 0.1,
+                 'effects.payload_moment.y': 0.1, 'effects.payload_moment.z': 0.1})
+
+
+def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path)
+    (tmp_path / 'there').mkdir()
+    written = tmp_path / 'there' / 'new.yaml'
+    real = arm.real_arm(tmp_path)
+    write_model(written, real.values, path)
+    block = yaml.safe_load(written.read_text())['/**']['ros__parameters']
+    assert block['arm']['urdf'] == os.path.join('..', 'made_up.urdf')
+    assert block['friction']['coulomb'] == list(arm.FRICTION['friction.coulomb'])
+    again = load_model(written)
+    assert dict(again.values) == dict(real.values)
+    motion = states()
+    assert np.array_equal(again.drive_forces(motion).total, real.drive_forces(motion).total)
+
+
+def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: Path) -> None:
+    first, second = tmp_path / 'a', tmp_path / 'b'
+    for folder in (first, second):
+        folder.mkdir()
+    models = [ArmModel.load(arm.write_arm(folder)) for folder in (first, second)]
+    assert fingerprint(models[0]) == fingerprint(models[1])
+    heavier = ArmModel.load(arm.write_arm(second, arm.urdf().replace('value="1.5"', 'value="1.6"')))
+    assert fingerprint(heavier) != fingerprint(models[0])
+
+
+def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableFileError, match=r'made_up\.urdf'):
+        load_model(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))
+
+
+def test_ripple_is_looked_for_where_the_gear_has_it() -> None:
+    """A joint of four turns: the waves of its gear are beyond the grid over its range."""
+    covered = DriveRange(40.0, 0.01, 25.0, 1.0)
+    pitches = [trial['pitch'] for trial in ForceRipple.trials(replace(covered, gear_ratio=101.0))]
+    for pitch in (2 * np.pi / 101, np.pi / 101):
+        assert min(abs(np.array(pitches) / pitch - 1)) < 1e-12
+        without = [trial['pitch'] for trial in ForceRipple.trials(covered)]
+        assert min(abs(np.array(without) / pitch - 1)) > 0.1
+
+
+def defects_of(tmp_path: Path, change: Callable[[Array, Array], None]) -> str:
+    """Return what is told of a recording of the arm that was changed."""
+    model = arm.real_arm(tmp_path)
+    run = arm.record(model, arm.motion(10.0))
+    position, effort = run.position.copy(), run.effort.copy()
+    change(position, effort)
+    path = tmp_path / 'run.csv'
+    write_recording(path, Recording.from_arrays('run', run.time, position, None, effort,
+                                                model.drives))
+    found = read_for(model, path)
+    return ' '.join(one.text for one in (*find_mistakes(model, found), *found.findings))
+
+
+def test_what_is_wrong_with_a_recording_is_told_in_the_units_of_the_joints(tmp_path: Path) -> None:
+    def stuck(position: Array, effort: Array) -> None:
+        position[:, 0], effort[:, 0], effort[:, 2] = 0.25, 3.0, 7.0
+        position[500:, 1] += 1.0
+
+    said = defects_of(tmp_path, stuck)
+    assert 'the position of turn is 0.25 rad throughout' in said
+    assert 'the effort of turn is 3 N m throughout' in said
+    assert 'the effort of reach is 7 N throughout' in said
+    jump = said.partition('the position of swing jumps')[2].partition('by up to ')[2]
+    assert jump.split()[1] == 'rad,'
+    assert ' m throughout' not in said.replace('N m throughout', '')
+
+
+def test_positions_in_degrees_are_told(tmp_path: Path) -> None:
+    def in_degrees(position: Array, effort: Array) -> None:
+        position[:, :2] *= 180 / np.pi
+
+    assert 'turn, swing look like degrees' in defects_of(tmp_path, in_degrees)
+
+
+def test_efforts_in_other_units_are_told_by_joint(tmp_path: Path) -> None:
+    def thousandth(position: Array, effort: Array) -> None:
+        effort[:, 1] *= 1e-3
+
+    said = defects_of(tmp_path, thousandth)
+    assert 'the effort of swing' in said
+    assert 'kN m' in said
+
+
+def test_six_joints_are_no_slides_and_lifts() -> None:
+    joints = tuple(f'joint_{k}' for k in range(1, 7))
+    found = list(readings(joints, (DriveUnits(True),) * 6))
+    assert not any(word in one.what for one in found for word in ('slide', 'lift', 'metres'))
+    assert {one.kind for one in found} == {'reversed_time', 'position_unit', 'position_sign'}

@@ -1,0 +1,267 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""One statement of the equations, three ways to run it: on floats, on arrays, and compiled.
+
+What is claimed: all three agree, the one pass over the paper's model agrees with the steps that
+are kept, and nothing is lost where Numba is absent or has nowhere to keep what it compiled.
+"""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from random_states import model_of, paper_model, random_motion, random_robot
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.errors import MotionError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism import compilation
+from pprs_dynamics.physics.model.one_pass import SHORT
+from pprs_dynamics.physics.three_pprs import evaluation
+from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates
+
+# Compiled, sums may be associated otherwise; forces of up to 40 N then differ by some 1e-14.
+AGREEMENT = 1e-12
+SAMPLES = 300
+VARIANTS: dict[str, dict[str, Any]] = {
+    'corrected': {}, 'printed': {'equations': 'printed'},
+    'widths': {'friction.reversal_rate': 0.3},
+    'chains': {'friction.approach': 'independent_chains', 'limits.rod_cosine': 1e-6}}
+
+
+@pytest.fixture
+def plainly(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], Any]], Any]:
+    """Return what evaluates a function without compiled code."""
+    def run(function: Callable[[], Any]) -> Any:
+        with monkeypatch.context() as patch:
+            patch.setattr(evaluation, '_compile', None)
+            patch.setattr(evaluation, '_decided', True)
+            patch.setattr(evaluation, '_loops', {})
+            return function()
+    return run
+
+
+def everything(model: DriveModel, motion: PlatformMotion) -> dict[str, np.ndarray]:
+    """Return what kernels compute for a motion."""
+    forces = model.drive_forces(motion)
+    s = forces.mechanism
+    kept = model.forces_at(model.mechanism(motion))
+    geometry = model.robot.geometry
+    found = solve_forward_kinematics(geometry, s.position, motion)
+    rates = platform_rates(geometry, motion, s.velocity, s.acceleration)
+    return {'total': forces.total, **forces.parts, 'in steps': kept.total,
+            'position': s.position, 'acceleration': s.acceleration, 'J': s.jacobians.J,
+            'J_u': s.jacobians.J_u, 'guide_load': s.guide_load,
+            'reactions': np.stack(s.rigid_body.reactions), 'found': found.position,
+            'turned': found.orientation, 'rates': rates.rows}
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+@pytest.mark.parametrize('elbow', ['up', 'down'])
+def test_compiled_equals_plain(plainly, variant, elbow):
+    pytest.importorskip('numba')
+    rng = np.random.default_rng(5)
+    model = model_of(random_robot(rng, elbow), VARIANTS[variant])
+    motion = random_motion(rng, SAMPLES, elbow)
+    compiled, plain = everything(model, motion), plainly(lambda: everything(model, motion))
+    for name, values in compiled.items():
+        assert_allclose(values, plain[name], rtol=AGREEMENT, atol=AGREEMENT, err_msg=name)
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_a_sample_alone_equals_the_same_among_others(plainly, variant):
+    rng = np.random.default_rng(6)
+    model = model_of(random_robot(rng), VARIANTS[variant])
+    motion = random_motion(rng, 20)
+    together = plainly(lambda: everything(model, motion))
+    for k in (0, 7, 19):
+        alone = plainly(lambda k=k: everything(model, motion[k]))
+        for name in ('total', 'position', 'J', 'found'):
+            assert_array_equal(alone[name][0], together[name][k], err_msg=name)
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_one_pass_equals_the_steps_that_are_kept(variant):
+    rng = np.random.default_rng(7)
+    model = model_of(random_robot(rng, gravity=(1.0, -2.0, -9.0)), VARIANTS[variant])
+    motion = random_motion(rng, SAMPLES)
+    in_one, in_steps = model.drive_forces(motion), model.forces_at(model.mechanism(motion))
+    assert list(in_one.parts) == list(in_steps.parts)
+    for name, part in in_steps.parts.items():
+        assert_allclose(in_one.parts[name], part, rtol=AGREEMENT, atol=AGREEMENT, err_msg=name)
+
+
+@pytest.mark.parametrize('plain', [False, True])
+@pytest.mark.parametrize('samples', [1, 20, SHORT, SHORT + 1])
+def test_the_drives_motion_that_comes_with_the_forces_is_the_mechanisms(plainly, plain, samples):
+    model, motion = paper_model(), random_motion(np.random.default_rng(7), samples)
+    run = plainly if plain else (lambda function: function())
+    forces, state = run(lambda: (model.drive_forces(motion), model.mechanism(motion)))
+    expected = state.chains.position, state.chains.velocity, state.chains.acceleration
+    for kept, built, value in zip(run(lambda: forces.drive_motion),
+                                  run(lambda: forces.mechanism.kinematics.drive_motion),
+                                  expected, strict=True):
+        assert kept.flags.c_contiguous
+        assert_array_equal(kept, built)
+        assert_allclose(kept, value, rtol=AGREEMENT, atol=AGREEMENT)
+
+
+def test_forces_that_are_made_when_looked_at_are_forces_like_others():
+    model, motion = paper_model(), random_motion(np.random.default_rng(7), 3)
+    forces = model.drive_forces(motion)
+    for same in (copy.deepcopy(forces), pickle.loads(pickle.dumps(forces)),
+                 replace(forces, total=forces.total)):
+        assert_array_equal(sum(same.parts.values()), forces.total)
+        assert_array_equal(same.mechanism.position, forces.mechanism.position)
+    assert model.drive_forces(motion).mechanism.motion is motion
+    with pytest.raises(AttributeError, match='torque'):
+        forces.torque  # noqa: B018
+
+
+@pytest.mark.parametrize('plain', [False, True])
+@pytest.mark.parametrize('samples', [1, 3, 20])
+def test_what_is_allowed_is_what_no_check_objects_to(plainly, plain, samples):
+    limits, rng = paper_model().limits, np.random.default_rng(11)
+    run = plainly if plain else (lambda function: function())
+    lower, upper = limits.strokes
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+
+    def allowed(table, row=None, drive=None, which=None, value=None):
+        changed = table.copy()
+        if row is not None:
+            changed[which, row, drive] = value
+        return run(lambda: limits.allow(changed[0], tuple(changed[1:])))
+
+    shape = (samples, 6)
+    table = np.stack((rng.uniform(-1, 1, shape) * limits.efforts,
+                      middle + half * rng.uniform(-1, 1, shape),
+                      rng.normal(size=shape), rng.normal(size=shape)))
+    assert allowed(table)
+    limits.check_strokes(table[1])
+    limits.check_efforts(table[0])
+    row = samples - 1
+    for drive in range(6):
+        for which in range(4):
+            for value in (np.nan, np.inf, -np.inf):
+                assert not allowed(table, row, drive, which, value)
+        effort = limits.efforts[drive]
+        for value, fine in ((effort, True), (-effort, True), (np.nextafter(effort, np.inf), False),
+                            (-np.nextafter(effort, np.inf), False)):
+            assert allowed(table, row, drive, 0, value) is fine
+        for value, fine in ((lower[drive], True), (upper[drive], True),
+                            (np.nextafter(lower[drive], -np.inf), False),
+                            (np.nextafter(upper[drive], np.inf), False)):
+            assert allowed(table, row, drive, 1, value) is fine
+
+
+def test_a_motion_of_rows_is_checked_like_one_of_arrays():
+    motion = random_motion(np.random.default_rng(12), 5)
+    table = motion.rows.copy()
+    table[:, 3:7] *= 1.0005
+    given = table.copy()
+    rows = PlatformMotion.from_rows(table, np.arange(5.0))
+    assert_allclose(rows.rows, motion.rows, rtol=AGREEMENT, atol=AGREEMENT)
+    assert_array_equal(table, given)
+    for wrong, word in ((1.1, 'length'), (np.nan, 'finite')):
+        table = given.copy()
+        table[3, 3:7] *= wrong
+        with pytest.raises(MotionError, match=word):
+            PlatformMotion.from_rows(table)
+    with pytest.raises(MotionError, match='shape'):
+        PlatformMotion.from_rows(given[:0])
+    for time in ([np.nan], [0.0, 1.0]):
+        with pytest.raises(MotionError, match='time'):
+            PlatformMotion.from_rows(given[:1], time)
+
+
+def test_blocks_give_what_the_whole_gives(plainly, monkeypatch):
+    model, motion = paper_model(), random_motion(np.random.default_rng(8), 100)
+    whole = plainly(lambda: model.drive_forces(motion).total)
+    monkeypatch.setattr(evaluation, 'BLOCK', 33)
+    assert_array_equal(plainly(lambda: model.drive_forces(motion).total), whole)
+
+
+@pytest.mark.parametrize('plain', [False, True])
+def test_the_first_sample_that_is_not_allowed_is_named(plainly, plain):
+    model = paper_model()
+    motion = random_motion(np.random.default_rng(9), 50)
+    far = motion.position.copy()
+    far[33] += (0.5, 0.0, 0.0)
+    moved = PlatformMotion(far, *(getattr(motion, name) for name in (
+        'orientation', 'linear_velocity', 'angular_velocity', 'linear_acceleration',
+        'angular_acceleration')))
+    run = plainly if plain else (lambda function: function())
+    with pytest.raises(WorkspaceError) as caught:
+        run(lambda: model.drive_forces(moved))
+    assert caught.value.sample == 33
+    strict = paper_model({'limits.condition_number': 1.0001})
+    with pytest.raises(SingularityError) as near:
+        run(lambda: strict.drive_forces(motion))
+    assert near.value.sample == 0
+
+
+@pytest.mark.parametrize('wrong', [np.nan, np.inf])
+@pytest.mark.parametrize('column', range(6))
+def test_a_number_that_is_none_is_refused_in_every_column(column, wrong):
+    motion = random_motion(np.random.default_rng(10), 30)
+    columns = [np.array(motion.rows[:, part]) for part in (
+        slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 19))]
+    columns[column][17, 1] = wrong
+    with pytest.raises(MotionError, match='sample 17'):
+        PlatformMotion(*columns)
+
+
+def test_huge_but_finite_numbers_are_no_error():
+    motion = PlatformMotion(np.full((1, 3), 1e308), [[0.0, 0.0, 0.0, 1.0]],
+                            *(np.full((1, 3), 1e308),) * 4)
+    assert_array_equal(motion.linear_velocity, np.full((1, 3), 1e308))
+
+
+def test_a_motion_does_not_change_with_the_arrays_that_it_was_made_of():
+    columns = [np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)),
+               *(np.zeros((2, 3)) for _ in range(4))]
+    motion = PlatformMotion(*columns)
+    for column in columns:
+        column += 7.0
+    assert_array_equal(motion.rows[:, 3:7], np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+    assert not motion.position.any()
+    with pytest.raises(AttributeError):
+        motion.position = columns[0]
+
+
+def test_without_a_place_to_keep_compiled_code_nothing_is_compiled(monkeypatch):
+    pytest.importorskip('numba')
+
+    def refuse(kernel, named):
+        raise RuntimeError('cannot cache function: no locator available')
+
+    monkeypatch.setattr(compilation, '_compiled_loop', refuse)
+    assert compilation.compiler() is None
+
+
+def test_compiled_code_of_other_sources_is_another(tmp_path, monkeypatch):
+    compilation._digest.cache_clear()
+    before = compilation._digest()
+    monkeypatch.setattr(compilation, 'MODEL', tmp_path)
+    (tmp_path / 'one_pass.py').write_text('changed')
+    compilation._digest.cache_clear()
+    changed = compilation._digest()
+    compilation._digest.cache_clear()
+    assert changed != before
+
+
+def test_importing_and_loading_a_model_imports_no_compiler():
+    code = ('import sys, pprs_dynamics; pprs_dynamics.DriveModel.load(); '
+            'print("numba" in sys.modules)')
+    found = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == 'False'

@@ -1,0 +1,369 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects that act in single drives: their laws, what is fitted of them, and their memories."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
+from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
+from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
+from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
+from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
+from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
+from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
+from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
+from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
+from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
+
+EFFECTS: tuple[type[DriveEffect], ...] = (
+    AsymmetricFriction, CoulombFriction, DriveInertia, DriveSpring, EffortOffset, ForceRipple,
+    FrictionDrift, Hysteresis, LoadFriction, QuadraticFriction, StribeckFriction,
+    ViscousFriction)
+WITH_MEMORY = (FrictionDrift, Hysteresis)
+# Presliding alone is what is taken away from the model's friction.
+FRICTION = (AsymmetricFriction, CoulombFriction, FrictionDrift, LoadFriction, QuadraticFriction,
+            StribeckFriction, ViscousFriction)
+STEP = 0.002
+COVERED = DriveRange(duration=20.0, step=STEP, stroke=0.16, top_speed=0.25)
+
+every_effect = pytest.mark.parametrize('effect', EFFECTS, ids=lambda effect: effect.name)
+
+
+@dataclass
+class Axes:
+    """Drive states of no robot in particular."""
+
+    time: Any
+    position: Any
+    velocity: Any
+    acceleration: Any
+    guide_load: Any
+    drives: tuple[str, ...] = ('axis',)
+
+    @property
+    def direction(self):
+        return np.tanh(self.velocity / 0.001)
+
+    def __getitem__(self, part):
+        time = None if self.time is None else self.time[part]
+        return Axes(time, *(x[part] for x in (self.position, self.velocity, self.acceleration,
+                                              self.guide_load)), self.drives)
+
+
+def excitation(duration=20.0, drives=('axis',)):
+    """Return sums of two sinusoids about 0.1 m, of another phase per drive, from 5 s on."""
+    t = np.arange(0, duration, STEP)[:, None] + np.arange(len(drives))
+    q = 0.1 + 0.05 * np.sin(2 * t) + 0.03 * np.sin(5 * t)
+    v = 0.1 * np.cos(2 * t) + 0.15 * np.cos(5 * t)
+    a = -0.2 * np.sin(2 * t) - 0.75 * np.sin(5 * t)
+    return Axes(5.0 + t[:, 0], q, v, a, 40 + 5 * np.cos(3 * t), drives)
+
+
+def one_sample(t=0.0, q=0.0, v=0.0, a=0.0, load=0.0):
+    return Axes(np.array([t]), *(np.array([[x]]) for x in (q, v, a, load)))
+
+
+def random_values(effect, rng):
+    """Return parameters some way into their bounds, those of a size at which they matter."""
+    return {p.name: float(np.clip(p.scale * rng.uniform(0.3, 3), p.lower, p.upper))
+            for p in effect.parameters}
+
+
+# What the laws say ---------------------------------------------------------------------------
+
+@pytest.mark.parametrize(('effect', 'values', 'sample', 'force'), [
+    (ViscousFriction, {'coefficient': 3.0}, {'v': -0.2}, -0.6),
+    (CoulombFriction, {'force': 0.7}, {'v': -0.2}, -0.7),
+    (CoulombFriction, {'force': 0.7}, {'v': 0.0}, 0.0),
+    (AsymmetricFriction, {'force_forward': 1.0, 'force_backward': 2.0, 'viscous_forward': 3.0,
+                          'viscous_backward': 4.0}, {'v': 0.5}, 2.5),
+    (AsymmetricFriction, {'force_forward': 1.0, 'force_backward': 2.0, 'viscous_forward': 3.0,
+                          'viscous_backward': 4.0}, {'v': -0.5}, -4.0),
+    (StribeckFriction, {'force': 1.2, 'velocity': 0.1}, {'v': 0.1}, 0.4414553),  # 1.2 / e
+    (StribeckFriction, {'force': 1.2, 'velocity': 0.1, 'exponent': 1.0}, {'v': -0.2},
+     -0.1624023),  # 1.2 / e^2
+    (QuadraticFriction, {'coefficient': 20.0}, {'v': -0.3}, -1.8),
+    (LoadFriction, {'coefficient': 0.05}, {'v': -0.2, 'load': 40.0}, -2.0),
+    (EffortOffset, {'force': -0.4}, {'v': 0.3, 'q': 0.1}, -0.4),
+    (FrictionDrift, {'force': 0.9, 'time': 10.0}, {'t': 7.0, 'v': -0.2}, -0.9),
+    (DriveSpring, {'stiffness': 20.0, 'position': 0.05}, {'q': 0.2}, 3.0),
+    (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004}, {'q': 0.001},
+     0.4330127),  # 0.5 cos(30 deg)
+    (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004, 'second': 0.2},
+     {'q': 0.0005}, 0.6829629),  # 0.5 sin(75 deg) + 0.2 sin(90 deg)
+    (ForceRipple, {'force': 0.0, 'phase': 0.0, 'pitch': 0.004, 'second': 0.2,
+                   'second_phase': math.pi / 2}, {'q': 0.001}, -0.2),
+    (DriveInertia, {'mass': 0.3}, {'a': -2.0}, -0.6),
+])
+def test_law_gives_the_number_worked_out_by_hand(effect, values, sample, force):
+    built = effect.from_file({'axis': values})
+    assert_allclose(built.force(one_sample(**sample)), [[force]], rtol=0, atol=1e-7)
+
+
+def test_friction_has_fallen_to_its_eth_part_a_drift_time_after_the_start():
+    axes = excitation()
+    force = FrictionDrift({'axis': {'force': 1.0, 'time': 4.0}}).force(axes)
+    share = force / axes.direction
+    assert_allclose(share[0], 1, rtol=1e-12)
+    assert_allclose(share[2000], math.exp(-1), rtol=1e-9)  # 2000 samples of 2 ms
+
+
+def test_drift_without_times_is_friction_at_the_start():
+    axes = excitation()
+    axes.time = None
+    assert_array_equal(FrictionDrift({'axis': {'force': 2.0, 'time': 4.0}}).force(axes),
+                       2 * axes.direction)
+
+
+def test_presliding_gives_the_numbers_worked_out_by_hand():
+    # From rest forwards by x_d ln 2: z = 1/2. Back by as much: z = -1 + 3/2 / 2 = -1/4.
+    half = 0.001 * math.log(2)
+    q = np.array([0.0, half, 0.0])[:, None]
+    v = np.array([0.0, 1.0, -1.0])[:, None]
+    axes = Axes(None, q, v, v, v)
+    force = Hysteresis({'axis': {'force': 0.8, 'distance': 0.001}}).force(axes)
+    assert_allclose(force[:, 0], [0, 0.8 * (0.5 - 1), 0.8 * (-0.25 + 1)], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize('x_d', [1e-4, 1e-3, 1e-2])
+def test_presliding_solves_dahls_differential_equation(x_d):
+    def q_dot(t):
+        return 0.01 * np.cos(2 * t) + 0.015 * np.cos(5 * t)
+
+    t = np.arange(0, 6, 2e-4)
+    q = 0.005 * np.sin(2 * t) + 0.003 * np.sin(5 * t)
+    z = solve_ivp(lambda s, z: (q_dot(s) - z * abs(q_dot(s))) / x_d, (0, t[-1]), [0.0],
+                  t_eval=t, rtol=1e-9, atol=1e-10, max_step=2e-3).y[0]
+    assert z.min() < -0.5
+    assert z.max() > 0.5
+    axes = Axes(t, q[:, None], q_dot(t)[:, None], q[:, None], q[:, None])
+    force = Hysteresis({'axis': {'force': 1.0, 'distance': x_d}}).force(axes)
+    # A reversal between samples is missed by up to acceleration dt^2 / 8 = 5e-10 m.
+    assert_allclose(force[:, 0] + axes.direction[:, 0], z, rtol=0, atol=2e-5)
+
+
+def test_presliding_of_a_jittering_encoder_is_dahls_solution_sample_by_sample():
+    rng = np.random.default_rng(61)
+    q = np.cumsum(rng.integers(-2, 3, 3000)) * 1e-6  # standstills and reversals all the time
+    z, expected = 0.0, [0.0]
+    for step in np.diff(q):
+        z = np.sign(step) + (z - np.sign(step)) * math.exp(-abs(step) / 2e-5)
+        expected.append(z)
+    axes = Axes(None, *(np.stack([x], axis=1) for x in (q, 0 * q, 0 * q, 0 * q)))
+    force = Hysteresis({'axis': {'force': 1.0, 'distance': 2e-5}}).force(axes)
+    assert np.ptp(force) > 0.5
+    assert_allclose(force[:, 0], expected, rtol=0, atol=1e-12)
+
+
+def test_presliding_friction_dissipates_over_every_closed_cycle():
+    axes = excitation(2 * 2 * math.pi)
+    for distance in (1e-4, 1e-3, 1e-2, 0.1):
+        effect = Hysteresis({'axis': {'force': 1.0, 'distance': distance}})
+        z = (effect.force(axes) + axes.direction)[:, 0]
+        cycle = slice(len(z) // 2, None)  # the second, no longer from rest
+        assert np.sum((z * axes.velocity[:, 0])[cycle]) * STEP > 0
+
+
+@pytest.mark.parametrize('effect', FRICTION, ids=lambda effect: effect.name)
+def test_friction_takes_power_from_the_motion_and_below_its_limit_gives_it(effect):
+    axes = excitation()
+    rng = np.random.default_rng(62)
+    for variant in effect.variants:
+        values = {c.name: c.scale * rng.uniform(0.3, 3) if c.name in variant else 0.0
+                  for c in effect.linear}
+        shape = {p.name: p.scale for p in effect.shape}
+        assert set(values) == set(effect.unphysical_below)
+        for name, limit in effect.unphysical_below.items():
+            assert limit == 0, name
+        power = effect({'axis': {**values, **shape}}).force(axes) * axes.velocity
+        # A dry force of one direction only is half itself within the reversal, 1 mm/s wide.
+        sliding = np.abs(axes.velocity) > 0.02
+        assert np.all(power[sliding] > -1e-12)
+        assert power.max() > 1e-3
+        against = {name: -value for name, value in values.items()}
+        assert_allclose(effect({'axis': {**against, **shape}}).force(axes) * axes.velocity, -power)
+
+
+# What is fitted ------------------------------------------------------------------------------
+
+@every_effect
+def test_force_is_the_sum_of_coefficients_times_columns(effect):
+    axes = excitation()
+    values = random_values(effect, np.random.default_rng(63))
+    shape = {p.name: values[p.name] for p in effect.shape}
+    columns = effect.columns(DriveSamples.of(axes, 0), **shape)
+    coefficients = effect.to_coefficients(values)
+    assert list(coefficients) == [c.name for c in effect.coefficients]
+    expected = sum(coefficients[c.name] * column
+                   for c, column in zip(effect.coefficients, columns, strict=True))
+    assert_allclose(effect({'axis': values}).force(axes)[:, 0], expected, rtol=1e-12, atol=1e-12)
+
+
+@every_effect
+def test_no_trial_of_any_variant_goes_unnoticed_in_the_force(effect):
+    axes = excitation()
+    samples = DriveSamples.of(axes, 0)
+    order = [c.name for c in effect.coefficients]
+    for shape in effect.trials(COVERED):
+        columns = np.stack(effect.columns(samples, **shape), axis=1)
+        assert columns.shape == (len(axes.time), len(order))
+        assert np.all(np.isfinite(columns))
+        size = np.sqrt(np.mean(columns ** 2, axis=0)) * [c.scale for c in effect.coefficients]
+        assert np.all(size > 1e-3), shape  # N rms, by what its scale says matters
+        for variant in effect.variants:
+            chosen = columns[:, [order.index(name) for name in variant]]
+            assert np.linalg.cond(chosen / np.linalg.norm(chosen, axis=0)) < 100, shape
+
+
+@pytest.mark.parametrize('covered', [
+    COVERED, DriveRange(0.0, 0.0, 0.0, 0.0), DriveRange(1e5, 1.0, 20.0, 50.0),
+    DriveRange(1.0, 1e-3, 2e-4, 1e-4)], ids=['usual', 'nothing', 'large', 'tiny'])
+@every_effect
+def test_trials_are_distinct_and_lie_within_the_bounds(effect, covered):
+    trials = effect.trials(covered)
+    assert len({tuple(trial.values()) for trial in trials}) == len(trials) > 0
+    for trial in trials:
+        assert list(trial) == [p.name for p in effect.shape]
+        for p in effect.shape:
+            assert type(p.check(p.name, trial[p.name])) is float
+
+
+def test_some_pitch_tried_shows_most_of_any_ripple():
+    q = np.linspace(0, COVERED.stroke, 2000)
+    drive = DriveSamples(None, q, q, q, q, q)
+    bases = [np.linalg.qr(np.stack(ForceRipple.columns(drive, **trial)[:2], axis=1))[0]
+             for trial in ForceRipple.trials(COVERED)]
+    rng = np.random.default_rng(64)
+    shortest = COVERED.stroke / 120
+    # Fewer than three waves over the stroke are a spring's curve as well: none is tried.
+    for pitch in np.geomspace(shortest, COVERED.stroke / 3, 200):
+        ripple = np.sin(2 * np.pi * q / pitch + rng.uniform(0, 2 * np.pi))
+        shown = max(np.sum((basis.T @ ripple) ** 2) for basis in bases) / np.sum(ripple ** 2)
+        # Half a step off: (sin(pi/4) / (pi/4))^2 = 0.81 over many periods.
+        assert shown > 0.75, pitch
+
+
+@every_effect
+def test_variants_are_sets_of_coefficients_and_the_last_holds_all(effect):
+    known = {c.name for c in effect.coefficients}
+    assert set(effect.variants[-1]) == known
+    assert len(set(effect.variants)) == len(effect.variants)
+    for variant in effect.variants:
+        assert set(variant) <= known
+    assert set(effect.unphysical_below) <= {p.name for p in effect.parameters}
+
+
+@every_effect
+def test_parameters_come_back_from_their_coefficients(effect):
+    rng = np.random.default_rng(65)
+    for _ in range(20):
+        values = random_values(effect, rng)
+        back = effect.from_coefficients(effect.to_coefficients(values))
+        assert set(back) == {p.name for p in effect.linear}
+        assert_allclose([back[name] for name in back], [values[name] for name in back],
+                        rtol=1e-12, atol=1e-14)
+
+
+@given(st.data())
+@every_effect
+def test_any_coefficients_fitted_make_an_allowed_effect_of_the_same_force(effect, data):
+    fitted = {c.name: data.draw(st.sampled_from((0.0, 1e-9, -1e-9)) | st.floats(-100, 100))
+              for c in effect.coefficients}
+    values = {**effect.from_coefficients(fitted),
+              **{p.name: p.scale for p in effect.shape}}
+    assert effect.from_file({'axis': values}).drives == {'axis': values}
+    axes = excitation(2.0)
+    columns = effect.columns(DriveSamples.of(axes, 0), **{p.name: p.scale for p in effect.shape})
+    expected = sum(fitted[c.name] * column
+                   for c, column in zip(effect.coefficients, columns, strict=True))
+    # A constant force as the softest spring allowed varies by 0.02 % over 0.2 m.
+    assert_allclose(effect({'axis': values}).force(axes)[:, 0], expected,
+                    rtol=0, atol=2e-4 * max(map(abs, fitted.values())) + 1e-12)
+
+
+@pytest.mark.parametrize('force', [0.7, -0.7])
+@pytest.mark.parametrize('k', [0.0, -0.0, 1e-12, -1e-12])
+def test_a_spring_without_stiffness_is_a_constant_force_from_afar(k, force):
+    values = DriveSpring.from_coefficients({'stiffness': k, 'force': force})
+    assert abs(values['position']) == 1000
+    assert DriveSpring.to_coefficients(values)['force'] == pytest.approx(force, rel=1e-12)
+    assert abs(values['stiffness']) == pytest.approx(7e-4)
+
+
+def test_a_spring_without_force_is_relaxed_at_zero():
+    assert DriveSpring.from_coefficients({'stiffness': 0.0, 'force': 0.0}) == {
+        'stiffness': 0.0, 'position': 0.0}
+    assert DriveSpring.from_coefficients({'stiffness': 5.0, 'force': 0.0})['position'] == 0
+
+
+# Files, drives and memories ------------------------------------------------------------------
+
+@every_effect
+def test_effect_comes_back_from_its_block_in_a_file(effect):
+    rng = np.random.default_rng(66)
+    built = effect({'lift_1': random_values(effect, rng), 'slide_2': random_values(effect, rng)})
+    block = yaml.safe_load(yaml.safe_dump(built.to_file()))
+    assert effect.from_file(block) == built
+    assert effect.from_file({'axis': next(iter(block.values()))}) != built
+
+
+@every_effect
+def test_card_states_the_law_with_every_parameters_symbol(effect):
+    card = effect.card
+    for parameter in effect.parameters:
+        assert parameter.symbol in card.equation
+        assert parameter.lower <= parameter.scale <= parameter.upper
+    assert all(len(text) > 40 for text in (card.looks_like, card.causes, card.confirm,
+                                           card.reference))
+
+
+@every_effect
+def test_effect_acts_in_its_drive_alone_and_by_that_drives_motion(effect):
+    two = excitation(drives=('slide_2', 'lift_1'))
+    values = random_values(effect, np.random.default_rng(67))
+    force = effect({'lift_1': values}).force(two)
+    assert np.all(force[:, 0] == 0)
+    alone = Axes(two.time, two.position[:, 1:], two.velocity[:, 1:], two.acceleration[:, 1:],
+                 two.guide_load[:, 1:])
+    assert_array_equal(force[:, 1:], effect({'axis': values}).force(alone))
+    assert np.sqrt(np.mean(force[:, 1] ** 2)) > 1e-3
+
+
+@pytest.mark.parametrize('chunk', [1, 7, 1000])
+@every_effect
+def test_a_stream_with_a_carried_memory_equals_one_call(effect, chunk):
+    drives = ('slide_2', 'lift_1')
+    axes = excitation(4.0, drives)
+    rng = np.random.default_rng(68)
+    axes.position = np.round(axes.position, 6)  # an encoder, that stands still at times
+    built = effect({drive: random_values(effect, rng) for drive in drives})
+    memory = built.initial_memory()
+    assert (memory is not None) == (effect in WITH_MEMORY)
+    parts = [built.force(axes[start:start + chunk], memory)
+             for start in range(0, len(axes.time), chunk)]
+    assert_array_equal(np.concatenate(parts), built.force(axes))
+
+
+@pytest.mark.parametrize('effect', WITH_MEMORY, ids=lambda effect: effect.name)
+def test_a_call_without_memory_starts_afresh(effect):
+    axes = excitation()
+    built = effect({'axis': random_values(effect, np.random.default_rng(69))})
+    whole = built.force(axes)
+    assert np.abs(whole[5000:] - built.force(axes[5000:])).max() > 0.01
+    assert_array_equal(built.force(axes), whole)

@@ -1,0 +1,585 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Drive forces: energy, statics, symmetry, reactions, friction and the sum over effects."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from oracles.first_principles import (
+    UP,
+    central_difference,
+    chain_vectors,
+    drive_motion,
+    energy,
+    moved,
+)
+from random_states import (
+    ELBOWS,
+    OPEN_LIMITS,
+    home_position,
+    model_of,
+    paper_geometry,
+    paper_model,
+    random_masses,
+    random_motion,
+    random_robot,
+    smooth_motion,
+)
+from scipy.spatial.transform import Rotation
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.errors import PprsError, SingularityError
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.three_pprs.robot import DRIVES, Masses, Robot
+
+# Forces of some 40 N and powers of some 100 W, with the rounding errors of a few hundred
+# operations; a wrong term shows at 1e-3 or more.
+ROUNDING = 1e-11
+# A fourth-order difference over 1e-3 s of motions of a few rad/s.
+DIFFERENCE_TOLERANCE = 1e-8
+OBLIQUE = (3.0, -4.0, -8.0)
+PRINTED = {'equations': 'printed'}
+INDEPENDENT = {'friction.approach': 'independent_chains'}
+VISCOUS_ONLY = {
+    'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0,
+    'friction.drives.coulomb': (0.0,) * 6}
+HARD_SIGN = {'friction.reversal_velocity': 1e-9, 'friction.reversal_rate': 1e-9}
+STATES = 300
+
+every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
+
+
+@pytest.fixture(params=ELBOWS)
+def robot(request):
+    """Return a robot in which no two chains are equal, under oblique gravity."""
+    return random_robot(np.random.default_rng(51), request.param, OBLIQUE)
+
+
+@pytest.fixture
+def motion(robot):
+    """Random states of that robot."""
+    return random_motion(np.random.default_rng(52), STATES, robot.geometry.elbow)
+
+
+def power(forces, part):
+    """Return q_dot . Q of one part of the forces, (N,) [W]."""
+    return np.sum(forces.mechanism.velocity * forces.parts[part], axis=1)
+
+
+def reactions_on_platform(robot, forces):
+    """Return the force of every rod on the platform, (N, 3, 3) [N], from H, V and W."""
+    (e, n), chains, r = chain_vectors(robot.geometry), forces.mechanism.chains, \
+        forces.mechanism.rigid_body.reactions
+    c, s = chains.cos_u[..., None], chains.sin_u[..., None]
+    along, normal = -c * e + s * UP, -(s * e + c * UP)
+    return r.H[..., None] * n + r.V[..., None] * along + r.W[..., None] * normal
+
+
+def inertia_in_base(robot, motion):
+    rotation = Rotation.from_quat(motion.orientation).as_matrix()
+    return rotation @ robot.masses.inertia_tensor @ np.swapaxes(rotation, 1, 2)
+
+
+# Energy and statics --------------------------------------------------------------------------
+
+def test_power_of_frictionless_forces_is_the_rate_of_energy(robot):
+    t, h = np.linspace(0, 6, 150), 1e-3
+    elbow = robot.geometry.elbow
+    forces = model_of(robot).drive_forces(smooth_motion(t, elbow))
+    E = {k: sum(energy(robot, smooth_motion(t + k * h, elbow))) for k in (-2, -1, 1, 2)}
+    rate = (8 * (E[1] - E[-1]) - (E[2] - E[-2])) / (12 * h)
+    delivered = np.sum(drive_motion(robot.geometry, smooth_motion(t, elbow))[1]
+                       * forces.parts['rigid_body'], axis=1)
+    assert_allclose(delivered, rate, rtol=0, atol=DIFFERENCE_TOLERANCE)
+    kinetic = energy(robot, smooth_motion(t, elbow))[0]
+    assert np.ptp(kinetic) > 0.05  # kinetic and potential energy both matter here
+    assert np.abs(rate).max() > 1
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_force_at_rest_is_the_gradient_of_potential_energy(robot, seed):
+    states = random_motion(np.random.default_rng([53, seed]), 1, robot.geometry.elbow)
+    pose = PlatformMotion.at_rest(states.position, states.orientation)
+    force = model_of(robot).drive_forces(pose).parts['rigid_body'][0]
+    gradient = central_difference(lambda x: energy(robot, moved(pose, x))[1][0], 6)
+    drives = central_difference(
+        lambda x: drive_motion(robot.geometry, moved(pose, x))[0][0], 6)
+    assert_allclose(drives.T @ force, gradient, rtol=0, atol=DIFFERENCE_TOLERANCE)
+
+
+def test_positive_lift_force_carries_the_weight():
+    # At home each lift carries a third of platform, payload, rods and lifts: 4.1 kg.
+    for elbow in ELBOWS:
+        forces = paper_model({'geometry.elbow': elbow}).drive_forces(
+            PlatformMotion.at_rest(home_position(elbow)))
+        third = 4.1 * 9.81 / 3
+        assert_allclose(forces.total, [[0, 0, 0, third, third, third]], rtol=0, atol=ROUNDING)
+
+
+def test_rms_forces_of_the_helical_path_are_those_checked_by_engines():
+    motion = HelicalPath().motion(np.linspace(0, HelicalPath.duration, 5000))
+    force = DriveModel.load().drive_forces(motion).parts['rigid_body']
+    rms = np.sqrt(np.mean(force ** 2, axis=0))
+    # Printed to two decimals; sampling moves them by less than one unit of the third.
+    assert_allclose(rms, (3.43, 3.93, 3.93, 13.41, 13.41, 13.41), rtol=0, atol=0.006)
+
+
+# Symmetry ------------------------------------------------------------------------------------
+
+def turned_by_a_third(robot, motion):
+    """Turn motion, gravity and bodies by 120 degrees about z: chain i becomes chain i + 1."""
+    third = Rotation.from_rotvec((0, 0, 2 * np.pi / 3))
+    Z, m = third.as_matrix(), robot.masses
+    tensor = Z @ m.inertia_tensor @ Z.T
+    masses = Masses(
+        m.platform, m.payload, *(tuple(np.roll(x, 1)) for x in (m.slides, m.lifts, m.rods)),
+        tuple(Z @ m.centre),
+        (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]))
+    orientation = third * Rotation.from_quat(motion.orientation) * third.inv()
+    position, *vectors = (x @ Z.T for x in (
+        motion.position, motion.linear_velocity, motion.angular_velocity,
+        motion.linear_acceleration, motion.angular_acceleration))
+    return (Robot(robot.geometry, masses, tuple(Z @ robot.gravity)),
+            PlatformMotion(position, orientation.as_quat(), *vectors))
+
+
+@every_elbow
+@pytest.mark.parametrize('changes', [{}, PRINTED, INDEPENDENT, {**INDEPENDENT, **PRINTED}],
+                         ids=['whole', 'whole-printed', 'independent', 'independent-printed'])
+def test_turning_everything_by_120_degrees_permutes_the_chains(elbow, changes):
+    rng = np.random.default_rng(54)
+    robot = Robot(paper_geometry(elbow), random_masses(rng), OBLIQUE)
+    motion = random_motion(rng, STATES, elbow)
+    cos_u = model_of(robot).mechanism(motion).chains.cos_u
+    motion = motion[np.all(np.abs(cos_u) > 0.06, axis=1)]  # where (13) is defined
+    forces = model_of(robot, changes).drive_forces(motion)
+    turned_robot, turned_motion = turned_by_a_third(robot, motion)
+    turned = model_of(turned_robot, changes).drive_forces(turned_motion)
+    chain_before = [2, 0, 1, 5, 3, 4]
+    for name, part in forces.parts.items():
+        # Dry friction magnifies the rounding of velocities by 1 / reversal velocity.
+        assert_allclose(turned.parts[name], part[:, chain_before], rtol=0, atol=1e-9,
+                        err_msg=name)
+    assert np.abs(turned.total - forces.total).max() > 1
+
+
+# Reactions -----------------------------------------------------------------------------------
+
+def test_reactions_satisfy_the_platforms_newton_euler_equations(robot, motion):
+    forces = model_of(robot).drive_forces(motion)
+    on_platform = reactions_on_platform(robot, forces)
+    omega, epsilon = motion.angular_velocity, motion.angular_acceleration
+    rotation = Rotation.from_quat(motion.orientation)
+    d = rotation.apply(robot.masses.centre)
+    arms = np.stack([rotation.apply(robot.geometry.platform_radius * np.array(
+        [np.cos(angle), np.sin(angle), 0])) for angle in robot.geometry.platform_angles], axis=1)
+    a_centre = (motion.linear_acceleration + np.cross(epsilon, d)
+                + np.cross(omega, np.cross(omega, d)))
+    assert_allclose(on_platform.sum(axis=1) + robot.masses.total * np.asarray(robot.gravity),
+                    robot.masses.total * a_centre, rtol=0, atol=ROUNDING)
+    # Euler's equation about the centre of mass, not about o as in the package.
+    tensor = inertia_in_base(robot, motion)
+    spin = np.einsum('nij,nj->ni', tensor, omega)
+    moment = np.cross(arms - d[:, None], on_platform).sum(axis=1)
+    assert_allclose(moment, np.einsum('nij,nj->ni', tensor, epsilon) + np.cross(omega, spin),
+                    rtol=0, atol=ROUNDING)
+
+
+def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
+    forces = model_of(robot).drive_forces(motion)
+    chains, body = forces.mechanism.chains, forces.mechanism.rigid_body
+    (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
+        robot.geometry.rod_length  # noqa: E741
+    slides, lifts, rods = (np.asarray(m)[:, None] for m in (
+        robot.masses.slides, robot.masses.lifts, robot.masses.rods))
+    c, s = chains.cos_u[..., None], chains.sin_u[..., None]
+    u_dot, u_ddot = chains.u_dot[..., None], chains.u_ddot[..., None]
+    along, swing = -c * e + s * UP, s * e + c * UP
+    q_ddot = chains.acceleration
+    a_slide = q_ddot[:, :3, None] * n
+    a_lift = a_slide + q_ddot[:, 3:, None] * UP
+    a_rod = a_lift + l / 2 * (u_ddot * swing - u_dot ** 2 * along)
+
+    at_A = -reactions_on_platform(robot, forces)
+    at_C = rods * (a_rod - g) - at_A  # from the lift on the rod
+    moment = np.sum(n * np.cross(l / 2 * along, at_A - at_C), axis=-1)
+    transverse = rods[:, 0] * l ** 2 / 12
+    assert_allclose(moment, transverse * chains.u_ddot, rtol=0, atol=ROUNDING)
+    from_slide = at_C + lifts * (a_lift - g)
+    from_base = from_slide + slides * (a_slide - g)
+
+    r = body.reactions
+    assert_allclose(r.H_star, np.sum(at_C * n, axis=-1), rtol=0, atol=ROUNDING)
+    assert_allclose(r.V_star, at_C[..., 2], rtol=0, atol=ROUNDING)
+    assert_allclose(r.W_star, -np.sum(at_C * e, axis=-1), rtol=0, atol=ROUNDING)
+    # A drive pushes along its guide; the rest of the force is the guide's load.
+    assert_allclose(body.force[:, :3], np.sum(from_base * n, axis=-1), rtol=0, atol=ROUNDING)
+    assert_allclose(body.force[:, 3:], from_slide[..., 2], rtol=0, atol=ROUNDING)
+    across_slide = from_base - np.sum(from_base * n, axis=-1, keepdims=True) * n
+    assert_allclose(body.guide_load[:, :3], np.linalg.norm(across_slide, axis=-1), rtol=0,
+                    atol=ROUNDING)
+    assert_allclose(body.guide_load[:, 3:], np.linalg.norm(from_slide[..., :2], axis=-1),
+                    rtol=0, atol=ROUNDING)
+
+
+# Friction in the joints ----------------------------------------------------------------------
+
+def test_active_friction_is_viscous_plus_load_times_sign(robot, motion):
+    viscous, coulomb = np.linspace(0.5, 3, 6), np.linspace(0.02, 0.2, 6)
+    model = model_of(robot, {**HARD_SIGN, 'friction.drives.viscous': tuple(viscous),
+                             'friction.drives.coulomb': tuple(coulomb)})
+    forces = model.drive_forces(motion)
+    q_dot = drive_motion(robot.geometry, motion)[1]
+    expected = viscous * q_dot + coulomb * forces.mechanism.guide_load * np.sign(q_dot)
+    assert_allclose(forces.parts['active_friction'], expected, rtol=0, atol=ROUNDING)
+
+
+def joint_friction(robot, motion, forces, c_r, mu_r, d_r, c_s, mu_s, d_s):
+    """Return friction moments on the rods by Eq. (9) with a hard sign, (N, 3, 3) each [N m].
+
+    Opposed to the rod's velocity against the lift, and against the platform; also those
+    velocities.
+    """
+    _, n = chain_vectors(robot.geometry)
+    r = forces.mechanism.rigid_body.reactions
+    rod = forces.mechanism.chains.u_dot[..., None] * n
+    relative = rod - motion.angular_velocity[:, None]
+    moments = []
+    for velocity, load, c, mu, d in (
+            (rod, np.hypot(r.V_star, r.W_star), c_r, mu_r, d_r),
+            (relative, np.linalg.norm(reactions_on_platform(robot, forces), axis=-1),
+             c_s, mu_s, d_s)):
+        speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
+        moments.append(-(c * velocity + mu * d / 2 * load[..., None] * velocity / speed))
+    return *moments, rod, relative
+
+
+NUMBERS = {'friction.revolute.viscous': 0.03, 'friction.revolute.coulomb': 0.4,
+           'friction.revolute.diameter': 0.02, 'friction.spherical.viscous': 0.01,
+           'friction.spherical.coulomb': 0.2, 'friction.spherical.diameter': 0.03}
+
+
+def test_passive_friction_takes_the_power_that_the_joints_dissipate(robot, motion):
+    forces = model_of(robot, {**HARD_SIGN, **NUMBERS}).drive_forces(motion)
+    at_C, at_A, rod, relative = joint_friction(robot, motion, forces, *NUMBERS.values())
+    dissipated = -np.sum(at_C * rod, axis=(1, 2)) - np.sum(at_A * relative, axis=(1, 2))
+    assert_allclose(power(forces, 'passive_friction'), dissipated, rtol=0, atol=ROUNDING)
+    assert np.all(dissipated > 0)
+
+
+def test_passive_friction_does_the_joints_virtual_work_for_every_drive(robot, motion):
+    model = model_of(robot, {**HARD_SIGN, **NUMBERS})
+    forces = model.drive_forces(motion)
+    at_C, at_A, *_ = joint_friction(robot, motion, forces, *NUMBERS.values())
+    _, n = chain_vectors(robot.geometry)
+    # What each drive's unit velocity turns, from differences of positions alone.
+    for sample in range(5):
+        pose = motion[sample]
+        turns = central_difference(
+            lambda x, p=pose: drive_motion(robot.geometry, moved(p, x))[0][0], 6)
+        platform = np.linalg.inv(turns)
+        u = central_difference(
+            lambda x, p=pose: model.mechanism(moved(p, x)).chains.rod_angle[0], 6) @ platform
+        virtual = np.zeros(6)
+        for i in range(3):
+            rod = n[i][:, None] * u[i]
+            virtual -= at_C[sample, i] @ rod + at_A[sample, i] @ (rod - platform[3:])
+        assert_allclose(forces.parts['passive_friction'][sample], virtual, rtol=0, atol=1e-7)
+
+
+def test_viscous_passive_friction_is_a_symmetric_damping_of_all_but_rising(robot):
+    # Delta Q = D q_dot with D from its columns: each drive moved alone at 1 m/s.
+    model = model_of(robot, VISCOUS_ONLY)
+    state = random_motion(np.random.default_rng(55), 1, robot.geometry.elbow)
+    J = model.mechanism(state).jacobians.J[0]
+    zero = np.zeros((6, 3))
+    alone = PlatformMotion(state.position.repeat(6, 0), state.orientation.repeat(6, 0),
+                           J[:3].T, J[3:].T, zero, zero)
+    D = model.drive_forces(alone).parts['passive_friction'].T
+    assert_allclose(D, D.T, rtol=0, atol=1e-14)
+    # Positive semi-definite: when all lifts rise alike, no joint turns; everything else costs.
+    assert_allclose(D @ (0, 0, 0, 1, 1, 1), 0, rtol=0, atol=1e-14)
+    assert np.linalg.eigvalsh(D)[1] > 0.01
+    printed = model_of(robot, {**VISCOUS_ONLY, **PRINTED}).drive_forces(alone)
+    skew = printed.parts['passive_friction'].T - D
+    assert_allclose(skew, -skew.T, rtol=0, atol=1e-14)
+    assert np.abs(skew).max() > 0.01
+
+
+@pytest.mark.parametrize('part', ['active_friction', 'passive_friction'])
+def test_friction_never_drives_the_robot(robot, part):
+    motion = random_motion(np.random.default_rng(56), 2000, robot.geometry.elbow)
+    assert np.all(power(model_of(robot).drive_forces(motion), part) > 0)
+
+
+@pytest.mark.parametrize('changes', [{}, PRINTED, INDEPENDENT, {**INDEPENDENT, **PRINTED}],
+                         ids=['whole', 'whole-printed', 'independent', 'independent-printed'])
+def test_zero_velocity_gives_zero_friction(robot, motion, changes):
+    zero = np.zeros_like(motion.position)
+    starting = PlatformMotion(motion.position, motion.orientation, zero, zero,
+                              motion.linear_acceleration, motion.angular_acceleration)
+    cos_u = model_of(robot).mechanism(starting).chains.cos_u
+    starting = starting[np.all(np.abs(cos_u) > 0.06, axis=1)]
+    forces = model_of(robot, changes).drive_forces(starting)
+    for part in ('active_friction', 'passive_friction'):
+        assert not np.any(forces.parts[part]), part
+    assert_array_equal(forces.total, forces.parts['rigid_body'])
+
+
+def test_friction_is_odd_in_velocity_where_loads_stay(robot):
+    # Turning all velocities round leaves accelerations, and so all loads, as they are.
+    motion = random_motion(np.random.default_rng(57), STATES, robot.geometry.elbow)
+    back = PlatformMotion(motion.position, motion.orientation, -motion.linear_velocity,
+                          -motion.angular_velocity, motion.linear_acceleration,
+                          motion.angular_acceleration)
+    model = model_of(robot)
+    forward, reverse = model.drive_forces(motion).parts, model.drive_forces(back).parts
+    assert_allclose(reverse['rigid_body'], forward['rigid_body'], rtol=0, atol=ROUNDING)
+    for part in ('active_friction', 'passive_friction'):
+        assert_allclose(reverse[part], -forward[part], rtol=0, atol=ROUNDING, err_msg=part)
+
+
+# Corrected and printed -----------------------------------------------------------------------
+
+def test_printed_equation_12_has_the_right_total_power_but_another_share(robot, motion):
+    corrected = model_of(robot).drive_forces(motion)
+    printed = model_of(robot, PRINTED).drive_forces(motion)
+    assert_allclose(power(printed, 'passive_friction'), power(corrected, 'passive_friction'),
+                    rtol=0, atol=1e-12)
+    assert np.abs(printed.parts['passive_friction']
+                  - corrected.parts['passive_friction']).max() > 0.1
+
+
+def test_printed_equation_12_leaves_out_a_term_in_pure_translation(robot, motion):
+    zero = np.zeros_like(motion.position)
+    translation = PlatformMotion(motion.position, motion.orientation, motion.linear_velocity,
+                                 zero, motion.linear_acceleration, zero)
+    changes = {**VISCOUS_ONLY, 'friction.spherical.viscous': 0.02}
+    corrected = model_of(robot, changes).drive_forces(translation)
+    printed = model_of(robot, {**changes, **PRINTED}).drive_forces(translation)
+    _, n = chain_vectors(robot.geometry)
+    spin = 0.02 * corrected.mechanism.chains.u_dot @ n
+    left_out = -np.einsum('nij,ni->nj', corrected.mechanism.jacobians.J_omega, spin)
+    assert np.abs(left_out).max() > 0.1
+    assert_allclose(corrected.parts['passive_friction'] - printed.parts['passive_friction'],
+                    left_out, rtol=0, atol=ROUNDING)
+
+
+def test_printed_equation_7_lacks_the_rod_length_in_one_term(robot, motion):
+    corrected = model_of(robot).drive_forces(motion)
+    printed = model_of(robot, PRINTED).drive_forces(motion)
+    c = corrected.mechanism.chains
+    difference = np.asarray(robot.masses.rods) / 2 * (1 - robot.geometry.rod_length) * (
+        c.u_ddot * c.cos_u - c.u_dot ** 2 * c.sin_u)
+    assert np.abs(difference).max() > 0.1  # whatever the rods weigh
+    change = printed.parts['rigid_body'] - corrected.parts['rigid_body']
+    assert_array_equal(change[:, :3], 0)
+    assert_allclose(change[:, 3:], difference, rtol=0, atol=ROUNDING)
+    assert_array_equal(printed.parts['active_friction'], corrected.parts['active_friction'])
+
+
+def yawing_at_home(rate, elbow='up'):
+    return PlatformMotion(home_position(elbow), (0, 0, 0, 1), (0, 0, 0), (0, 0, rate), (0, 0, 0),
+                          (0, 0, 0))
+
+
+@every_elbow
+@pytest.mark.parametrize(('changes', 'slide'), [
+    ({}, 0.2), ({**INDEPENDENT, **PRINTED}, -0.4), (INDEPENDENT, 0.4)],
+    ids=['exact', 'independent-printed', 'independent-corrected'])
+def test_pure_yaw_of_1_rad_per_s_at_home(elbow, changes, slide):
+    # Exact: 3 c_s omega^2 = 0.06 W over three slides at r omega = 0.1 m/s. Eq. (13): c_s omega
+    # = 0.02 N m over l cos u = 0.05 m, printed with the sign that drives the robot.
+    model = paper_model({'geometry.elbow': elbow, **VISCOUS_ONLY, **changes})
+    force = model.drive_forces(yawing_at_home(1.0, elbow)).parts['passive_friction']
+    assert_allclose(force, [[slide] * 3 + [0] * 3], rtol=0, atol=1e-14)
+
+
+def test_printed_equation_13_has_the_wrong_sign_throughout(robot, motion):
+    # Rods of this robot pass through cos u = 0 within the sampled workspace.
+    cos_u = model_of(robot).mechanism(motion).chains.cos_u
+    defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
+    assert STATES / 3 < len(defined) < STATES
+    corrected = model_of(robot, INDEPENDENT).drive_forces(defined).parts['passive_friction']
+    printed = model_of(robot, {**INDEPENDENT, **PRINTED}).drive_forces(defined)
+    assert np.all(np.isfinite(corrected))
+    assert np.abs(corrected).max() > 0.5
+    assert_array_equal(printed.parts['passive_friction'], -corrected)
+
+
+def test_independent_chains_do_each_chains_virtual_work(robot, motion):
+    cos_u = model_of(robot).mechanism(motion).chains.cos_u
+    defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
+    changes = {**INDEPENDENT, **HARD_SIGN, **NUMBERS}
+    forces = model_of(robot, changes).drive_forces(defined)
+    at_C, at_A, *_ = joint_friction(robot, defined, forces, *NUMBERS.values())
+    _, n = chain_vectors(robot.geometry)
+    lever = robot.geometry.rod_length * forces.mechanism.chains.cos_u
+    slides = at_A[..., 2] / lever
+    lifts = np.sum((at_A + at_C) * n, axis=-1) / lever
+    assert_allclose(forces.parts['passive_friction'], np.concatenate((slides, lifts), axis=1),
+                    rtol=1e-12, atol=ROUNDING)
+
+
+@every_elbow
+@pytest.mark.parametrize('equations', ['corrected', 'printed'])
+@pytest.mark.parametrize(('cosine', 'refused'), [
+    (-0.0501, False), (-0.0499, True), (0.0, True), (0.0499, True), (0.0501, False)])
+def test_independent_chains_refuse_where_a_rod_is_upright(elbow, equations, cosine, refused):
+    # Chain 1 has cos u = (R - r - x) / l.
+    model = paper_model({'geometry.elbow': elbow, **INDEPENDENT, 'equations': equations})
+    x = 0.15 - 0.10 - 0.30 * cosine
+    pose = PlatformMotion.at_rest([home_position(elbow), home_position(elbow) + x * np.eye(3)[0]])
+    if not refused:
+        assert np.all(np.isfinite(model.drive_forces(pose).total))
+        return
+    with pytest.raises(SingularityError, match=r'cos u. of chain 1') as caught:
+        model.drive_forces(pose)
+    assert caught.value.sample == 1
+    assert '0.05' in str(caught.value)
+    whole = paper_model({'geometry.elbow': elbow, 'equations': equations})
+    assert np.all(np.isfinite(whole.drive_forces(pose).total))
+
+
+# The sum over effects ------------------------------------------------------------------------
+
+CLOSED_FORMS = {
+    'viscous_friction': ({'coefficient': 3.0}, lambda v: 3.0 * v),
+    'coulomb_friction': ({'force': 0.7}, lambda v: 0.7 * np.tanh(v / 0.001)),
+    'stribeck_friction': ({'force': 1.2, 'velocity': 0.3},
+                          lambda v: 1.2 * np.exp(-(v / 0.3) ** 2) * np.tanh(v / 0.001)),
+    'quadratic_friction': ({'coefficient': 2.0}, lambda v: 2.0 * v * np.abs(v)),
+    'effort_offset': ({'force': -0.4}, lambda v: np.full_like(v, -0.4)),
+}
+
+
+def effect_keys(name, drives, values):
+    """Return the keys that activate one effect on drives."""
+    return {'effects.active': [name],
+            **{f'effects.{name}.{drive}.{key}': value
+               for drive in drives for key, value in values.items()}}
+
+
+@pytest.mark.parametrize('drives', [('lift_1',), ('slide_2', 'lift_3'), DRIVES], ids=len)
+@pytest.mark.parametrize('name', CLOSED_FORMS)
+def test_effect_adds_its_closed_form_and_nothing_else(robot, motion, name, drives):
+    values, closed_form = CLOSED_FORMS[name]
+    without = model_of(robot).drive_forces(motion)
+    with_it = model_of(robot, effect_keys(name, drives, values)).drive_forces(motion)
+    expected = np.zeros((STATES, 6))
+    q_dot = drive_motion(robot.geometry, motion)[1]
+    for drive in drives:
+        index = DRIVES.index(drive)
+        expected[:, index] = closed_form(q_dot[:, index])
+    assert np.abs(expected).max() > 0.1
+    for part, force in without.parts.items():
+        assert_array_equal(with_it.parts[part], force, err_msg=part)
+    assert set(with_it.parts) == {*without.parts, name}
+    # tanh magnifies the rounding of velocities by 1 / reversal velocity.
+    assert_allclose(with_it.parts[name], expected, rtol=0, atol=1e-10)
+    assert_allclose(with_it.total - without.total, expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize('changes', [
+    {}, PRINTED, {'effects.active': [], 'friction.reversal_velocity': 0.1}])
+def test_parts_sum_to_the_total(robot, motion, changes):
+    forces = model_of(robot, changes).drive_forces(motion)
+    assert_allclose(sum(forces.parts.values()), forces.total, rtol=0, atol=1e-13)
+    assert list(forces.parts) == ['rigid_body', 'active_friction', 'passive_friction']
+
+
+@every_elbow
+def test_samples_do_not_influence_each_other(elbow):
+    rng = np.random.default_rng(58)
+    robot = random_robot(rng, elbow, OBLIQUE)
+    model, motion = model_of(robot), random_motion(rng, STATES, elbow)
+    together = model.drive_forces(motion).total
+    order = rng.permutation(STATES)
+    # Bitwise: a node that gets one point must give what a recording of many gives.
+    assert_array_equal(model.drive_forces(motion[order]).total, together[order])
+    split = [model.drive_forces(motion[part]).total
+             for part in (slice(0, 1), slice(1, 8), slice(8, 150), slice(150, None))]
+    assert_array_equal(np.concatenate(split), together)
+    single = [model.drive_forces(motion[sample]).total[0] for sample in range(30)]
+    assert_array_equal(single, together[:30])
+
+
+# Effects with memory -------------------------------------------------------------------------
+
+HYSTERESIS = effect_keys('hysteresis', ('slide_1', 'lift_2'), {'force': 0.8, 'distance': 0.01})
+
+
+@pytest.fixture
+def remembering():
+    """Return a model with hysteresis, and a motion with reversals."""
+    return (paper_model({**OPEN_LIMITS, **HYSTERESIS}), smooth_motion(np.linspace(0, 4, 800)))
+
+
+def hysteresis_by_substeps(q, force, distance, substeps=400):
+    """Integrate Dahl's equation dz = (s - z) |dq| / x_d in small steps; return F z."""
+    z, result = 0.0, [0.0]
+    for step in np.diff(q):
+        small = step / substeps
+        for _ in range(substeps):
+            # Heun's method: second order in the small step.
+            slope = (np.sign(small) - z) * abs(small) / distance
+            z += (slope + (np.sign(small) - z - slope) * abs(small) / distance) / 2
+        result.append(force * z)
+    return np.array(result)
+
+
+def test_hysteresis_is_dahls_equation_in_place_of_the_sign(remembering):
+    model, motion = remembering
+    forces = model.drive_forces(motion)
+    q, q_dot = drive_motion(model.robot.geometry, motion)
+    for drive in range(6):
+        expected = np.zeros(len(motion))
+        if DRIVES[drive] in ('slide_1', 'lift_2'):
+            expected = (hysteresis_by_substeps(q[:, drive], 0.8, 0.01, 40)
+                        - 0.8 * np.tanh(q_dot[:, drive] / 0.001))
+            assert np.ptp(expected) > 0.8
+        # Heun's error per sample: (dq / 40 / x_d)^3 of a few 1e-3 m, some 1e-8 in all.
+        assert_allclose(forces.parts['hysteresis'][:, drive], expected, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize('chunk', [1, 7, 400])
+def test_chunks_with_a_carried_state_equal_one_call(remembering, chunk):
+    model, motion = remembering
+    state = model.initial_state()
+    chunks = [model.drive_forces(motion[start:start + chunk], state=state).total
+              for start in range(0, len(motion), chunk)]
+    assert_array_equal(np.concatenate(chunks), model.drive_forces(motion).total)
+
+
+def test_chunks_without_a_state_start_afresh(remembering):
+    model, motion = remembering
+    whole = model.drive_forces(motion).parts['hysteresis'][400:]
+    afresh = model.drive_forces(motion[400:]).parts['hysteresis']
+    assert np.abs(whole - afresh).max() > 0.1
+    assert_array_equal(model.drive_forces(motion).total, model.drive_forces(motion).total)
+
+
+def test_a_copied_state_does_not_advance_the_original(remembering):
+    model, motion = remembering
+    state = model.initial_state()
+    model.drive_forces(motion[:300], state=state)
+    ahead = model.drive_forces(motion[300:500], state=state.copy()).total
+    model.drive_forces(motion[600:], state=state.copy())
+    assert_array_equal(model.drive_forces(motion[300:500], state=state).total, ahead)
+
+
+def test_states_of_one_model_are_independent(remembering):
+    model, motion = remembering
+    first, second = model.initial_state(), model.initial_state()
+    model.drive_forces(motion[:500], state=first)
+    assert_array_equal(model.drive_forces(motion[:500], state=second).total,
+                       model.drive_forces(motion[:500]).total)
+
+
+def test_state_of_another_model_is_refused(remembering):
+    model, motion = remembering
+    with pytest.raises(PprsError, match='hysteresis'):
+        model.drive_forces(motion, state=paper_model(OPEN_LIMITS).initial_state())

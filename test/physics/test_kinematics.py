@@ -1,0 +1,450 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Kinematics: closure, forward and inverse, Jacobians, singular poses and other solutions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from oracles.first_principles import central_difference, chain_vectors, closure, moved
+from random_states import (
+    ELBOWS,
+    home_position,
+    model_of,
+    paper_geometry,
+    paper_model,
+    random_motion,
+    random_poses,
+    random_robot,
+    smooth_motion,
+)
+from scipy.optimize import brentq, root
+from scipy.spatial.transform import Rotation
+
+from pprs_dynamics import PlatformMotion
+from pprs_dynamics.errors import (
+    ConvergenceError,
+    MotionError,
+    PprsError,
+    SingularityError,
+    WorkspaceError,
+)
+from pprs_dynamics.physics.three_pprs.forward_kinematics import home_pose, solve_forward_kinematics
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
+    chain_table,
+    solve_inverse_kinematics,
+)
+from pprs_dynamics.physics.three_pprs.jacobians import condition_number, inverse_table
+from pprs_dynamics.physics.three_pprs.robot import Robot
+from pprs_dynamics.physics.three_pprs.state import solve_mechanism
+
+POSES = 4000
+# Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
+POSE_TOLERANCE = 1e-11
+# Quadratic convergence from home takes 5 steps to cross the workspace; 8 leaves room for other
+# processors' rounding, and a Jacobian that is wrong converges linearly, in dozens.
+MOST_NEWTON_STEPS = 8
+
+every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
+
+
+@pytest.fixture(params=ELBOWS)
+def geometry(request):
+    """Return a geometry in which no two chains are equal."""
+    return random_robot(np.random.default_rng(21), request.param).geometry
+
+
+def rotation_vector(motion):
+    """Return the rotation vector of a motion's first sample."""
+    return Rotation.from_quat(motion.orientation[0]).as_rotvec()
+
+
+# Rounding of 1e-16 over a step of 1e-4, times the conditioning of the mechanism.
+DIFFERENCE_TOLERANCE = 1e-9
+
+
+def solve(geometry, motion):
+    """Return chains and Jacobians of a motion."""
+    state = solve_mechanism(Robot(geometry, paper_model().robot.masses), motion)
+    return state.chains, state.jacobians
+
+
+def home_determinant(geometry):
+    """Return det [B] of the home pose."""
+    return np.linalg.det(solve(geometry, home_pose(geometry))[1].B)[0]
+
+
+# Inverse and forward -------------------------------------------------------------------------
+
+def test_inverse_kinematics_satisfies_the_closure_equations(geometry):
+    motion = random_motion(np.random.default_rng(1), 200, geometry.elbow)
+    q = solve_inverse_kinematics(geometry, motion).position
+    for sample in range(len(motion)):
+        gap = closure(geometry, q[sample], motion.position[sample],
+                      rotation_vector(motion[sample]))
+        assert np.abs(gap).max() < 1e-15
+
+
+def test_carriages_lie_on_the_side_of_the_platform_that_the_elbow_says(geometry):
+    motion = random_motion(np.random.default_rng(2), 500, geometry.elbow)
+    chains = solve_inverse_kinematics(geometry, motion)
+    tips = motion.position[:, None, 2] + chains.arm.k
+    below = tips - chains.position[:, 3:] > 0
+    assert np.all(below) if geometry.elbow == 'up' else not np.any(below)
+    assert_allclose(chains.cos_u ** 2 + chains.sin_u ** 2, 1.0, rtol=1e-15)
+
+
+@every_elbow
+@pytest.mark.parametrize('robot', ['paper', 'unequal'])
+def test_forward_kinematics_undoes_inverse_kinematics(elbow, robot, record_property):
+    geometry = (paper_geometry(elbow) if robot == 'paper'
+                else random_robot(np.random.default_rng(3), elbow).geometry)
+    position, orientation = random_poses(np.random.default_rng(4), POSES, elbow)
+    poses = PlatformMotion.at_rest(position, orientation)
+    found = solve_forward_kinematics(geometry, solve_inverse_kinematics(geometry, poses).position)
+    turned = PlatformMotion.at_rest(found.position, found.orientation)
+    assert_allclose(found.position, position, rtol=0, atol=POSE_TOLERANCE)
+    assert_allclose(turned.rotation, poses.rotation, rtol=0, atol=POSE_TOLERANCE)
+    assert not np.any(found.near_branch)
+    record_property('newton_steps_mean', float(found.steps.mean()))
+    record_property('newton_steps_largest', int(found.steps.max()))
+    print(f'Newton steps: mean {found.steps.mean():.2f}, largest {found.steps.max()}')
+    assert found.steps.min() >= 1
+    assert found.steps.max() <= MOST_NEWTON_STEPS
+
+
+def test_a_near_seed_saves_newton_steps(geometry):
+    rng = np.random.default_rng(5)
+    position, orientation = random_poses(rng, 200, geometry.elbow)
+    poses = PlatformMotion.at_rest(position, orientation)
+    seeds = PlatformMotion.at_rest(position + rng.uniform(-1e-4, 1e-4, (200, 3)), orientation)
+    q = solve_inverse_kinematics(geometry, poses).position
+    near, far = solve_forward_kinematics(geometry, q, seeds), solve_forward_kinematics(geometry, q)
+    assert_allclose(near.position, position, rtol=0, atol=POSE_TOLERANCE)
+    assert near.steps.max() <= 2 < far.steps.min()
+
+
+def test_one_seed_serves_all_samples(geometry):
+    position, orientation = random_poses(np.random.default_rng(6), 50, geometry.elbow)
+    q = solve_inverse_kinematics(geometry, PlatformMotion.at_rest(position, orientation)).position
+    seed = PlatformMotion.at_rest(position[7], orientation[7:8])
+    found = solve_forward_kinematics(geometry, q, seed)
+    assert_allclose(found.position, position, rtol=0, atol=POSE_TOLERANCE)
+    assert found.steps[7] == 0
+
+
+# Other solutions -----------------------------------------------------------------------------
+
+def assert_right_or_refused(geometry, q, seed, true_position):
+    """Assert that a seed in another assembly mode ends at the true pose, or in ConvergenceError."""
+    try:
+        found = solve_forward_kinematics(geometry, q, seed)
+    except ConvergenceError:
+        return
+    assert_allclose(found.position, [true_position], rtol=0, atol=POSE_TOLERANCE)
+
+
+@every_elbow
+@pytest.mark.parametrize('yaw', [0.4, 0.8, 1.2])
+def test_mirror_solution_of_a_yaw_is_refused(elbow, yaw):
+    # At home, yaws psi and pi - psi have the same slide positions r sin psi; the lifts differ by
+    # what the rods rise, alike for all three, which the height makes up.
+    geometry = paper_geometry(elbow)
+    home = home_position(elbow)
+
+    def yawed(angle, height):
+        return PlatformMotion.at_rest(
+            (0, 0, height), Rotation.from_rotvec((0, 0, angle)).as_quat()[None])
+
+    true = yawed(yaw, home[2])
+    q = solve_inverse_kinematics(geometry, true).position
+    level = yawed(np.pi - yaw, home[2])
+    rise = q[0, 3] - solve_inverse_kinematics(geometry, level).position[0, 3]
+    other = yawed(np.pi - yaw, home[2] + rise)
+    chains, jacobians = solve(geometry, other)
+    assert_allclose(chains.position, q, rtol=0, atol=1e-15)
+    assert np.linalg.det(jacobians.B)[0] / home_determinant(geometry) < 0
+    with pytest.raises(ConvergenceError, match='sample 0'):
+        solve_forward_kinematics(geometry, q, other)
+    assert_allclose(solve_forward_kinematics(geometry, q).position, true.position, rtol=0,
+                    atol=POSE_TOLERANCE)
+
+
+def test_other_solutions_of_random_poses_are_refused():
+    geometry = paper_geometry()
+    rng = np.random.default_rng(8)
+    position, orientation = random_poses(rng, 20)
+    true = PlatformMotion.at_rest(position, orientation)
+    q = solve_inverse_kinematics(geometry, true).position
+    sign_at_home = np.sign(home_determinant(geometry))
+    others = 0
+    for sample in range(len(q)):
+        for _ in range(8):
+            start = np.concatenate((position[sample] + rng.uniform(-0.1, 0.1, 3),
+                                    rng.normal(size=3)))
+            found = root(lambda x, s=sample: closure(geometry, q[s], x[:3], x[3:]), start)
+            if np.abs(closure(geometry, q[sample], found.x[:3], found.x[3:])).max() > 1e-10:
+                continue
+            pose = PlatformMotion.at_rest(
+                found.x[:3], Rotation.from_rotvec(found.x[3:]).as_quat()[None])
+            # The inverse takes sin u > 0: only such solutions come back to the same drives.
+            chains, jacobians = solve(geometry, pose)
+            same_elbow = np.abs(chains.position[0] - q[sample]).max() < 1e-8
+            if same_elbow and np.sign(np.linalg.det(jacobians.B)[0]) != sign_at_home:
+                others += 1
+                assert_right_or_refused(geometry, q[sample], pose, position[sample])
+    assert others >= 10
+
+
+def test_forward_from_home_finds_the_true_pose_among_several():
+    # The same search, the other way round: wherever there are rivals, home leads to the truth.
+    geometry = paper_geometry()
+    position, orientation = random_poses(np.random.default_rng(8), 20)
+    q = solve_inverse_kinematics(geometry, PlatformMotion.at_rest(position, orientation)).position
+    assert_allclose(solve_forward_kinematics(geometry, q).position, position, rtol=0,
+                    atol=POSE_TOLERANCE)
+
+
+def test_drives_that_cannot_close_the_mechanism_raise(geometry):
+    q = solve_inverse_kinematics(geometry, home_pose(geometry)).position.repeat(3, axis=0)
+    q[1, 0] += 1.0  # one slide a metre away from the others
+    with pytest.raises(ConvergenceError, match='sample 1') as caught:
+        solve_forward_kinematics(geometry, q)
+    assert caught.value.sample == 1
+
+
+@pytest.mark.parametrize('q', [
+    np.zeros(5), np.zeros((2, 7)), np.zeros((0, 6)), np.zeros((2, 3, 6)),
+    [0, 0, 0, 0.2, np.nan, 0.2], [0, 0, 0, 0.2, np.inf, 0.2], [[0, 0], [0]], [['left'] * 6]],
+    ids=['five', 'seven', 'none', 'nested', 'nan', 'infinite', 'ragged', 'words'])
+def test_drive_positions_that_are_none_raise(q):
+    with pytest.raises(MotionError, match='drive positions'):
+        solve_forward_kinematics(paper_geometry(), q)
+
+
+@pytest.mark.parametrize('pattern', [(1, 1, 1, 1, 1, 1), (1, -1, 1, -1, 1, -1)],
+                         ids=['alike', 'alternating'])
+@pytest.mark.parametrize('size', [1e3, 1e9, 1e200, 1e300])
+def test_absurd_drive_positions_raise_like_any_that_do_not_close(size, pattern):
+    # Finite, so a broken encoder may send them; the slides are too far out for any yaw.
+    with pytest.raises(ConvergenceError, match='sample 0'):
+        solve_forward_kinematics(paper_geometry(), size * np.array([pattern]))
+
+
+def test_seeds_fewer_than_samples_raise():
+    geometry = paper_geometry()
+    poses = PlatformMotion.at_rest(*random_poses(np.random.default_rng(9), 5))
+    q = solve_inverse_kinematics(geometry, poses).position
+    with pytest.raises(MotionError, match='seed'):
+        solve_forward_kinematics(geometry, q, poses[:3])
+
+
+def test_robot_whose_home_pose_is_singular_has_no_assembly_mode_to_choose():
+    # Platform joints a quarter turn on: det [B] = 0 at home, so its sign there is rounding.
+    quarter = tuple(np.asarray(paper_geometry().platform_angles) + np.pi / 2)
+    geometry = replace(paper_geometry(), platform_angles=quarter)
+    poses = PlatformMotion.at_rest(*random_poses(np.random.default_rng(10), 1))
+    q = solve_inverse_kinematics(geometry, poses).position
+    with pytest.raises(PprsError, match='home'):
+        solve_forward_kinematics(geometry, q)
+
+
+def yaw_with_share(geometry, share):
+    """Return the home pose yawed until det [B] is `share` of its value at home."""
+    def pose(yaw):
+        return PlatformMotion.at_rest(
+            home_position(geometry.elbow), Rotation.from_rotvec((0, 0, yaw)).as_quat()[None])
+
+    def excess(yaw):
+        determinant = np.linalg.det(solve(geometry, pose(yaw))[1].B)[0]
+        return determinant / home_determinant(geometry) - share
+
+    return pose(brentq(excess, 0.0, 2.0, xtol=1e-14))
+
+
+@every_elbow
+@pytest.mark.parametrize(('share', 'near'), [(0.5, False), (0.12, False), (0.08, True),
+                                             (0.01, True)])
+def test_near_branch_is_flagged_where_two_solutions_are_about_to_meet(elbow, share, near):
+    geometry = paper_geometry(elbow)
+    pose = yaw_with_share(geometry, share)
+    q = solve_inverse_kinematics(geometry, pose).position
+    found = solve_forward_kinematics(geometry, q, pose)
+    assert_allclose(found.position, pose.position, rtol=0, atol=1e-9)
+    assert bool(found.near_branch[0]) is near
+
+
+# Rates ---------------------------------------------------------------------------------------
+
+def test_velocities_and_accelerations_are_derivatives_of_positions(geometry):
+    t, h = np.linspace(0, 6, 200), 1e-3
+    middle = solve_inverse_kinematics(geometry, smooth_motion(t, geometry.elbow))
+    around = {k: solve_inverse_kinematics(geometry, smooth_motion(t + k * h, geometry.elbow))
+              for k in (-2, -1, 1, 2)}
+
+    def first(name):
+        f = {k: getattr(chains, name) for k, chains in around.items()}
+        return (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12 * h)
+
+    # O(h^4) of motions of a few rad/s, and rounding 1e-16 / h.
+    assert_allclose(middle.velocity, first('position'), rtol=0, atol=1e-9)
+    assert_allclose(middle.u_dot, first('rod_angle'), rtol=0, atol=1e-9)
+    assert_allclose(middle.acceleration, first('velocity'), rtol=0, atol=1e-8)
+    assert_allclose(middle.u_ddot, first('u_dot'), rtol=0, atol=1e-8)
+    assert np.abs(middle.u_ddot).max() > 0.5
+
+
+def test_drive_velocities_are_A_inverse_B_times_the_twist(geometry):
+    motion = random_motion(np.random.default_rng(31), 300, geometry.elbow)
+    chains, jacobians = solve(geometry, motion)
+    twist = np.concatenate((motion.linear_velocity, motion.angular_velocity), axis=1)
+    assert_allclose(np.einsum('nij,nj->ni', jacobians.B, twist), jacobians.A * chains.velocity,
+                    rtol=0, atol=1e-13)
+    assert_allclose(np.einsum('nij,nj->ni', jacobians.J, chains.velocity), twist, rtol=0,
+                    atol=1e-12)
+    assert_allclose(np.einsum('nij,nj->ni', jacobians.J_u, chains.velocity), chains.u_dot,
+                    rtol=0, atol=1e-12)
+
+
+# Jacobians -----------------------------------------------------------------------------------
+
+@pytest.mark.parametrize('seed', range(5))
+def test_A_and_B_are_derivatives_of_the_closure_equations(geometry, seed):
+    pose = random_motion(np.random.default_rng([40, seed]), 1, geometry.elbow)
+    chains, jacobians = solve(geometry, pose)
+    q = chains.position[0]
+
+    def of_pose(change):
+        near = moved(pose, change)
+        return closure(geometry, q, near.position[0], rotation_vector(near))
+
+    def of_drives(change):
+        return closure(geometry, q + change, pose.position[0], rotation_vector(pose))
+
+    assert_allclose(jacobians.B[0], central_difference(of_pose, 6), rtol=0,
+                    atol=DIFFERENCE_TOLERANCE)
+    assert_allclose(np.diag(-jacobians.A[0]), central_difference(of_drives, 6), rtol=0,
+                    atol=DIFFERENCE_TOLERANCE)
+    assert_allclose(jacobians.B_inverse[0] @ jacobians.B[0], np.eye(6), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_J_and_J_u_are_derivatives_of_forward_kinematics(geometry, seed):
+    pose = random_motion(np.random.default_rng([41, seed]), 1, geometry.elbow)
+    chains, jacobians = solve(geometry, pose)
+    back = Rotation.from_quat(pose.orientation[0]).inv()
+
+    def platform_and_rods(change):
+        found = solve_forward_kinematics(geometry, chains.position + change, pose)
+        near = PlatformMotion.at_rest(found.position, found.orientation)
+        turn = (Rotation.from_quat(found.orientation[0]) * back).as_rotvec()
+        return np.concatenate((found.position[0], turn,
+                               solve_inverse_kinematics(geometry, near).rod_angle[0]))
+
+    # The pose is known to some 1e-13, which the step makes 1e-9; a larger step would let the
+    # fifth derivative in, which is large where a platform of 0.1 m is poorly held.
+    difference = central_difference(platform_and_rods, 6, step=2e-4)
+    assert_allclose(jacobians.J[0], difference[:6], rtol=0, atol=1e-7)
+    assert_allclose(jacobians.J_omega[0], difference[3:6], rtol=0, atol=1e-7)
+    assert_allclose(jacobians.J_u[0], difference[6:], rtol=0, atol=1e-7)
+
+
+def test_J_u_is_that_of_constant_distances_between_the_spherical_joints(geometry):
+    # Eq. (10) the paper's way: (A_i - A_j) . (v_Ai - v_Aj) = 0 for the three pairs, with
+    # v_Ai = q_dot_i n_i + q_dot_(i+3) k + l u_dot_i (sin u_i e_i + cos u_i k).
+    motion = random_motion(np.random.default_rng(42), 200, geometry.elbow)
+    chains, jacobians = solve(geometry, motion)
+    e, n = chain_vectors(geometry)
+    k, l = np.array([0.0, 0.0, 1.0]), geometry.rod_length  # noqa: E741
+    for sample in range(len(motion)):
+        q, c, s = chains.position[sample], chains.cos_u[sample], chains.sin_u[sample]
+        A = (geometry.base_radius * e + q[:3, None] * n + q[3:, None] * k
+             + l * (-c[:, None] * e + s[:, None] * k))
+        swing = l * (s[:, None] * e + c[:, None] * k)
+        A_u, B_u = np.zeros((3, 6)), np.zeros((3, 3))
+        for row, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+            apart = A[i] - A[j]
+            for chain, side in ((i, 1.0), (j, -1.0)):
+                A_u[row, chain] = side * apart @ n[chain]
+                A_u[row, chain + 3] = side * apart @ k
+                B_u[row, chain] = -side * apart @ swing[chain]
+        assert_allclose(jacobians.J_u[sample], np.linalg.solve(B_u, A_u), rtol=0, atol=1e-11)
+
+
+def test_condition_number_takes_rotations_times_the_platform_radius():
+    robot = random_robot(np.random.default_rng(43))
+    motion = random_motion(np.random.default_rng(44), 50)
+    model = model_of(robot)
+    J = model.mechanism(motion).jacobians.J.copy()
+    J[:, 3:] *= robot.geometry.platform_radius
+    assert_allclose(model.condition_number(motion), np.linalg.cond(J), rtol=1e-10)
+    assert_allclose(condition_number(robot.geometry, model.mechanism(motion).jacobians.J),
+                    np.linalg.cond(J), rtol=1e-10)
+
+
+# Out of reach and singular -------------------------------------------------------------------
+
+@every_elbow
+@pytest.mark.parametrize('chain', [1, 2, 3])
+def test_pose_out_of_reach_names_sample_chain_and_rod_length(elbow, chain):
+    model = paper_model({'geometry.elbow': elbow})
+    away = -0.26 * chain_vectors(model.robot.geometry)[0][chain - 1]  # from this carriage
+    motion = PlatformMotion.at_rest([home_position(elbow), home_position(elbow) + away])
+    with pytest.raises(WorkspaceError, match=rf'chain {chain}\b') as caught:
+        model.drive_forces(motion)
+    assert not isinstance(caught.value, SingularityError)
+    assert caught.value.sample == 1
+    assert 'geometry.rod_length = 0.3 m' in str(caught.value)
+    # R - A . e = 0.15 - (0.10 - 0.26) m.
+    assert '0.31 m' in str(caught.value)
+
+
+@every_elbow
+@pytest.mark.parametrize('chain', [1, 2, 3])
+def test_horizontal_rod_raises_singularity(elbow, chain):
+    model = paper_model({'geometry.elbow': elbow})
+    away = -0.25 * chain_vectors(model.robot.geometry)[0][chain - 1]
+    motion = PlatformMotion.at_rest(home_position(elbow) + away * (1 - 1e-6))
+    with pytest.raises(SingularityError, match=rf'chain {chain}\b') as caught:
+        model.drive_forces(motion)
+    assert '0.05' in str(caught.value)  # limits.rod_sine
+    assert_allclose(np.abs(solve_inverse_kinematics(
+        model.robot.geometry, motion, 1e-9).sin_u[0, chain - 1]), 0, atol=2e-3)
+
+
+@every_elbow
+def test_pose_at_which_the_drives_cannot_hold_the_platform_raises(elbow):
+    model = paper_model({'geometry.elbow': elbow})
+    pose = yaw_with_share(model.robot.geometry, 0.0)
+    moving = PlatformMotion.at_rest(np.concatenate((
+        home_position(elbow)[None], pose.position)), np.concatenate((
+            [[0, 0, 0, 1]], pose.orientation)))
+    with pytest.raises(SingularityError, match=r'condition_number|det \[B\]') as caught:
+        model.drive_forces(moving)
+    assert caught.value.sample == 1
+
+
+@every_elbow
+def test_condition_limit_is_where_it_says(elbow):
+    geometry = paper_geometry(elbow)
+    pose = yaw_with_share(geometry, 0.2)
+    number = float(paper_model({'geometry.elbow': elbow, 'limits.condition_number': 1e6})
+                   .condition_number(pose)[0])
+    above = {'geometry.elbow': elbow, 'limits.condition_number': number * (1 + 1e-9)}
+    below = {'geometry.elbow': elbow, 'limits.condition_number': number * (1 - 1e-9)}
+    assert np.all(np.isfinite(paper_model(above).drive_forces(pose).total))
+    with pytest.raises(SingularityError, match='condition number'):
+        paper_model(below).drive_forces(pose)
+
+
+def test_exactly_singular_B_raises_even_without_a_limit():
+    geometry = paper_geometry()
+    chains = chain_table(geometry, PlatformMotion.at_rest(home_position()), 1e-6)
+    # Joints of the platform on top of each other: no moment about any axis through them.
+    chains[:, :9] = 0.0
+    with pytest.raises(SingularityError, match=r'det \[B\]'):
+        inverse_table(geometry, chains, np.inf)

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Trajectories without twists or accelerations: rejected, or taken from a spline."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
+from random_states import smooth_motion
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.physics.mechanism.pose_spline import spline_derivatives
+from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.trajectory_request import read_trajectory
+
+TIMES = np.arange(0.0, 1.0, 0.01)
+SMOOTH = smooth_motion(TIMES)
+
+
+def without(motion: PlatformMotion, *fields: str, points: slice | None = None,
+            ) -> MultiDOFJointTrajectory:
+    message = message_of(motion)
+    for point in message.points[points or slice(None)]:
+        for field in fields:
+            setattr(point, field, [])
+    return message
+
+
+def motion_of(message: MultiDOFJointTrajectory) -> PlatformMotion:
+    return read_trajectory(message, 1, missing='spline').motion
+
+
+def test_the_spline_gives_the_derivatives_of_a_motion_known_in_closed_form() -> None:
+    motion = motion_of(without(SMOOTH, 'velocities', 'accelerations'))
+    # Poses at 100 Hz of motions of 3 rad/s: truncation of quintic splines. The ends matter: the
+    # first point is the one that is executed.
+    for name, inner, ends in (('linear_velocity', 1e-9, 1e-8), ('angular_velocity', 1e-9, 1e-8),
+                              ('linear_acceleration', 1e-8, 1e-6),
+                              ('angular_acceleration', 1e-7, 1e-5)):
+        error = np.abs(getattr(motion, name) - getattr(SMOOTH, name)).max(axis=1)
+        assert error[10:-10].max() < inner, name
+        assert error.max() < ends, name
+
+
+def test_what_is_given_is_kept_and_only_what_is_missing_is_filled() -> None:
+    altered = PlatformMotion(
+        SMOOTH.position, SMOOTH.orientation, SMOOTH.linear_velocity + 0.01,
+        SMOOTH.angular_velocity, SMOOTH.linear_acceleration, SMOOTH.angular_acceleration, TIMES)
+    motion = motion_of(without(altered, 'accelerations'))
+    np.testing.assert_array_equal(motion.linear_velocity, altered.linear_velocity)
+    np.testing.assert_allclose(motion.linear_acceleration[10:-10],
+                               SMOOTH.linear_acceleration[10:-10], rtol=0, atol=1e-8)
+    some = motion_of(without(altered, 'velocities', points=slice(20, 30)))
+    np.testing.assert_array_equal(some.linear_velocity[:20], altered.linear_velocity[:20])
+    np.testing.assert_array_equal(some.linear_acceleration, altered.linear_acceleration)
+    np.testing.assert_allclose(some.linear_velocity[20:30], SMOOTH.linear_velocity[20:30],
+                               rtol=0, atol=1e-8)
+
+
+def test_a_turn_beyond_every_euler_angle_and_quaternion_sign_is_smooth() -> None:
+    # A constant rate about a tilted axis: quaternions of either sign, a full turn and more.
+    axis, rate = np.array([0.6, 0.0, 0.8]), 2.0
+    angle = rate * np.arange(0, 4.0, 0.02)
+    quaternion = np.column_stack((np.outer(np.sin(angle / 2), axis), np.cos(angle / 2)))
+    quaternion[::3] *= -1
+    position = np.zeros((len(angle), 3))
+    velocity, acceleration = spline_derivatives(angle / rate, position, quaternion)
+    np.testing.assert_allclose(velocity[:, 3:], np.tile(rate * axis, (len(angle), 1)), atol=1e-8)
+    np.testing.assert_allclose(acceleration[:, 3:], 0, atol=1e-6)
+
+
+@pytest.mark.parametrize('fields', [('velocities',), ('accelerations',),
+                                    ('velocities', 'accelerations')])
+def test_too_few_points_and_the_policy_reject_refuse_with_the_code_size(
+    fields: tuple[str, ...],
+) -> None:
+    for motion, policy in ((SMOOTH[:3], 'spline'), (SMOOTH[:1], 'spline'), (SMOOTH, 'reject')):
+        with pytest.raises(Rejection, match=r'^SIZE: point 0 has 0'):
+            read_trajectory(without(motion, *fields), 1, missing=policy)
+    motion_of(without(SMOOTH[:4], *fields))
+
+
+def test_two_twists_or_no_pose_are_refused_even_so() -> None:
+    message = message_of(SMOOTH)
+    message.points[3].velocities = [message.points[3].velocities[0]] * 2
+    with pytest.raises(Rejection, match=r'^SIZE: point 3 has 2 velocities'):
+        motion_of(message)
+    with pytest.raises(Rejection, match=r'^SIZE: point 0 has 0 transforms'):
+        motion_of(without(SMOOTH, 'transforms'))
+
+
+def test_poses_that_no_spline_can_follow_are_rejected_and_nothing_else_happens() -> None:
+    rng = np.random.default_rng(4)
+    for seconds in ([0, 1, 2, 3], [0, 0, 2**31 - 5, 2**31 - 2]):
+        message = without(random_motion(rng, 4), 'velocities', 'accelerations')
+        for k, (point, second) in enumerate(zip(message.points, seconds, strict=True)):
+            point.time_from_start.sec, point.time_from_start.nanosec = second, k
+        message.points[2].transforms[0].translation.x = 1e308
+        message.points[3].transforms[0].translation.x = -1e308
+        with pytest.raises(Rejection, match=r'^OUTPUT'):
+            motion_of(message)
+
+
+def test_the_node_answers_a_pose_trajectory_as_a_whole_and_its_first_point() -> None:
+    expected = DriveModel.load().drive_forces(SMOOTH)
+    with feedforward_bench(missing_derivatives='spline') as node:
+        first = node.answer(without(SMOOTH, 'velocities', 'accelerations'))
+        assert node.bench.spin_until(lambda: node.joint_trajectory)
+        effort = np.array([point.effort for point in node.joint_trajectory[-1].points])
+        np.testing.assert_allclose(first, effort[0], rtol=0, atol=EQUAL)
+        # Errors of 1e-5 in accelerations, and velocities of 1e-8 under a reversal of 1e-3 m/s.
+        np.testing.assert_allclose(effort, expected.total, rtol=0, atol=1e-4)
+        node.send(without(SMOOTH[:1], 'velocities'))
+        assert node.counters['SIZE'] == 1
+
+
+@pytest.mark.parametrize('missing', ['reject', 'spline'])
+def test_splines_are_loaded_before_messages_and_only_where_they_are_asked_for(missing: str) -> None:
+    code = (
+        'import sys\n'
+        'from pprs_dynamics import DriveModel\n'
+        'from pprs_dynamics.physics.model.preparation import prepare\n'
+        'from pprs_dynamics.ros.answer import Feedforward\n'
+        'from pprs_dynamics.ros.feedforward_settings import parameters_for\n'
+        'model = DriveModel.load()\n'
+        'prepare(model)\n'
+        'own = {each.name: each.default for each in parameters_for(6)}\n'
+        f'Feedforward(model, own | {{"missing_derivatives": {missing!r}}})\n'
+        'print("scipy.interpolate" in sys.modules)\n')
+    found = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == [str(missing == 'spline')]

@@ -1,0 +1,257 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Model files: what is accepted, and what each mistake is told as."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.physics.model.keys import KEYS
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
+
+PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
+
+
+def written(folder: Path, changes: dict[str, Any], removed: tuple[str, ...] = ()) -> Path:
+    """Write the paper's model with changes, flat keys side by side, as ROS 2 also reads them."""
+    flat = {**default_parameters(), **changes}
+    for name in removed:
+        del flat[name]
+    file = folder / 'model.yaml'
+    file.write_text(yaml.safe_dump({'/**': {'ros__parameters': flat}}))
+    return file
+
+
+def test_the_default_model_is_the_papers_robot() -> None:
+    robot = DriveModel.load().robot
+    assert (robot.geometry.base_radius, robot.geometry.platform_radius,
+            robot.geometry.rod_length) == (0.15, 0.10, 0.30)
+    assert robot.masses.total == 2.0
+    friction = DriveModel.load().values
+    mu_p, s, d_r = 0.1, 0.00005, 0.01
+    assert friction['friction.revolute.coulomb'] == pytest.approx(
+        mu_p + 2 * s / d_r / np.sqrt(1 + mu_p ** 2), abs=1e-5)
+    assert friction['friction.spherical.coulomb'] == pytest.approx(mu_p / 3, abs=1e-6)
+
+
+def test_every_key_of_the_file_is_declared_and_every_declared_key_stands_in_the_file() -> None:
+    assert set(read_parameters(PAPER)) == set(KEYS)
+
+
+def test_the_package_finds_its_own_model_from_any_folder(tmp_path: Path) -> None:
+    code = ('from pprs_dynamics import DriveModel; '
+            'print(DriveModel.load("config/paper.yaml").robot.masses.total)')
+    found = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, capture_output=True,
+                           text=True, check=True)
+    assert found.stdout.strip() == '2.0'
+
+
+def test_limits_tolerances_effects_and_node_keys_are_optional(tmp_path: Path) -> None:
+    limits = tuple(name for name in KEYS if name.startswith('limits.'))
+    file = written(tmp_path, {'max_age': 0.2, 'tolerances.masses.payload': 0.05,
+                              'effects.active': []}, limits)
+    model = DriveModel.load(file)
+    assert model.limits.effort == (100.0,) * 6
+    assert [effect.name for effect in model.effects] == ['active_friction', 'passive_friction']
+
+
+def test_added_effects_are_summed_as_their_own_part(tmp_path: Path) -> None:
+    model = DriveModel.load(written(tmp_path, {
+        'effects': {'active': ['effort_offset'], 'effort_offset': {'slide_3': {'force': -0.7}},
+                    'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.01}}}}))
+    forces = model.drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
+    assert list(forces.parts) == ['rigid_body', 'active_friction', 'passive_friction',
+                                  'effort_offset']
+    np.testing.assert_array_equal(forces.parts['effort_offset'], [[0, 0, -0.7, 0, 0, 0]])
+
+
+WRONG = [
+    ('geometry.rod_length', -0.3, 'greater than 0'),
+    ('geometry.rod_length', 'long', 'be a number'),
+    ('geometry.rod_length', True, 'be a number'),
+    ('geometry.rod_length', float('nan'), 'be finite'),
+    ('geometry.elbow', 'sideways', 'one of up, down'),
+    ('geometry.chain_angles', [0.0, 0.0, 1.0], 'three different directions'),
+    ('geometry.chain_angles', [0.0, 1.0], 'list of 3'),
+    ('masses.payload', -1.0, 'at least 0'),
+    ('masses.rods', 0.2, 'list of 3'),
+    ('masses.slides', [0.5, 0.5, -0.5], 'at least 0'),
+    ('masses.inertia', [0.005, 0.005, 0.02, 0.0, 0.0, 0.0], 'sum to at least the third'),
+    ('masses.inertia', [0.005, 0.005, 0.01, 0.009, 0.0, 0.0], 'positive semi-definite'),
+    ('friction.approach', 'third', 'one of whole_mechanism, independent_chains'),
+    ('friction.reversal_velocity', 0.0, 'greater than 0'),
+    ('friction.drives.coulomb', [0.05] * 5, 'list of 6'),
+    ('limits.slide_stroke', [0.3, -0.3], 'a lower and a higher position'),
+    ('limits.effort', [100.0, 0.0, 100.0, 100.0, 100.0, 100.0], 'greater than 0'),
+    ('equations', 'correct', 'one of corrected, printed'),
+    ('masses.paylod', 1.0, r'unknown key masses\.paylod \(did you mean masses\.payload\?\)'),
+    ('tolerances.masses.paylod', 0.1, r'unknown key tolerances\.masses\.paylod \(did you mean '
+     r'tolerances\.masses\.payload\?\)'),
+    ('tolerances.masses.payload', 5.0, 'between 0 and 1'),
+    ('effects.active', ['stribeck'], r'unknown effect stribeck \(did you mean stribeck_friction\?'),
+    ('effects.active', ['stribeck_friction'], 'be given'),
+    ('effects.active', 'stribeck_friction', 'list of names'),
+    ('effects.active', 5, 'list of names'),
+    ('effects.active', True, 'list of names'),
+    ('effects.active', [1.0], 'list of names'),
+    ('effects.effort_offset', 3, 'map drives to parameters'),
+    ('geometry.rod_length', 10 ** 400, 'be finite'),
+    ('geometry.rod_length', 0.01, 'greater than 0.05 m, for the platform to stand'),
+    ('limits', 5, 'unknown key limits'),
+    ('bogus', None, 'unknown key bogus'),
+    ('effects.effort_offset.lift_9.force', 1.0, r'unknown drive lift_9 \(known: slide_1, '
+     r'slide_2, slide_3, lift_1'),
+    ('effects.effort_offset.lift_1.strength', 1.0, r'unknown key effects\.effort_offset\.lift_1\.'
+     r'strength \(known: effects\.effort_offset\.lift_1\.force\)'),
+    ('effects.effort_offset.lift_1.force', 'strong', 'be a number'),
+    ('effects.stribeck_friction.lift_1.velocity', -0.01, r'between 1e-06 and 10 \('),
+]
+
+
+@pytest.mark.parametrize(('key', 'value', 'rule'), WRONG)
+def test_a_wrong_value_is_told_with_file_key_value_and_rule(
+    tmp_path: Path, key: str, value: object, rule: str,
+) -> None:
+    file = written(tmp_path, {key: value})
+    with pytest.raises(ModelError, match=rule) as caught:
+        DriveModel.load(file)
+    message = str(caught.value)
+    assert message.startswith(f'{file}: ')
+    assert '\n' not in message
+    if value == ['stribeck_friction']:
+        # The list is right; what it needs is missing.
+        assert 'effects.stribeck_friction is missing' in message
+    elif 'unknown' not in message:
+        # A whole block is named where its drive is wrong: effects.effort_offset.lift_9.
+        assert '.'.join(key.split('.')[:3]) in message
+        assert str(value)[:100] in message
+
+
+@pytest.mark.parametrize('key', [name for name, key in KEYS.items() if key.default is None])
+def test_a_missing_key_is_told(tmp_path: Path, key: str) -> None:
+    with pytest.raises(ModelError, match=f'{re.escape(key)} is missing, must'):
+        DriveModel.load(written(tmp_path, {}, (key,)))
+
+
+FOREIGN = {
+    'empty': b'', 'no mapping': b'- 1\n- 2\n', 'binary': bytes(range(256)),
+    'not yaml': b'a: [1, 2\nb: }', 'no ros__parameters': b'/**:\n  geometry: {}\n',
+    'key twice': b'/**:\n  ros__parameters:\n    equations: corrected\n    equations: printed\n',
+    'a list as key': b'/**:\n  ros__parameters:\n    ? [a, b]\n    : 1\n',
+    'braces': b'/**:\n  ros__parameters:\n    rod_length: {{ l }}\n',
+    'itself': b'/**: &a\n  ros__parameters: {b: *a}\n',
+    'model of one node': (b'/**: {ros__parameters: {equations: corrected}}\n'
+                          b'feedforward: {ros__parameters: {masses: {payload: 9.0}}}\n'),
+    'two nodes': b'a: {ros__parameters: {}}\nb: {ros__parameters: {}}\n'}
+
+
+@pytest.mark.parametrize('content', FOREIGN.values(), ids=FOREIGN.keys())
+def test_a_foreign_file_is_one_clear_sentence(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / 'model.yaml'
+    file.write_bytes(content)
+    with pytest.raises(UnreadableFileError) as caught:
+        DriveModel.load(file)
+    assert str(caught.value).startswith(f'{file}: ')
+    assert '\n' not in str(caught.value)
+
+
+def test_a_missing_file_and_a_folder_are_one_clear_sentence(tmp_path: Path) -> None:
+    for path in (tmp_path / 'nowhere.yaml', Path('nowhere.yaml'), tmp_path):
+        with pytest.raises(UnreadableFileError, match=str(path)):
+            DriveModel.load(path)
+
+
+def test_lists_that_ros_would_refuse_are_refused_here_too(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r'write 0\.0, not 0'):
+        DriveModel.load(written(tmp_path, {'masses.centre': [0, 0.001, 0.0]}))
+
+
+@pytest.mark.parametrize('number', ['1e-3', '1.0e-3', '.1E-2', '0.001', '+1e-3'])
+def test_numbers_are_those_that_ros_reads(tmp_path: Path, number: str) -> None:
+    text = PAPER.read_text().replace('reversal_velocity: 0.001', f'reversal_velocity: {number}')
+    file = tmp_path / 'model.yaml'
+    file.write_text(text)
+    assert DriveModel.load(file).reversal.velocity == 1e-3
+
+
+def test_a_key_given_nested_and_with_dots_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / 'model.yaml'
+    file.write_text(PAPER.read_text() + '    masses.payload: 3.0\n')
+    with pytest.raises(ModelError, match=r'masses\.payload is 3\.0, must stand once'):
+        DriveModel.load(file)
+
+
+def test_an_effect_cannot_be_a_value_and_a_block_at_once() -> None:
+    values = {**DriveModel.load().values, 'effects.effort_offset.lift_1.force': 1.0}
+    with pytest.raises(ModelError, match='keys stand below it'):
+        build_model({**values, 'effects.effort_offset': 3})
+
+
+def test_blocks_left_empty_say_nothing(tmp_path: Path) -> None:
+    model = DriveModel.load(written(tmp_path, {'tolerances': None, 'effects': {}}))
+    assert len(model.effects) == 2
+
+
+JUNK = st.one_of(
+    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5),
+    st.lists(st.one_of(st.floats(), st.integers(), st.text(max_size=3)), max_size=6))
+NAMES = st.one_of(
+    st.sampled_from([*KEYS, 'effects.active', 'effects.effort_offset.lift_1.force',
+                     'effects.hysteresis.slide_1', 'effects', 'history.step_01.effect']),
+    st.from_regex(r'(effects|tolerances|history|masses)(\.[a-z_1]{0,8}){0,3}', fullmatch=True))
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.dictionaries(NAMES, JUNK, min_size=1, max_size=4))
+def test_whatever_a_parameter_is_set_to_gives_a_model_or_one_of_our_errors(
+    changes: dict[str, object],
+) -> None:
+    # In a node every other exception would end the feedforward of a moving robot.
+    try:
+        model = build_model({**DriveModel.load().values, **changes})
+        # A platform of 1e-166 m is a model, and singular everywhere.
+        forces = model.drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
+    except PprsError:
+        pass
+    else:
+        assert forces.total.shape == (1, 6)
+
+
+def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
+    model = DriveModel.load(written(tmp_path, {'masses.payload': 2, 'masses.slides': [1, 1, 1]}))
+    assert model.robot.masses.payload == 2.0
+
+
+def test_a_model_can_be_built_again_from_its_own_values() -> None:
+    values = {**DriveModel.load().values, 'effects.active': ['effort_offset'],
+              'effects.effort_offset.lift_1.force': 0.3}
+    once = build_model(values)
+    again = build_model(once.values)
+    motion = PlatformMotion.at_rest((0.01, 0.02, 0.5))
+    np.testing.assert_array_equal(once.drive_forces(motion).total, again.drive_forces(motion).total)
+
+
+def test_an_unreadable_file_is_told(tmp_path: Path) -> None:
+    if os.geteuid() == 0:
+        # Permissions do not bind root; a file in place of a folder does.
+        blocked = written(tmp_path, {}) / 'below.yaml'
+    else:
+        blocked = written(tmp_path, {})
+        blocked.chmod(0)
+    with pytest.raises(UnreadableFileError, match=re.escape(str(blocked))):
+        DriveModel.load(blocked)

@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Model files written: read back exactly, by us and by ROS 2; whole or not at all."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.model_writer import edit_model, format_model, write_model
+from pprs_dynamics.physics.model.parameter_file import (
+    default_parameters,
+    parse_parameters,
+    read_parameters,
+)
+from pprs_dynamics.system.atomic_file import write_text
+
+PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
+# Numbers whose shortest text is a trap: whole, tiny, huge, not representable, negative zero.
+AWKWARD = (1.0, 1e-05, 2.5e-300, 1e22, 123456789.123456789, 0.1, -0.0, 1e300)
+ADDED = {
+    'effects.active': ['stribeck_friction', 'payload_offset'],
+    'effects.stribeck_friction.lift_1.force': 1e-05,
+    'effects.stribeck_friction.lift_1.velocity': 0.012345678901234567,
+    'effects.payload_offset.x': 0.004, 'effects.payload_offset.y': -0.0,
+    'effects.payload_offset.z': 1e-3,
+    'tolerances.masses.payload': 0.05,
+    'history.step_01.effect': 'yes', 'history.step_01.forced': True,
+    'history.step_01.recordings': ['a: b #c.csv', '1e3', 'null', 'ü"\\', ''],
+    'history.step_01.values': list(AWKWARD),
+}
+
+
+def values_of(**changes: Any) -> dict[str, Any]:
+    return dict(build_model({**default_parameters(), **ADDED, **changes}).values)
+
+
+def plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value
+            for key, value in values.items()}
+
+
+def ros_parameters(file: Path) -> dict[str, Any]:
+    """Return what ROS 2's own parser makes of a file."""
+    context = Context()
+    rclpy.init(context=context, args=['--ros-args', '--params-file', str(file)])
+    try:
+        node = Node('any', context=context, allow_undeclared_parameters=True,
+                    automatically_declare_parameters_from_overrides=True)
+        found = {name: parameter.value for name, parameter
+                 in node.get_parameters_by_prefix('').items()}
+        node.destroy_node()
+    finally:
+        context.try_shutdown()
+    return {name: list(value) if hasattr(value, 'tolist') or isinstance(value, tuple) else value
+            for name, value in found.items()}
+
+
+def test_what_is_written_is_read_back_exactly(tmp_path: Path) -> None:
+    values = values_of()
+    write_model(tmp_path / 'model.yaml', values)
+    assert read_parameters(tmp_path / 'model.yaml') == plain(values)
+    assert DriveModel.load(tmp_path / 'model.yaml').values == values
+
+
+def test_ros_reads_the_same_numbers_and_words(tmp_path: Path) -> None:
+    file = tmp_path / 'model.yaml'
+    values = values_of()
+    write_model(file, values)
+    found = ros_parameters(file)
+    assert {key: found[key] for key in values} == plain(values)
+    assert all(type(found[key]) is float for key, value in values.items()
+               if isinstance(value, float))
+
+
+def test_an_edited_file_differs_in_what_changed_and_nothing_else() -> None:
+    text = PAPER.read_text()
+    values = values_of(**{'masses.payload': 1.23456, 'masses.slides': [0.5, 0.51, 0.5]})
+    edited = edit_model(text, values)
+    taken = [line[1:] for line in difflib.ndiff(text.splitlines(), edited.splitlines())
+             if line.startswith('- ')]
+    assert [line.split(':')[0].strip() for line in taken] == ['payload', 'slides']
+    assert '# m, the manipulated object' in edited
+    assert '# F_s, breakaway force beyond Coulomb friction [N]' in edited
+    # What is taken back leaves not a byte behind.
+    assert edit_model(edited.replace('    tolerances.masses.payload: 0.05\n', ''),
+                      default_parameters()) == text
+
+
+FORMS: dict[str, Callable[[str], str]] = {
+    'four spaces': lambda text: re.sub(r'^ +', lambda m: 2 * m.group(), text, flags=re.M),
+    'spaces in brackets': lambda text: text.replace('[0.5, 0.5, 0.5]', '[ 0.5, 0.5, 0.5 ]'),
+    'values in a column': lambda text: re.sub(
+        r'(base_radius|platform_radius|rod_length): ', lambda m: f'{m[1]}:'.ljust(18), text),
+    'list over lines': lambda text: text.replace('[0.0, 2.0943951023931953, ',
+                                                 '[0.0, 2.0943951023931953,\n        ', 1),
+    'null': lambda text: text + '    file: ~\n',
+    'exponent': lambda text: text.replace('reversal_velocity: 0.001', 'reversal_velocity: .1E-2'),
+    'start of document': lambda text: '---\n' + text,
+    'anchor': lambda text: text.replace('lifts: [', 'lifts: &same ['),
+    'quotes': lambda text: text.replace('whole_mechanism ', "'whole_mechanism' ")}
+
+
+@pytest.mark.parametrize('form', FORMS)
+def test_an_edit_changes_one_line_of_a_file_of_any_form(form: str) -> None:
+    text = FORMS[form](PAPER.read_text())
+    values = parse_parameters(text)
+    edited = edit_model(text, {**values, 'masses.payload': 1.23456})
+    lines, new = text.splitlines(), edited.splitlines()
+    changed = [k for k, (old, line) in enumerate(zip(lines, new, strict=True)) if old != line]
+    assert [lines[k].split(':')[0].strip() for k in changed] == ['payload']
+
+
+def test_a_file_written_anew_names_every_key_with_its_unit() -> None:
+    text = format_model(build_model(default_parameters()).values)
+    assert '  # l, length of the guiding rods [m]' in text
+    assert [line for line in text.splitlines() if line.startswith('    masses:')]
+
+
+def test_keys_of_nodes_and_other_nodes_blocks_stay(tmp_path: Path) -> None:
+    base = tmp_path / 'base.yaml'
+    base.write_text(PAPER.read_text() + '    max_age: 0.5  # of the node\n'
+                    'monitor:\n  ros__parameters:\n    window: 0.2\n')
+    write_model(tmp_path / 'new.yaml', values_of(), base)
+    text = (tmp_path / 'new.yaml').read_text()
+    assert 'max_age: 0.5  # of the node\n' in text
+    assert 'monitor:\n  ros__parameters:\n    window: 0.2\n' in text
+    assert DriveModel.load(tmp_path / 'new.yaml').values == values_of()
+
+
+@pytest.mark.parametrize('form', ['dots', 'flow', 'block_lists', 'no_newline'])
+def test_files_of_every_form_come_out_right(tmp_path: Path, form: str) -> None:
+    base, values = tmp_path / 'base.yaml', default_parameters()
+    flat = ', '.join(f'{key}: {value}' for key, value in values.items())
+    text = {
+        'dots': '/**:\n  ros__parameters:\n' + ''.join(
+            f'    {key}: {value}\n' for key, value in values.items()),
+        'flow': f'{{/**: {{ros__parameters: {{{flat}}}}}, '
+                'monitor: {ros__parameters: {window: 0.2}}}\n',
+        'block_lists': PAPER.read_text().replace(
+            'slides: [0.5, 0.5, 0.5] ', 'slides:\n        - 0.5\n        - 0.5\n        - 0.5 '),
+        'no_newline': format_model(build_model(values).values).rstrip('\n')}[form]
+    base.write_text(text)
+    wanted = values_of(**{'masses.slides': [0.4, 0.5, 0.5]})
+    write_model(tmp_path / 'new.yaml', wanted, base)
+    assert DriveModel.load(tmp_path / 'new.yaml').values == wanted
+    assert ('window: 0.2' in (tmp_path / 'new.yaml').read_text()) == (form == 'flow')
+    assert ros_parameters(tmp_path / 'new.yaml')['masses.slides'] == [0.4, 0.5, 0.5]
+
+
+def test_no_model_is_no_file(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r'masses\.payload is -1'):
+        write_model(tmp_path / 'model.yaml', {**default_parameters(), 'masses.payload': -1.0})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('link', ['same', 'symbolic', 'hard'])
+def test_the_model_itself_is_never_the_output(tmp_path: Path, link: str) -> None:
+    base, output = tmp_path / 'base.yaml', tmp_path / 'output.yaml'
+    base.write_text(PAPER.read_text())
+    if link == 'same':
+        output = base
+    elif link == 'symbolic':
+        output.symlink_to(base)
+    else:
+        os.link(base, output)
+    with pytest.raises(ModelError, match='another file than the model'):
+        write_model(output, default_parameters(), base)
+    assert base.read_text() == PAPER.read_text()
+
+
+def write_in_process(file: Path, before: str, setup: Any = None) -> int:
+    """Write a file in a process of its own in which something goes wrong."""
+    code = (f'{before}\nfrom pprs_dynamics.system.atomic_file import write_text\n'
+            f'write_text({str(file)!r}, "new " * 100_000)')
+    return subprocess.run([sys.executable, '-c', code], capture_output=True,
+                          preexec_fn=setup).returncode
+
+
+@pytest.mark.parametrize(('moment', 'nameless'), [
+    ('fsync', True), ('link', True), ('replace', True), ('fsync', False), ('replace', False)])
+def test_a_kill_in_mid_write_leaves_the_old_file_whole(
+    tmp_path: Path, moment: str, nameless: bool,
+) -> None:
+    old = tmp_path / 'model.yaml'
+    old.write_text('old')
+    before = (f'import os, signal\nos.{moment} = lambda *a, **k: '
+              'os.kill(os.getpid(), signal.SIGKILL)')
+    if not nameless:
+        before += '\ndel os.O_TMPFILE'
+    assert write_in_process(old, before) == -signal.SIGKILL
+    assert old.read_text() == 'old'
+    if nameless and moment != 'replace':
+        # A file without a name vanishes with the process.
+        assert list(tmp_path.iterdir()) == [old]
+
+
+@pytest.mark.parametrize('nameless', [True, False])
+def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path, nameless: bool) -> None:
+    old = tmp_path / 'model.yaml'
+    old.write_text('old')
+    assert write_in_process(
+        old, '' if nameless else 'import os; del os.O_TMPFILE',
+        lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))) == 1
+    assert old.read_text() == 'old'
+    assert list(tmp_path.iterdir()) == [old]
+
+
+def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
+    write_text(tmp_path / 'new.yaml', 'text')
+    (tmp_path / 'plain.yaml').write_text('text')
+    assert (tmp_path / 'new.yaml').stat().st_mode == (tmp_path / 'plain.yaml').stat().st_mode
+
+
+def test_a_folder_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableFileError, match='cannot be written: No such file'):
+        write_text(tmp_path / 'nowhere' / 'new.yaml', 'text')

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Drive forces against two physics engines that share no kinematics with the package."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+# Only a missing library skips these tests; a broken oracle must fail.
+from oracles.mujoco_robot import MujocoRobot
+from oracles.pinocchio_robot import PinocchioRobot
+from random_states import ELBOWS, model_of, paper_model, random_motion, random_robot
+
+from pprs_dynamics import PlatformMotion
+
+ENGINES = {'mujoco': MujocoRobot, 'pinocchio': PinocchioRobot}
+STATES = 1000
+# Forces of some 40 N carry rounding errors near 1e-14 N; a wrong term shows at 1e-3 N or more.
+FORCE_TOLERANCE = 1e-10
+GRAVITIES = {'upright': (0.0, 0.0, -9.81), 'oblique': (3.0, -4.0, -8.0)}
+# All mass distributions of `random_robot` are unequal; these viscous constants are too.
+C_REVOLUTE, C_SPHERICAL = 0.031, 0.017
+VISCOUS_ONLY = {
+    'friction.revolute.viscous': C_REVOLUTE, 'friction.spherical.viscous': C_SPHERICAL,
+    'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0}
+
+every_engine = pytest.mark.parametrize('engine', ENGINES.values(), ids=ENGINES.keys())
+every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
+
+
+@pytest.fixture(scope='module', params=[
+    (elbow, gravity) for elbow in ELBOWS for gravity in GRAVITIES], ids='-'.join)
+def states(request):
+    """Return a robot of unequal chains, its model, and random states with the model's answer."""
+    elbow, gravity = request.param
+    # One seed per case, so that a case run alone sees the states that it sees in the suite.
+    rng = np.random.default_rng([ELBOWS.index(elbow), list(GRAVITIES).index(gravity)])
+    robot = random_robot(rng, elbow, GRAVITIES[gravity])
+    motion = random_motion(rng, STATES, elbow)
+    return robot, motion, model_of(robot, VISCOUS_ONLY).drive_forces(motion)
+
+
+@pytest.fixture(scope='module')
+def answers(states):
+    """Return the answer of each engine for `states`, worked out once."""
+    robot, motion, _ = states
+    return {engine: engine(robot).solve(motion, C_REVOLUTE, C_SPHERICAL)
+            for engine in ENGINES.values()}
+
+
+@every_engine
+def test_drive_motion_is_the_engines(states, answers, engine):
+    chains, oracle = states[2].mechanism.chains, answers[engine]
+    # Accelerations up to some 100 m/s^2 come from divisions by sin u.
+    assert_allclose(chains.position, oracle.position, rtol=0, atol=1e-14)
+    assert_allclose(chains.velocity, oracle.velocity, rtol=0, atol=1e-13)
+    assert_allclose(chains.acceleration, oracle.acceleration, rtol=0, atol=1e-11)
+
+
+@every_engine
+def test_frictionless_drive_forces_are_the_engines(states, answers, engine):
+    assert len(states[1]) >= STATES
+    assert_allclose(states[2].parts['rigid_body'], answers[engine].force, rtol=0,
+                    atol=FORCE_TOLERANCE)
+
+
+@every_engine
+def test_viscous_friction_of_passive_joints_is_the_engines(states, answers, engine):
+    oracle = answers[engine].passive
+    assert np.abs(oracle).max() > 0.1
+    assert_allclose(states[2].parts['passive_friction'], oracle, rtol=0, atol=FORCE_TOLERANCE)
+
+
+@every_engine
+@every_elbow
+def test_forces_of_many_different_robots_are_the_engines(engine, elbow):
+    rng = np.random.default_rng([7, ELBOWS.index(elbow)])
+    for _ in range(20):
+        robot = random_robot(rng, elbow, rng.uniform(-10, 10, 3))
+        motion = random_motion(rng, 5, elbow)
+        forces = model_of(robot, VISCOUS_ONLY).drive_forces(motion)
+        oracle = engine(robot).solve(motion, C_REVOLUTE, C_SPHERICAL)
+        assert_allclose(forces.parts['rigid_body'], oracle.force, rtol=0, atol=FORCE_TOLERANCE)
+        assert_allclose(forces.parts['passive_friction'], oracle.passive, rtol=0,
+                        atol=FORCE_TOLERANCE)
+
+
+# The errors of (7) and (12) as printed, on states of this kind: both would be caught above.
+
+@every_elbow
+def test_printed_equation_7_contradicts_the_engines(elbow):
+    rng = np.random.default_rng(11)
+    robot = random_robot(rng, elbow)
+    motion = random_motion(rng, 50, elbow)
+    printed = model_of(robot, {'equations': 'printed'}).drive_forces(motion).parts['rigid_body']
+    oracle = PinocchioRobot(robot).solve(motion).force
+    assert_allclose(printed[:, :3], oracle[:, :3], rtol=0, atol=FORCE_TOLERANCE)
+    assert np.abs(printed[:, 3:] - oracle[:, 3:]).max() > 0.1
+
+
+@every_elbow
+def test_printed_equation_12_contradicts_the_engines_but_has_their_power(elbow):
+    rng = np.random.default_rng(12)
+    robot = random_robot(rng, elbow)
+    motion = random_motion(rng, 50, elbow)
+    forces = model_of(robot, {**VISCOUS_ONLY, 'equations': 'printed'}).drive_forces(motion)
+    printed, q_dot = forces.parts['passive_friction'], forces.mechanism.velocity
+    oracle = PinocchioRobot(robot).solve(motion, C_REVOLUTE, C_SPHERICAL).passive
+    assert np.abs(printed - oracle).max() > 0.1
+    assert_allclose(np.sum(q_dot * printed, axis=1), np.sum(q_dot * oracle, axis=1), rtol=0,
+                    atol=1e-12)
+
+
+# Helical path at t = 1 s, as two engines gave it elsewhere: to all printed digits.
+REFERENCE_FORCE = (
+    -2.9771662, 5.22152482, -2.24435861, 13.41786397, 13.49724443, 13.3886266)
+REFERENCE_PASSIVE = (
+    0.11757538, -0.03910791, -0.07846746, -0.07264624, 0.13252167, -0.05987543)
+HALF_OF_THE_LAST_DIGIT = 0.5e-8
+
+
+def helical_motion_at_1_second() -> PlatformMotion:
+    """Return the paper's path at t = 1 s, from its closed form with lambda = 2 t^2 / pi."""
+    t, R, pitch = 1.0, 0.15, 0.1 / (2 * np.pi)
+    angle, rate, gain = 2 / np.pi * t ** 2, 4 / np.pi * t, 4 / np.pi
+    c, s = np.cos(angle), np.sin(angle)
+    return PlatformMotion(
+        (R * c, R * s, 0.5 + pitch * angle), (0, 0, 0, 1),
+        (-R * s * rate, R * c * rate, pitch * rate), (0, 0, 0),
+        (-R * (s * gain + c * rate ** 2), R * (c * gain - s * rate ** 2), pitch * gain),
+        (0, 0, 0))
+
+
+CONSTANT_RESISTANCE = {'friction.revolute.coulomb': 0.0, 'friction.spherical.coulomb': 0.0}
+
+
+def test_reference_values_of_the_helical_path():
+    forces = paper_model(CONSTANT_RESISTANCE).drive_forces(helical_motion_at_1_second())
+    assert_allclose(forces.parts['rigid_body'], [REFERENCE_FORCE], rtol=0,
+                    atol=HALF_OF_THE_LAST_DIGIT)
+    assert_allclose(forces.parts['passive_friction'], [REFERENCE_PASSIVE], rtol=0,
+                    atol=HALF_OF_THE_LAST_DIGIT)
+
+
+@every_engine
+def test_engines_give_the_reference_values_themselves(engine):
+    oracle = engine(paper_model().robot).solve(helical_motion_at_1_second(), 0.02, 0.02)
+    assert_allclose(oracle.force, [REFERENCE_FORCE], rtol=0, atol=HALF_OF_THE_LAST_DIGIT)
+    assert_allclose(oracle.passive, [REFERENCE_PASSIVE], rtol=0, atol=HALF_OF_THE_LAST_DIGIT)
+
+
+def test_package_path_at_1_second_is_the_papers_closed_form():
+    from pprs_dynamics.physics.mechanism.paths import HelicalPath
+
+    path, expected = HelicalPath().motion([1.0]), helical_motion_at_1_second()
+    for name in ('position', 'linear_velocity', 'linear_acceleration'):
+        assert_allclose(getattr(path, name), getattr(expected, name), rtol=0, atol=1e-15)

@@ -1,0 +1,295 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A single axis: its forces, its files, and the same commands on recordings of one drive."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ros_processes import environment, executable
+
+from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
+from pprs_dynamics.errors import ModelError, MotionError
+from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
+from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.collecting import sensitivities_of
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.motion.reconstruction import reconstruct
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import read_parameters
+from pprs_dynamics.physics.three_pprs.robot import AXIS
+
+CONFIG = Path(__file__).parents[2] / 'config'
+FILE = CONFIG / 'single_axis.yaml'
+MASS, VISCOUS, COULOMB, OFFSET, WIDTH = 20.0, 40.0, 6.0, -2.0, 0.001
+VALUES = {'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
+          'axis.offset': OFFSET, 'friction.reversal_velocity': WIDTH}
+SPRING, CENTRE = 55.0, 0.03  # N/m, m: hidden
+NOISE, RATE = 0.05, 500.0
+EQUAL = 1e-12
+
+
+def sweep(duration: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return time, position, velocity and acceleration of a sum of sines."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, duration, 1 / RATE)
+    omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
+    phase = omega * time + rng.uniform(0, 2 * np.pi, (3, 1))
+    size = np.array([0.08, 0.04, 0.015])[:, None]
+    return (time, (size * np.sin(phase)).sum(0), (size * omega * np.cos(phase)).sum(0),
+            -(size * omega ** 2 * np.sin(phase)).sum(0))
+
+
+def textbook_force(q_dot: Any, q_ddot: Any, gravity: float = 0.0) -> Any:
+    return (MASS * (q_ddot - gravity) + VISCOUS * q_dot + COULOMB * np.tanh(q_dot / WIDTH)
+            + OFFSET)
+
+
+def bench(seed: int, hidden: bool = True, duration: float = 20.0, offset: float = 0.0,
+          ) -> Recording:
+    """Return a recording of an axis, with a spring that the model does not know, or not."""
+    time, q, q_dot, q_ddot = sweep(duration, seed)
+    force = textbook_force(q_dot, q_ddot) + offset + hidden * SPRING * (q - CENTRE)
+    rng = np.random.default_rng(seed)
+    encoder = 1e-6
+    return Recording.from_arrays(
+        f'bench_{seed}', time, (encoder * np.round(q / encoder))[:, None], None,
+        (force + NOISE * rng.standard_normal(len(time)))[:, None], (AXIS,))
+
+
+def pprs(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
+                          text=True, timeout=300, cwd=cwd)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a model file and two recordings of an axis with a hidden spring."""
+    folder = tmp_path_factory.mktemp('axis')
+    lines = [f'    {key}: {value!r}' for key, value in VALUES.items()]
+    (folder / 'axis.yaml').write_text('\n'.join(['/**:', '  ros__parameters:', *lines, '']))
+    write_recording(folder / 'run.csv', bench(1))
+    write_recording(folder / 'other.mcap', bench(2, duration=12.0))
+    return folder
+
+
+@pytest.mark.parametrize('gravity', [0.0, -9.81])
+def test_the_force_is_the_textbooks(gravity: float) -> None:
+    time, q, q_dot, q_ddot = sweep(3.0)
+    model = build_model({**VALUES, 'axis.gravity': gravity})
+    forces = model.drive_forces(AxisMotion(q[:, None], q_dot[:, None], q_ddot[:, None], time))
+    np.testing.assert_allclose(forces.total[:, 0], textbook_force(q_dot, q_ddot, gravity),
+                               rtol=0, atol=1e-9)
+    np.testing.assert_allclose(sum(forces.parts.values()), forces.total, rtol=0, atol=EQUAL)
+
+
+def test_a_vertical_axis_at_rest_is_held_against_its_weight() -> None:
+    model = build_model({**VALUES, 'axis.offset': 0.0, 'axis.gravity': -9.81})
+    rest = np.zeros((1, 1))
+    assert model.drive_forces(AxisMotion(rest, rest, rest)).total[0, 0] == MASS * 9.81
+
+
+def test_an_effect_adds_its_closed_form_and_changes_nothing_else() -> None:
+    time, q, q_dot, q_ddot = sweep(2.0)
+    motion = AxisMotion(q[:, None], q_dot[:, None], q_ddot[:, None], time)
+    with_effect = build_model({**VALUES, 'effects.active': ['quadratic_friction'],
+                               'effects.quadratic_friction.axis.coefficient': 30.0})
+    bare, forces = (model.drive_forces(motion) for model in (build_model(VALUES), with_effect))
+    np.testing.assert_allclose((forces.total - bare.total)[:, 0], 30 * q_dot * np.abs(q_dot),
+                               rtol=0, atol=1e-9)
+    for name, part in bare.parts.items():
+        np.testing.assert_array_equal(forces.parts[name], part)
+
+
+def test_the_shipped_file_loads_by_both_loaders_and_a_robot_is_no_axis() -> None:
+    assert isinstance(load_model(FILE), AxisModel)
+    assert AxisModel.load().values == load_model(FILE).values
+    with pytest.raises(ModelError, match='single axis'):
+        AxisModel.load(CONFIG / 'paper.yaml')
+    with pytest.raises(ModelError, match=r'axis\.mass is 95\.109.*3-PPRS'):
+        DriveModel.load(FILE)
+
+
+@pytest.mark.parametrize(('change', 'sentence'), [
+    ({'axis.mass': 0.0}, 'axis.mass is 0.0, must be greater than 0'),
+    ({'axis.coulomb': -1.0}, 'axis.coulomb is -1.0'),
+    ({'axis.masss': 1.0}, 'did you mean axis.mass?'),
+    ({'masses.platform': 1.0}, 'unknown key masses.platform'),
+    ({'tolerances.axis.mass': 2.0}, 'between 0 and 1'),
+    ({'tolerances.masses.payload': 0.1}, 'unknown key tolerances.masses.payload'),
+    ({'effects.payload_mass.mass': 0.1}, 'be an effect that acts in a single axis'),
+    ({'effects.homing_error.axis.zero': 0.001}, 'be an effect that acts in a single axis'),
+    ({'effects.viscous_friction.lift_1.coefficient': 1.0}, 'unknown drive lift_1 (known: axis)'),
+])
+def test_a_mistake_in_a_file_is_one_sentence(change: dict[str, float], sentence: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        build_model({**VALUES, **change})
+    assert sentence in str(caught.value)
+
+
+def test_a_robot_has_no_drive_axis() -> None:
+    values = {**read_parameters(CONFIG / 'paper.yaml'), 'effects.active': ['viscous_friction'],
+              'effects.viscous_friction.axis.coefficient': 1.0}
+    with pytest.raises(ModelError, match=r'unknown drive axis \(known: slide_1'):
+        build_model(values)
+
+
+def test_a_missing_key_of_an_axis_is_named() -> None:
+    for key in VALUES:
+        if key != 'axis.offset':
+            with pytest.raises(ModelError, match=f'{key} is missing'):
+                build_model({name: value for name, value in VALUES.items() if name != key})
+
+
+def test_motion_comes_from_positions_of_the_drive_alone() -> None:
+    time, _, q_dot, q_ddot = sweep(20.0, 1)
+    found = reconstruct(build_model(VALUES), bench(1))
+    np.testing.assert_allclose(found.velocity[:, 0], q_dot[found.index], atol=2e-5)
+    np.testing.assert_allclose(found.acceleration[:, 0], q_ddot[found.index], atol=2e-3)
+    np.testing.assert_array_equal(found.time, time[found.index])
+
+
+def test_a_recording_of_other_drives_is_refused_by_name() -> None:
+    time = np.arange(0.0, 5.0, 0.01)
+    other = Recording.from_arrays('x', time, np.sin(time)[:, None], drives=('lift_1',))
+    with pytest.raises(MotionError, match='they are lift_1, must be axis'):
+        reconstruct(build_model(VALUES), other)
+
+
+def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
+    tolerances = {f'tolerances.{key}': 0.1 for key in VALUES}
+    model = build_model({**VALUES, 'axis.gravity': -9.81, 'tolerances.axis.gravity': 0.1,
+                         **tolerances})
+    design = Design.of(model, [bench(1)])
+    for column in design.base:
+        if not isinstance(column, KnownNumber):
+            continue
+        value, moved = column.number.value, 0.001
+        # Away from 0 by a share of one standard deviation.
+        after = value + np.sign(value) * moved * column.number.deviation
+        other = Design.of(build_model({**model.values, column.number.key: after}), [bench(1)])
+        change = (other.residuals.model - design.residuals.model)[:, 0] / moved
+        np.testing.assert_allclose(column.rows[0], change, rtol=0,
+                                   atol=2e-3 * np.abs(change).max())
+
+
+def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
+    values = {**read_parameters(CONFIG / 'paper.yaml'), 'masses.centre': [0.0, -0.01, -0.02],
+              'tolerances.masses.centre': 0.1, 'tolerances.gravity': 0.1}
+    model = DriveModel.from_parameters(values)
+    forces = model.drive_forces(HelicalPath().motion(np.arange(0.0, 1.0, 0.1)))
+    found = sensitivities_of(model, model)
+    columns = found.columns(forces)['numbers']
+    assert len(found.numbers) == 3
+    for number, column in zip(found.numbers, columns, strict=True):
+        moved = list(model.values[number.key])
+        moved[number.element or 0] += np.sign(number.value) * number.deviation
+        after = DriveModel.from_parameters({**model.values, number.key: moved}).drive_forces(
+            forces.mechanism.motion)
+        bodies = [name for name in forces.parts if name != 'passive_friction']
+        change = sum(after.parts[name] - forces.parts[name] for name in bodies)
+        passive = after.parts['passive_friction'] - forces.parts['passive_friction']
+        np.testing.assert_allclose(column, change + passive, rtol=0,
+                                   atol=0.02 * np.abs(change).max())
+
+
+def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
+    model = build_model({**VALUES, 'tolerances.axis.offset': 1.0})
+    design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
+    found = Search(design, DECISIONS, with_unknown=False).evaluate(())
+    place, number = next((k, column.number) for k, column in enumerate(design.base)
+                         if isinstance(column, KnownNumber))
+    assert OFFSET - found.fit.coefficients[place] * number.deviation == pytest.approx(
+        -2.5, abs=0.02)
+
+
+def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:
+    with pytest.raises(EffectRequestError, match='payload_mass does not act in a single axis'):
+        EffectRequest.of('payload_mass').require_place(build_model(VALUES))
+    with pytest.raises(EffectRequestError, match='one of axis'):
+        EffectRequest.of('viscous_friction:lift_1', (AXIS,))
+
+
+def test_compare_tells_the_error_of_the_axis(folder: Path) -> None:
+    done = pprs('compare', 'run.csv', '--model', 'axis.yaml', '--json', 'compare.json',
+                '--report', 'compare.html', cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((folder / 'compare.json').read_text())
+    _, q, q_dot, q_ddot = sweep(20.0, 1)
+    hidden = SPRING * (q - CENTRE)
+    assert list(found['drives']) == [AXIS]
+    assert found['overall']['rms'] == pytest.approx(np.sqrt(np.mean(hidden ** 2)), rel=0.02)
+    measured = textbook_force(q_dot, q_ddot) + hidden
+    assert found['overall']['relative'] == pytest.approx(
+        found['overall']['rms'] / np.std(measured), rel=0.02)
+    assert (folder / 'compare.html').stat().st_size > 10_000
+
+
+def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder: Path) -> None:
+    done = pprs('diagnose', 'run.csv', '--validate', 'other.mcap', '--model', 'axis.yaml',
+                '--adopt-all', '--output', 'better.yaml', '--json', 'result.json', cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((folder / 'result.json').read_text())
+    assert [one['name'] for one in found['effects']] == ['drive_spring']
+    assert found['effects'][0]['drives'] == [AXIS]
+    values = found['effects'][0]['parameters']
+    stiffness = values['axis.stiffness']
+    assert abs(stiffness['value'] - SPRING) < 4 * stiffness['std'] + 0.01 * SPRING
+    better = load_model(folder / 'better.yaml')
+    assert isinstance(better, AxisModel)
+    assert better.values['effects.active'] == ('drive_spring',) or better.values[
+        'effects.active'] == ['drive_spring']
+    after = pprs('compare', 'other.mcap', '--model', 'better.yaml', '--json', 'after.json',
+                 cwd=folder)
+    assert after.returncode == 0, after.stderr
+    # Means over 10 ms of white noise.
+    floor = NOISE / np.sqrt(0.01 * RATE)
+    assert json.loads((folder / 'after.json').read_text())['overall']['rms'] < 1.3 * floor
+    history = pprs('history', 'better.yaml', '--json', 'history.json', cwd=folder)
+    assert history.returncode == 0, history.stderr
+    assert [one['effect'] for one in json.loads((folder / 'history.json').read_text())['steps']
+            ] == ['drive_spring']
+    undone = pprs('history', 'better.yaml', '--undo', '--output', 'undone.yaml', cwd=folder)
+    assert undone.returncode == 0, undone.stderr
+    assert {key: load_model(folder / 'undone.yaml').values[key] for key in VALUES} == VALUES
+
+
+def test_nothing_is_missing_where_nothing_is(folder: Path) -> None:
+    write_recording(folder / 'right.csv', bench(4, hidden=False))
+    done = pprs('diagnose', 'right.csv', '--model', 'axis.yaml', '--json', 'right.json',
+                cwd=folder)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((folder / 'right.json').read_text())
+    assert (found['verdict'], found['effects']) == ('adequate', [])
+
+
+@pytest.mark.parametrize('arguments', [
+    ('adopt', 'payload_mass', 'run.csv', '--output', 'x.yaml'),
+    ('adopt', 'homing_error', 'run.csv', '--output', 'x.yaml'),
+    ('simulate', '--output', 'x.csv'), ('reproduce', '--output', 'x')])
+def test_what_an_axis_cannot_do_is_one_line(folder: Path, arguments: tuple[str, ...]) -> None:
+    done = pprs(*arguments, '--model', 'axis.yaml', cwd=folder)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert 'single axis' in done.stderr
+
+
+@pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot'])
+def test_a_node_refuses_an_axis_in_one_sentence(node: str, ros_domain: int) -> None:
+    done = subprocess.run(
+        [executable(node), '--ros-args', '--params-file', str(FILE)],
+        env=environment(ros_domain), capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert next(line for line in done.stderr.splitlines() if 'axis.' in line).count(
+        'needs a 3-PPRS') == 1
+    assert 'Traceback' not in done.stderr

@@ -1,0 +1,374 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects on the platform, in the rods and in the passive joints, against independent oracles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from oracles.mujoco_robot import MujocoRobot
+from oracles.pinocchio_robot import PinocchioRobot
+from random_states import (
+    ELBOWS,
+    model_of,
+    paper_model,
+    random_motion,
+    random_poses,
+    random_robot,
+    smooth_motion,
+)
+
+from pprs_dynamics import PlatformMotion
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.effect import PLATFORM
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+
+EFFECTS = {name: effect for name, effect in CATALOGUE.items()
+           if issubclass(effect, StructureEffect) and PLATFORM in effect.acts_in}
+# Forces of some 40 N carry rounding errors near 1e-14 N, and accelerations come by division.
+FORCE_TOLERANCE = 1e-9
+VALUES = {
+    'base_tilt': {'x': 0.05, 'y': -0.03},
+    'external_wrench': {'force_x': 1.0, 'force_y': -2.0, 'force_z': 3.0, 'moment_x': 0.1,
+                        'moment_y': 0.2, 'moment_z': -0.3},
+    'payload_mass': {'mass': 0.4},
+    'payload_offset': {'x': 0.004, 'y': -0.01, 'z': 0.02},
+    'platform_drag': {'coefficient': 7.0, 'rotational': 0.05},
+    'platform_inertia': {'xx': 0.004, 'yy': 0.005, 'zz': 0.006, 'xy': 0.001, 'xz': -0.0005,
+                         'yz': 0.0007},
+    'revolute_friction': {'viscous': 0.03, 'torque': 0.02},
+    'revolute_stiffness': {'stiffness': 0.8, 'angle': 1.3},
+    'rod_mass': {'mass': 0.1},
+    'spherical_friction': {'viscous': 0.01, 'torque': 0.04},
+}
+NOT_LINEAR = ('base_tilt', 'payload_offset')
+
+every_elbow = pytest.mark.parametrize('elbow', ELBOWS)
+every_effect = pytest.mark.parametrize('name', EFFECTS)
+
+
+def test_every_effect_is_tested() -> None:
+    assert list(VALUES) == list(EFFECTS)
+    assert len(EFFECTS) == 10
+
+
+@pytest.fixture(params=ELBOWS)
+def case(request):
+    """Return a robot of unequal chains, a random motion and the state of the mechanism."""
+    rng = np.random.default_rng([5, ELBOWS.index(request.param)])
+    robot = random_robot(rng, request.param, (1.0, -2.0, -9.0))
+    motion = random_motion(rng, 40, request.param)
+    return robot, motion, model_of(robot).mechanism(motion)
+
+
+# The engine's robot with the change made in the engine ---------------------------------------
+
+def heavier(engine, body, factor) -> None:
+    engine.model.body_mass[body] *= factor
+    engine.model.body_inertia[body] *= factor
+
+
+def changed_engine(name, robot):
+    """Return a MuJoCo robot with the effect made in its own terms."""
+    values = VALUES[name]
+    if name == 'platform_inertia':
+        # The engine keeps principal axes: it has to compile the tensor itself.
+        more = [values[axes] for axes in ('xx', 'yy', 'zz', 'xy', 'xz', 'yz')]
+        inertia = tuple(np.add(robot.masses.inertia, more))
+        return MujocoRobot(replace(robot, masses=replace(robot.masses, inertia=inertia)))
+    engine = MujocoRobot(robot)
+    platform = engine.bodies['platform']
+    if name == 'payload_mass':
+        engine.model.body_mass[platform] += values['mass']
+    elif name == 'payload_offset':
+        engine.model.body_ipos[platform] += [values[axis] for axis in 'xyz']
+    elif name == 'rod_mass':
+        for i, mass in enumerate(robot.masses.rods):
+            heavier(engine, engine.bodies[f'rod_{i}'], 1 + values['mass'] / mass)
+    elif name == 'base_tilt':
+        # A quaternion about x, then one about y.
+        about_x, about_y, both, g = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(3)
+        mujoco.mju_axisAngle2Quat(about_x, np.array([1.0, 0, 0]), values['x'])
+        mujoco.mju_axisAngle2Quat(about_y, np.array([0, 1.0, 0]), values['y'])
+        mujoco.mju_mulQuat(both, about_y, about_x)
+        mujoco.mju_rotVecQuat(g, np.array(robot.gravity), both)
+        engine.model.opt.gravity[:] = g
+    mujoco.mj_setConst(engine.model, engine.data)
+    return engine
+
+
+@pytest.mark.parametrize('name', [
+    'base_tilt', 'payload_mass', 'payload_offset', 'platform_inertia', 'rod_mass'])
+def test_changed_bodies_give_the_engines_forces(case, name) -> None:
+    robot, motion, state = case
+    found = EFFECTS[name](VALUES[name]).force(state)
+    expected = changed_engine(name, robot).solve(motion).force - MujocoRobot(robot).solve(
+        motion).force
+    assert np.abs(expected).max() > 0.1
+    assert_allclose(found, expected, rtol=0, atol=FORCE_TOLERANCE)
+
+
+@pytest.mark.parametrize('engine', [MujocoRobot, PinocchioRobot])
+def test_viscous_friction_of_joints_is_the_engines(case, engine) -> None:
+    robot, motion, state = case
+    for name, constants in (('revolute_friction', (0.03, 0.0)),
+                            ('spherical_friction', (0.0, 0.03))):
+        found = EFFECTS[name]({'viscous': 0.03, 'torque': 0.0}).force(state)
+        oracle = engine(robot).solve(motion, *constants).passive
+        assert np.abs(oracle).max() > 0.05
+        assert_allclose(found, oracle, rtol=0, atol=FORCE_TOLERANCE)
+
+
+# Power of the drives = power into the load ---------------------------------------------------
+
+def several_velocities_per_pose(elbow):
+    """Return a robot and, for each of 10 poses, 6 independent velocities in a row."""
+    rng = np.random.default_rng([6, ELBOWS.index(elbow)])
+    robot = random_robot(rng, elbow)
+    pose = [np.repeat(part, 6, axis=0) for part in random_poses(rng, 10, elbow)]
+    v, omega, a, epsilon = rng.uniform(-1, 1, (4, 60, 3))
+    return robot, PlatformMotion(*pose, v, omega, a, epsilon)
+
+
+def rod_angles(robot, motion):
+    """Return u_i from where A_i stands over C_i's slide: A_i . e_i = R - l cos u_i."""
+    geometry = robot.geometry
+    angles = np.array(geometry.platform_angles)
+    points = geometry.platform_radius * np.stack((np.cos(angles), np.sin(angles), 0 * angles))
+    tips = motion.position[:, :, None] + motion.rotation @ points
+    outwards = np.stack((np.cos(geometry.chain_angles), np.sin(geometry.chain_angles)))
+    reach = np.einsum('nxi,xi->ni', tips[:, :2], outwards)
+    u = np.arccos((geometry.base_radius - reach) / geometry.rod_length)
+    return u if geometry.elbow == 'up' else -u
+
+
+@every_elbow
+def test_the_drives_do_the_work_of_wrench_and_drag(elbow) -> None:
+    robot, motion = several_velocities_per_pose(elbow)
+    state = model_of(robot).mechanism(motion)
+    v, omega = motion.linear_velocity, motion.angular_velocity
+    wrench = EFFECTS['external_wrench'](VALUES['external_wrench'])
+    force = wrench.force(state)
+    power = v @ [1.0, -2.0, 3.0] + omega @ [0.1, 0.2, -0.3]
+    assert_allclose(np.sum(force * state.velocity, axis=1), power, rtol=0, atol=1e-11)
+    # Six independent velocities per pose leave no other force that does this work.
+    assert_allclose(np.ptp(force.reshape(10, 6, 6), axis=1), 0, atol=FORCE_TOLERANCE)
+    drag = EFFECTS['platform_drag'](VALUES['platform_drag']).force(state)
+    power = 7.0 * np.sum(v ** 2, axis=1) + 0.05 * np.sum(omega ** 2, axis=1)
+    assert_allclose(np.sum(drag * state.velocity, axis=1), power, rtol=0, atol=1e-11)
+    # At a pose drag is linear in the velocity: its matrix is the same from any six of them.
+    held = EFFECTS['platform_drag']({'coefficient': 7.0, 'rotational': 0.0}).force(state)
+    for rows, motions in zip(held.reshape(10, 6, 6), state.velocity.reshape(10, 6, 6), strict=True):
+        damping = np.linalg.solve(motions, rows)
+        assert_allclose(damping, damping.T, rtol=0, atol=1e-6)
+
+
+def test_a_platform_pulled_down_needs_lifts_that_push_up() -> None:
+    state = paper_model().mechanism(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
+    down = EFFECTS['external_wrench'].at({'force_z': 3.0}).force(state)
+    assert_allclose(down, [[0, 0, 0, 1, 1, 1]], rtol=0, atol=1e-12)
+    payload = EFFECTS['payload_mass']({'mass': 3.0 / 9.81}).force(state)
+    assert_allclose(payload, down, rtol=0, atol=1e-12)
+
+
+@every_elbow
+def test_the_force_of_stiffness_is_the_change_of_its_energy(elbow) -> None:
+    robot, motion = several_velocities_per_pose(elbow)
+    state = model_of(robot).mechanism(motion)
+    force = EFFECTS['revolute_stiffness'](VALUES['revolute_stiffness']).force(state)
+    step = 1e-6
+    before, after = (
+        0.4 * np.sum((rod_angles(robot, moved(motion, side * step)) - 1.3) ** 2, axis=1)
+        for side in (-1, 1))
+    power = np.sum(force * state.velocity, axis=1)
+    assert np.abs(power).max() > 0.5
+    assert_allclose(power, (after - before) / (2 * step), rtol=0, atol=1e-7)
+    assert_allclose(np.ptp(force.reshape(10, 6, 6), axis=1), 0, atol=FORCE_TOLERANCE)
+
+
+def moved(motion, time):
+    """Return where the platform is a moment later at its velocity."""
+    half = 0.5 * time * motion.angular_velocity
+    x, y, z, w = motion.orientation.T
+    h_x, h_y, h_z = half.T
+    # q + (omega t / 2) q, to first order: what is left cancels in a central difference.
+    turned = np.stack((x + h_x * w + h_y * z - h_z * y, y + h_y * w + h_z * x - h_x * z,
+                       z + h_z * w + h_x * y - h_y * x, w - h_x * x - h_y * y - h_z * z), axis=1)
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    zero = np.zeros_like(motion.position)
+    return PlatformMotion(motion.position + time * motion.linear_velocity, turned,
+                          zero, zero, zero, zero)
+
+
+@every_elbow
+def test_dry_friction_of_joints_takes_its_torque_times_their_speed(elbow) -> None:
+    robot, motion = several_velocities_per_pose(elbow)
+    state = model_of(robot).mechanism(motion)
+    step = 1e-6
+    before, after = (rod_angles(robot, moved(motion, side * step)) for side in (-1, 1))
+    u_dot = (after - before) / (2 * step)
+    angles = np.array(robot.geometry.chain_angles)
+    axes = np.stack((-np.sin(angles), np.cos(angles), 0 * angles), axis=1)
+    relative = u_dot[..., None] * axes - motion.angular_velocity[:, None, :]
+    for name, speed in (('revolute_friction', np.abs(u_dot)),
+                        ('spherical_friction', np.linalg.norm(relative, axis=2))):
+        force = EFFECTS[name]({'viscous': 0.0, 'torque': 0.04}).force(state)
+        expected = 0.04 * np.sum(speed * np.tanh(speed / state.reversal.rate), axis=1)
+        assert_allclose(np.sum(force * state.velocity, axis=1), expected, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize('name', ['revolute_friction', 'spherical_friction', 'platform_drag'])
+def test_friction_dissipates_at_every_speed_and_is_nothing_at_rest(case, name) -> None:
+    _, motion, _ = case
+    robot = case[0]
+    effect = EFFECTS[name](VALUES[name])
+    for slowness in (1.0, 1e-3, 1e-6):
+        slow = replace_velocity(motion, slowness)
+        state = model_of(robot).mechanism(slow)
+        assert np.all(np.sum(effect.force(state) * state.velocity, axis=1) > 0)
+    rest = model_of(robot).mechanism(replace_velocity(motion, 0.0))
+    assert_allclose(effect.force(rest), 0, atol=1e-12)
+
+
+def replace_velocity(motion, factor):
+    return PlatformMotion(
+        motion.position, motion.orientation, factor * motion.linear_velocity,
+        factor * motion.angular_velocity, motion.linear_acceleration,
+        motion.angular_acceleration)
+
+
+@pytest.mark.parametrize('changes', [
+    {'equations': 'printed'}, {'friction.approach': 'independent_chains'}])
+def test_friction_added_in_joints_is_exact_whatever_the_papers_is(changes) -> None:
+    motion = smooth_motion(np.linspace(0, 3, 20))
+    states = [paper_model(more).mechanism(motion) for more in ({}, changes)]
+    for name in ('revolute_friction', 'spherical_friction'):
+        exact, other = (EFFECTS[name](VALUES[name]).force(state) for state in states)
+        assert_allclose(other, exact, rtol=0, atol=1e-12)
+
+
+# What holds for all of them ------------------------------------------------------------------
+
+@every_effect
+def test_every_coefficient_changes_the_prediction(case, name) -> None:
+    effect, state = EFFECTS[name], case[2]
+    columns = []
+    for coefficient in effect.coefficients:
+        force = effect.at({coefficient.name: coefficient.scale}).force(state)
+        assert np.sqrt(np.mean(force ** 2)) > 0.003, coefficient.name
+        columns.append(force.ravel() / np.linalg.norm(force))
+    # No coefficient does what the others do together.
+    assert np.linalg.svd(np.array(columns), compute_uv=False)[-1] > 0.02
+
+
+@every_effect
+def test_forces_follow_the_coefficients(case, name) -> None:
+    effect, state = EFFECTS[name], case[2]
+    coefficients = effect.to_coefficients(VALUES[name])
+    whole = effect(VALUES[name]).force(state)
+    assert_allclose(effect.at(coefficients).force(state), whole, rtol=0, atol=1e-9)
+    single = [effect.at({key: value}).force(state) for key, value in coefficients.items()]
+    rest = np.abs(np.sum(single, axis=0) - whole).max()
+    if name in NOT_LINEAR:
+        # Angles of 0.05 rad and offsets of 1 cm: a few hundredths of what the effect does.
+        assert 1e-9 < rest < 0.1 * np.abs(whole).max()
+    else:
+        assert rest < 1e-9
+    assert_allclose(effect.at({}).force(state), 0, atol=1e-9)
+
+
+@every_effect
+def test_unit_coefficients_one_at_a_time_give_finite_forces(case, name) -> None:
+    # Moments of inertia about one axis alone, or springs without stiffness, are no real bodies.
+    for coefficient in EFFECTS[name].coefficients:
+        for size in (1.0, -1.0):
+            force = EFFECTS[name].at({coefficient.name: size}).force(case[2])
+            assert np.all(np.isfinite(force))
+            assert np.abs(force).max() > 0
+
+
+@every_effect
+def test_an_effect_comes_back_from_its_file_and_from_its_coefficients(name) -> None:
+    effect = EFFECTS[name]
+    once = effect.from_file(VALUES[name])
+    assert once.to_file() == VALUES[name]
+    assert effect.from_file(once.to_file()) == once
+    coefficients = effect.to_coefficients(once.values)
+    assert list(coefficients) == [c.name for c in effect.coefficients]
+    assert effect.from_coefficients(coefficients) == pytest.approx(VALUES[name], rel=1e-14)
+    again = effect.at(coefficients)
+    assert effect.from_file(again.to_file()).values == pytest.approx(VALUES[name], rel=1e-14)
+
+
+@every_effect
+def test_variants_and_signs_name_what_there_is(name) -> None:
+    effect = EFFECTS[name]
+    names = {c.name for c in effect.coefficients}
+    assert all(set(variant) <= names for variant in effect.variants)
+    assert set().union(*effect.variants) == names
+    assert set(effect.unphysical_below) <= {p.name for p in effect.parameters}
+
+
+@every_effect
+def test_the_body_with_an_effect_is_a_robot_of_its_own(case, name) -> None:
+    robot, motion, state = case
+    if not issubclass(EFFECTS[name], BodyEffect):
+        return
+    effect, masses = EFFECTS[name](VALUES[name]), state.robot.masses
+    kept = dict(vars(masses))
+    applied = effect.apply(state)
+    assert vars(masses) == kept
+    assert state.robot.masses is masses
+    # Guide loads change with it: the friction that follows loads does, too.
+    assert np.abs(applied.guide_load - state.guide_load).max() > 1e-3
+    if name in ('base_tilt', 'payload_mass', 'payload_offset', 'platform_inertia', 'rod_mass'):
+        fresh = model_of(robot_of(effect.changed(robot))).mechanism(motion)
+        assert_allclose(applied.guide_load, fresh.guide_load, rtol=0, atol=FORCE_TOLERANCE)
+
+
+def robot_of(robot):
+    """Return the robot with its masses made anew, which checks them."""
+    return replace(robot, masses=replace(robot.masses))
+
+
+def test_masses_that_no_robot_has_are_refused_when_they_are_made_anew() -> None:
+    robot = paper_model().robot
+    for name, values in (('payload_mass', {'mass': -3.0}), ('rod_mass', {'mass': -1.0}),
+                         ('platform_inertia', {'xx': -0.1, 'yy': 0.0, 'zz': 0.0})):
+        altered = EFFECTS[name].from_file(values).changed(robot)
+        with pytest.raises(ModelError, match=r'masses\.'):
+            robot_of(altered)
+
+
+def test_a_moment_without_stiffness_is_exact_and_can_still_be_written(case) -> None:
+    spring, state = EFFECTS['revolute_stiffness'], case[2]
+    constant = spring.at({'moment': 1.0})
+    written = spring.from_file(constant.to_file())
+    assert np.abs(constant.force(state) - written.force(state)).max() < 0.005 * np.abs(
+        constant.force(state)).max()
+    assert spring.at({}).values == {'stiffness': 0.0, 'angle': 0.0}
+    assert spring.from_file({'stiffness': 1.0}, complete=False).values == {'stiffness': 1.0}
+
+
+@pytest.mark.parametrize(('name', 'values', 'rule'), [
+    ('payload_mass', {'mass': 1e6}, r'effects\.payload_mass\.mass is 1000000.*between'),
+    ('payload_mass', {}, r'effects\.payload_mass\.mass is missing.*kg'),
+    ('payload_mass', {'weight': 1.0}, r'unknown key effects\.payload_mass\.weight'),
+    ('external_wrench', {'force_x': 1.0}, r'external_wrench\.force_y is missing'),
+    ('base_tilt', {'x': 'level', 'y': 0.0}, 'be a number'),
+])
+def test_a_wrong_block_is_told(name, values, rule) -> None:
+    with pytest.raises(ModelError, match=rule):
+        EFFECTS[name].from_file(values)
+
+
+def test_what_is_seldom_known_may_be_left_out() -> None:
+    inertia = EFFECTS['platform_inertia'].from_file({'xx': 0.1, 'yy': 0.1, 'zz': 0.1})
+    assert inertia.values['xy'] == 0.0
+    assert EFFECTS['platform_drag'].from_file({'coefficient': 2.0}).values['rotational'] == 0.0

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Forces beyond what the physics engine can follow: refused, never written as a recording."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_processes import executable
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.robot import SimulatedRobot
+
+
+@pytest.mark.parametrize(('name', 'scale'), [
+    ('viscous_friction', 1e6), ('effort_offset', 1e4), ('drive_spring', 1e6),
+    ('payload_mass', 1e6), ('platform_drag', 1e6), ('rod_mass', 1e6)])
+def test_what_the_engine_does_not_solve_is_no_recording(
+    tmp_path: Path, name: str, scale: float,
+) -> None:
+    done = subprocess.run(
+        [executable('pprs'), 'simulate', '--output', 'run.csv', '--duration', '3', '--effect',
+         name, '--scale', f'{scale:g}'], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith('pprs simulate: the simulated robot: at ')
+    # Neither a recording nor the engine's own log.
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_robot_that_the_engine_does_not_solve_stops_and_says_so() -> None:
+    effects = draw_effects(['effort_offset'], np.random.default_rng(0), 1e4)
+    robot = SimulatedRobot(DriveModel.load().values, effects, rate=500.0)
+    for _ in range(50):
+        measurement = robot.tick()
+        # What is published stays what a robot can say.
+        assert np.abs(measurement.position).max() < 1.0
+    assert robot.unsolved is not None
+    assert [note.code for note in robot.notes].count('STOPPED') == 1

@@ -1,0 +1,320 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The nodes with an arm's model file: joint trajectories in, efforts per joint out."""
+
+from __future__ import annotations
+
+import signal
+import struct
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Duration
+from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench
+from node_bench import Bench, bench
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from ros_processes import environment, executable, node_process
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics.physics.model.parameter_file import read_parameters
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.monitor import MonitorNode
+from pprs_dynamics.ros.whole import is_whole
+
+pytestmark = pytest.mark.nodes
+
+ORDER = (2, 0, 1)  # joints are matched by name, in any order
+LIMIT = 200.0  # of the URDF [N m, N]
+TIMEOUT = 0.15  # [s]
+FRICTION = {key.replace('.', '__'): list(value) for key, value in arm.FRICTION.items()}
+STEP = 10_000_000  # [ns] between points
+
+
+@pytest.fixture(scope='module')
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return arm.write_arm(tmp_path_factory.mktemp('arm'), **FRICTION)
+
+
+@pytest.fixture(scope='module')
+def model(file: Path) -> ArmModel:
+    return ArmModel.load(file)
+
+
+def parameters(file: Path, **more: Any) -> dict[str, Any]:
+    """Return the file's parameters as a bench takes them."""
+    values = read_parameters(file)
+    return {**{name.replace('.', '__'): value for name, value in values.items()},
+            'arm__urdf': str(file.parent / values['arm.urdf']), **more}
+
+
+def motion(points: int = 3, seed: int = 0) -> JointMotion:
+    """Return points within the range, 10 ms apart, that do not follow from one another."""
+    q, v, a = np.random.default_rng(seed).uniform(-1, 1, (3, points, 3))
+    return JointMotion(q, v, a, np.arange(points) * STEP / 1e9)
+
+
+def message_of(moved: JointMotion) -> JointTrajectory:
+    message = JointTrajectory(joint_names=[arm.JOINTS[k] for k in ORDER])
+    for k in range(len(moved)):
+        rows = [values[k, list(ORDER)].tolist()
+                for values in (moved.position, moved.velocity, moved.acceleration)]
+        message.points.append(JointTrajectoryPoint(
+            positions=rows[0], velocities=rows[1], accelerations=rows[2],
+            time_from_start=Duration(nanosec=k * STEP)))
+    return message
+
+
+@pytest.fixture
+def node(file: Path) -> Iterator[FeedforwardBench]:
+    with feedforward_bench(JointTrajectory, **parameters(file)) as running:
+        yield running
+
+
+def test_efforts_are_the_models_on_every_topic(node: FeedforwardBench, model: ArmModel) -> None:
+    moved = motion()
+    forces = model.drive_forces(moved)
+    parts = {name: node.bench.listen(JointState, f'/feedforward/effort/{name}')
+             for name in forces.parts}
+    assert node.bench.spin_until(lambda: all(
+        node.node.count_subscribers(f'/feedforward/effort/{name}') for name in parts))
+    np.testing.assert_allclose(node.answer(message_of(moved)), forces.total[0], rtol=0, atol=EQUAL)
+    assert node.bench.spin_until(
+        lambda: node.joint_trajectory and node.joint_command and all(parts.values()))
+    assert list(node.joint_trajectory[-1].joint_names) == list(arm.JOINTS)
+    np.testing.assert_allclose([point.effort for point in node.joint_trajectory[-1].points],
+                               forces.total, rtol=0, atol=EQUAL)
+    command = node.joint_command[-1]
+    assert list(command.name) == list(arm.JOINTS)
+    np.testing.assert_allclose(command.position, moved.position[0], rtol=0, atol=EQUAL)
+    np.testing.assert_allclose(sum(np.array(each[-1].effort) for each in parts.values()),
+                               command.effort, rtol=0, atol=1e-9)
+    status = node.wait_for_status(code='OK', level='OK')
+    assert 0 < status['workspace_margin'] < 1
+    assert 'singularity_margin' not in status
+    assert status['taken_from_paper'] == []
+
+
+def broken(**change: Any) -> JointTrajectory:
+    """Return a message in which one thing is wrong."""
+    message = message_of(motion())
+    for name, value in change.items():
+        setattr(message if hasattr(message, name) else message.points[1], name, value)
+    return message
+
+
+RULES: list[tuple[str, dict[str, Any], str]] = [
+    ('EMPTY', {'points': []}, 'at least 1'),
+    ('NAMES', {'joint_names': ['turn', 'swing']}, 'reach'),
+    ('NAMES', {'joint_names': ['turn', 'swing', 'reach', 'gripper']}, 'nothing else'),
+    ('NAMES', {'joint_names': ['turn', 'turn', 'reach']}, 'once'),
+    ('SIZE', {'positions': [0.0, 0.0]}, 'point 1 has 2 positions, must have 3'),
+    ('SIZE', {'accelerations': []}, 'point 1 has 0 accelerations, must have 3'),
+    ('NON_FINITE', {'velocities': [0.0, float('nan'), 0.0]}, 'velocity'),
+    ('TIME', {'time_from_start': Duration(sec=-1)}, 'strictly increase'),
+    ('WORKSPACE', {'positions': [0.0, 3.5, 0.0]}, 'turn would have to be at 3.5 rad'),
+    ('LIMIT', {'accelerations': [900.0, 0.0, 0.0]}, 'N, the effort limit of URDF or node allows'),
+    ('OUTPUT', {'velocities': [1e300, 1e300, 1e300]}, 'not finite'),
+]
+
+
+def test_a_message_that_breaks_a_rule_is_rejected_whole_and_survived(
+    node: FeedforwardBench, model: ArmModel,
+) -> None:
+    moved = motion(seed=5)
+    for code, change, said in RULES:
+        before, counted = len(node.commands), node.counters[code]
+        node.send(broken(**change))
+        assert node.counters[code] == counted + 1, node.bench.status[-1]
+        assert said in node.wait_for_status(code=code)['message']
+        np.testing.assert_allclose(node.answer(message_of(moved)),
+                                   model.drive_forces(moved).total[0], rtol=0, atol=EQUAL)
+        assert len(node.commands) == before + 1
+        assert node.wait_for_status(code='OK')
+
+
+def test_a_message_that_arrives_cut_off_is_rejected(node: FeedforwardBench) -> None:
+    data = bytes(serialize_message(message_of(motion())))
+    whole = [length for length in range(len(data) + 1)
+             if is_whole(data[:length], JointTrajectory)]
+    # The last point's time ends it; a serialiser may add what it likes behind.
+    assert whole == list(range(whole[0], len(data) + 1))
+    assert struct.unpack('<iI', data[whole[0] - 8:whole[0]]) == (0, 2 * STEP)
+    counted = node.counters['SIZE']
+    node.send(data[:-60])
+    assert node.counters['SIZE'] == counted + 1
+
+
+def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
+    node: FeedforwardBench, model: ArmModel,
+) -> None:
+    moved = motion(1, 7)
+    before = np.array(node.answer(message_of(moved)))
+    steps = (('effects.payload_mass.mass', 0.8), ('effects.active', ['payload_mass']))
+    for name, value in steps:
+        result, = node.node.set_parameters([Parameter(name, value=value)])
+        assert result.successful, result.reason
+    from pprs_dynamics.physics.model.model_file import build_model
+    loaded = build_model({**model.values, **dict(steps)}, model.source)
+    np.testing.assert_allclose(node.answer(message_of(moved)),
+                               loaded.drive_forces(moved).total[0], rtol=0, atol=EQUAL)
+    for name, value, said in (('friction.viscous', [1.0, 2.0], 'friction.viscous'),
+                              ('arm.urdf', '/nowhere.urdf', '/nowhere.urdf'),
+                              ('arm.joints', ['swing', 'turn', 'reach'], 'when the node started'),
+                              ('geometry.rod_length', 0.3, 'geometry.rod_length')):
+        result, = node.node.set_parameters([Parameter(name, value=value)])
+        assert not result.successful
+        assert said in result.reason
+    result, = node.node.set_parameters(
+        [Parameter('effects.active', Parameter.Type.STRING_ARRAY, [])])
+    assert result.successful, result.reason
+    np.testing.assert_allclose(node.answer(message_of(moved)), before, rtol=0, atol=EQUAL)
+
+
+def test_the_nodes_own_limits_hold_and_clamp(file: Path, model: ArmModel) -> None:
+    moved = motion(2, 3)
+    peak = np.abs(model.drive_forces(moved).total).max(axis=0)
+    limits = peak * [0.5, 2, 0.5]
+    with feedforward_bench(JointTrajectory, **parameters(
+            file, effort_limits=limits.tolist(), limit_policy='clamp')) as node:
+        np.testing.assert_allclose(
+            node.answer(message_of(moved)),
+            np.clip(model.drive_forces(moved).total[0], -limits, limits), rtol=0, atol=EQUAL)
+        assert node.wait_for_status(code='CLAMPED')['level'] == 'WARN'
+        result, = node.node.set_parameters([Parameter('limit_policy', value='reject')])
+        assert result.successful
+        node.send(message_of(moved))
+        assert node.counters['LIMIT'] == 1
+
+
+def test_a_stale_command_holds_the_last_position(file: Path, model: ArmModel) -> None:
+    moved = motion()
+    with feedforward_bench(JointTrajectory, **parameters(file, command_timeout=TIMEOUT)) as node:
+        node.answer(message_of(moved))
+        node.wait_for_status(code='STALE', level='STALE')
+        assert len(node.commands) == 2
+        rest = np.zeros((1, 3))
+        held = model.drive_forces(JointMotion(moved.position[-1:], rest, rest, np.zeros(1)))
+        np.testing.assert_allclose(node.commands[-1].data, held.total[0], rtol=0, atol=EQUAL)
+        assert np.abs(held.total).max() > 1
+
+
+def test_efforts_in_amperes_go_out_as_currents_and_so_do_limits(
+    file: Path, model: ArmModel,
+) -> None:
+    gain, moved = np.array([10.0, 5.0, 40.0]), motion(2, 4)
+    currents = model.drive_forces(moved).total / gain
+    with feedforward_bench(JointTrajectory, **parameters(
+            file, arm__gain=gain.tolist(), arm__effort_unit='A')) as node:
+        np.testing.assert_allclose(node.answer(message_of(moved)), currents[0], rtol=0, atol=EQUAL)
+        tight = np.full(3, LIMIT)
+        tight[1] = np.abs(currents[:, 1]).max() * 0.9
+        result, = node.node.set_parameters([Parameter('effort_limits', value=tight.tolist())])
+        assert result.successful
+        node.send(message_of(moved))
+        assert 'swing needs' in (said := node.wait_for_status(code='LIMIT')['message'])
+        assert ' A, ' in said
+
+
+def test_missing_derivatives_come_from_a_spline(file: Path, model: ArmModel) -> None:
+    time = np.arange(40) * 0.01
+    phase = 2 * time[:, None] + np.array([0.1, 0.7, 1.5])
+    exact = JointMotion(np.sin(phase), 2 * np.cos(phase), -4 * np.sin(phase), time)
+    message = message_of(exact)
+    for point in message.points:
+        point.velocities, point.accelerations = [], []
+    with feedforward_bench(
+            JointTrajectory, **parameters(file, missing_derivatives='spline')) as node:
+        # A quintic spline at 100 Hz of a motion at 2 rad/s: its ends are good to 1e-4 of a N m.
+        np.testing.assert_allclose(node.answer(message), model.drive_forces(exact).total[0],
+                                   rtol=0, atol=1e-3)
+        short = message_of(exact[:3])
+        short.points[1].velocities = []
+        node.send(short)
+        assert 'a spline needs at least 4' in node.wait_for_status(code='SIZE')['message']
+
+
+@pytest.fixture
+def running() -> Iterator[Bench]:
+    with bench() as probe:
+        yield probe
+
+
+def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
+    running: Bench, ros_domain: int, file: Path, model: ArmModel, tmp_path: Path,
+) -> None:
+    commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
+    running.follow_status('/feedforward/status')
+    publisher = running.probe.create_publisher(JointTrajectory, '/feedforward/trajectory', 100)
+    moved = motion(5, 1)
+    # Started in another folder than the file's.
+    with node_process([executable('feedforward'), '--ros-args', '--params-file', str(file),
+                       '-p', 'command_timeout:=0.0', '-p', 'timeout_action:=silent'],
+                      ros_domain, tmp_path / 'log') as process:
+        assert running.connected()
+        assert running.spin_until(publisher.get_subscription_count)
+        for k in range(len(moved)):
+            publisher.publish(message_of(moved[k:k + 1].with_time([0.0])))
+        assert running.spin_until(lambda: len(commands) == len(moved)), running.status[-1]
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+    np.testing.assert_allclose([one.data for one in commands], model.drive_forces(moved).total,
+                               rtol=0, atol=EQUAL)
+
+
+@pytest.mark.parametrize(('parameter', 'said'), [
+    ('arm.tool:=flansch', "arm.tool is 'flansch', must be a link of the URDF"),
+    ('effort_limits:=[1.0,2.0]', 'effort_limits is [1.0, 2.0], must be empty, or be a list of 3'),
+    ('arm.urdf:=missing.urdf', 'missing.urdf'),
+])
+def test_a_mistake_is_one_sentence_and_status_2(
+    ros_domain: int, file: Path, parameter: str, said: str,
+) -> None:
+    done = subprocess.run(
+        [executable('feedforward'), '--ros-args', '--params-file', str(file), '-p', parameter],
+        env=environment(ros_domain), capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert 'Traceback' not in done.stderr
+
+
+def test_the_monitor_tells_what_the_model_of_an_arm_lacks(
+    running: Bench, file: Path, model: ArmModel,
+) -> None:
+    gain = np.array([10.0, 5.0, 40.0])
+    values = parameters(file, arm__gain=gain.tolist(), arm__effort_unit='A', error_span=1.0)
+    node = running.add(MonitorNode, parameter_overrides=[
+        Parameter(name.replace('__', '.'), value=value) for name, value in values.items()])
+    residual = running.listen(JointState, '/monitor/residual', 1000)
+    error = running.listen(Float64MultiArray, '/monitor/error', 1000)
+    running.follow_status('/monitor/status')
+    publisher = running.probe.create_publisher(JointState, '/joint_states', 1000)
+    assert running.spin_until(publisher.get_subscription_count)
+    assert running.connected()
+    moved = arm.motion(6.0, 200.0)
+    lacking = np.array([0.0, 3.0, 0.0])  # [N m] that the model does not know of
+    current = (model.drive_forces(moved).total + lacking) / gain
+    for row in range(len(moved)):
+        names = [arm.JOINTS[k] for k in ORDER]
+        message = JointState(name=names, position=moved.position[row, list(ORDER)].tolist(),
+                             effort=current[row, list(ORDER)].tolist())
+        message.header.stamp = conversions.time(1_700_000_000_000_000_000 + row * 5_000_000)
+        publisher.publish(message)
+        if row % 20 == 0:
+            assert running.spin_until(lambda row=row: node._counters['received'] > row)
+    assert running.spin_until(lambda: len(residual) > 1100)
+    assert tuple(residual[-1].name) == arm.JOINTS
+    # Smoothing over 0.12 s blurs where friction turns over: 12 N m and 18 N within milliseconds.
+    np.testing.assert_allclose(
+        np.nanmedian([one.effort for one in residual], axis=0), lacking, rtol=0, atol=0.1)
+    assert error[-1].data[1] > 2
+    assert 'N or N m' in running.status[-1]['message']

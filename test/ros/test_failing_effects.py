@@ -1,0 +1,377 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects of other packages that fail: one sentence that names them, and the nodes live on."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from failing_effects import install, installed, model_file, parameters
+from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
+from node_bench import Bench, bench
+from rclpy.parameter import Parameter
+from ros_processes import environment, executable, node_process
+from std_msgs.msg import Float64MultiArray
+from test_monitor_node import MonitorBench
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.errors import EffectError
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
+
+MOTION = random_motion(np.random.default_rng(11), 3)
+ONE = MOTION[:1]
+# Fault of WornBrake.columns: what the sentence says of it.
+FAULTS = {
+    'raises': 'columns raised ZeroDivisionError: division by zero (',
+    'exits': 'columns raised SystemExit: 3 (',
+    'none': "columns raised TypeError: 'NoneType' object is not iterable",
+    'longer': 'columns returned an array of shape (2,), must be (1,)',
+    'fewer': 'columns returned 0 arrays, must be 1 (coefficient)',
+    'words': 'columns raised ValueError: could not convert string to float',
+    'nan': 'columns returned an array with nan, must be finite',
+}
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Iterator[ModuleType]:
+    with installed(tmp_path) as module:
+        module.PLACE, module.FAULT = 'nowhere', 'none'
+        yield module
+
+
+def fail(package: Any, place: str, fault: str = 'raises') -> None:
+    package.PLACE, package.FAULT = place, fault
+
+
+def rest(motion: PlatformMotion) -> PlatformMotion:
+    return PlatformMotion.at_rest(motion.position[-1:], motion.orientation[-1:])
+
+
+# --- the model ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('fault', 'told'), FAULTS.items())
+def test_a_failing_drive_effect_is_one_error_with_its_name(
+    package: ModuleType, tmp_path: Path, fault: str, told: str,
+) -> None:
+    model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
+    fail(package, 'columns', fault)
+    with pytest.raises(EffectError) as raised:
+        model.drive_forces(ONE)
+    assert raised.value.effect == 'worn_brake'
+    assert str(raised.value).startswith(f'effect worn_brake: {told}')
+    if told.endswith('('):
+        assert 'worn_brake.py, line ' in str(raised.value)
+
+
+@pytest.mark.parametrize(('place', 'fault', 'told'), [
+    ('load', 'raises', 'load raised ZeroDivisionError'),
+    ('load', 'longer', 'must be (1, 6)'),
+    ('load', 'nan', 'load returned a wrench with nan, must be finite'),
+    ('changed', 'raises', 'changed raised ZeroDivisionError'),
+    ('changed', 'none', 'changed returned None, must be a Robot'),
+])
+def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
+    package: ModuleType, tmp_path: Path, place: str, fault: str, told: str,
+) -> None:
+    model = DriveModel.load(model_file(tmp_path, 'hose'))
+    fail(package, place, fault)
+    with pytest.raises(EffectError, match='effect hose: ') as raised:
+        model.drive_forces(ONE)
+    assert told in str(raised.value)
+
+
+def test_what_the_mechanism_refuses_is_not_put_down_to_the_effect(
+    package: ModuleType, tmp_path: Path,
+) -> None:
+    model = DriveModel.load(model_file(tmp_path, 'hose', 'worn_brake'))
+    absurd = PlatformMotion(ONE.position, ONE.orientation, np.full((1, 3), 1e200),
+                            *(np.zeros((1, 3)) for _ in range(3)))
+    assert not np.isfinite(model.drive_forces(absurd).total).all()
+
+
+def test_an_effect_whose_memory_cannot_be_copied_is_told(
+    package: Any, tmp_path: Path,
+) -> None:
+    package.WornBrake.drive_memory = classmethod(lambda cls: {'samples': 0, 'log': (x for x in ())})
+    model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
+    with pytest.raises(EffectError, match='effect worn_brake: its memory cannot be copied'):
+        model.initial_state().copy()
+
+
+@pytest.mark.parametrize('place', ['__init__', 'changed'])
+def test_a_model_file_with_an_effect_that_cannot_be_built_is_refused(
+    package: ModuleType, tmp_path: Path, place: str,
+) -> None:
+    fail(package, place)
+    name = 'hose' if place == 'changed' else 'worn_brake'
+    with pytest.raises(EffectError, match=f'effect {name}: {place} raised ZeroDivisionError'):
+        DriveModel.load(model_file(tmp_path, name))
+
+
+# --- feedforward ----------------------------------------------------------------------------------
+
+
+def held(node: FeedforwardBench, motion: PlatformMotion) -> np.ndarray:
+    """Return the forces that hold a pose without the effects of the package."""
+    return DriveModel.load().drive_forces(rest(motion)).total[0]
+
+
+@pytest.mark.nodes
+@pytest.mark.parametrize('fault', FAULTS)
+def test_feedforward_rejects_counts_tells_and_goes_on(package: ModuleType, fault: str) -> None:
+    with feedforward_bench(**parameters('worn_brake')) as node:
+        answer = node.answer(message_of(ONE))
+        for count in (1, 2):
+            fail(package, 'columns', fault)
+            silent = len(node.commands)
+            for _ in range(3):
+                node.send(message_of(ONE))
+            assert node.counters['EFFECT'] == 3 * count
+            status = node.wait_for_status(level='ERROR', code='EFFECT')
+            assert FAULTS[fault].split(' (')[0] in status['message']
+            # Once, though commands never go stale here: not the messages are wrong.
+            assert node.bench.spin_until(lambda silent=silent: len(node.commands) > silent)
+            node.bench.spin_for(0.1)
+            assert len(node.commands) == silent + 1
+            np.testing.assert_allclose(node.commands[-1].data, held(node, ONE), rtol=0, atol=EQUAL)
+            fail(package, 'nowhere')
+            assert node.answer(message_of(ONE)) == answer
+            node.wait_for_status(level='OK', code='OK')
+            assert node.bench.status[-1]['counters']['EFFECT'] == 3 * count
+
+
+@pytest.mark.nodes
+@pytest.mark.parametrize('action', ['zero', 'silent'])
+def test_the_timeouts_action_is_that_of_stale_commands(package: ModuleType, action: str) -> None:
+    with feedforward_bench(**parameters('hose'), timeout_action=action) as node:
+        node.answer(message_of(MOTION))
+        fail(package, 'load')
+        node.send(message_of(MOTION))
+        assert node.counters['EFFECT'] == 1
+        node.bench.spin_for(0.2)
+        assert len(node.commands) == (2 if action == 'zero' else 1)
+        if action == 'zero':
+            assert list(node.commands[-1].data) == [0.0] * 6
+        wanted = 'efforts are zero' if action == 'zero' else 'the last command stays in force'
+        assert node.bench.spin_until(lambda: wanted in node.bench.status[-1]['message'])
+
+
+@pytest.mark.nodes
+def test_nothing_goes_out_where_no_command_was_in_force(package: ModuleType) -> None:
+    fail(package, 'columns')
+    with feedforward_bench(**parameters('worn_brake')) as node:
+        node.send(message_of(ONE))
+        assert node.counters['EFFECT'] == 1
+        node.bench.spin_for(0.2)
+        assert not node.commands
+
+
+@pytest.mark.nodes
+def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: Any) -> None:
+    def columns(cls: type, drive: Any, **_: float) -> tuple[Any]:
+        return (np.array([1.0 / v for v in drive.velocity.tolist()]),)
+
+    package.WornBrake.columns = classmethod(columns)
+    from pprs_dynamics.physics.effects.guard import guard
+
+    guard(package.WornBrake)
+    with feedforward_bench(**parameters('worn_brake'), command_timeout=0.15) as node:
+        node.answer(message_of(ONE))
+        status = node.wait_for_status(level='STALE', code='STALE')
+        assert 'the last pose is held at rest, without worn_brake' in status['message']
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)
+        np.testing.assert_allclose(node.commands[-1].data, held(node, ONE), rtol=0, atol=EQUAL)
+
+
+@pytest.mark.nodes
+def test_a_rejected_message_leaves_no_trace_in_the_memory(package: ModuleType) -> None:
+    with feedforward_bench(**parameters('worn_brake')) as node:
+        def samples() -> int:
+            return int(node.node._feedforward._memory.memories['worn_brake']['slide_2']['samples'])
+
+        node.answer(message_of(MOTION))
+        assert samples() == 1
+        # The whole trajectory passes, and the step of the memory to its first point fails.
+        fail(package, 'columns_2')
+        node.send(message_of(MOTION))
+        assert node.counters['EFFECT'] == 1
+        assert samples() == 1
+        fail(package, 'nowhere')
+        node.answer(message_of(MOTION))
+        assert samples() == 2
+
+
+@pytest.mark.nodes
+@pytest.mark.parametrize('place', ['__init__', 'drive_memory'])
+def test_a_parameter_that_an_effect_fails_at_is_refused_with_the_reason(
+    package: ModuleType, place: str,
+) -> None:
+    with feedforward_bench(**parameters('worn_brake')) as node:
+        answer = node.answer(message_of(ONE))
+        fail(package, place)
+        result, = node.node.set_parameters(
+            [Parameter('effects.worn_brake.slide_2.coefficient', value=4.0)])
+        assert not result.successful
+        assert result.reason.startswith(f'effect worn_brake: {place} raised ZeroDivisionError')
+        fail(package, 'nowhere')
+        assert node.answer(message_of(ONE)) == answer
+
+
+@pytest.mark.nodes
+def test_an_effect_that_fails_to_begin_after_it_was_accepted_costs_messages_only(
+    package: Any,
+) -> None:
+    with feedforward_bench(**parameters('worn_brake')) as node:
+        answer = node.answer(message_of(ONE))
+        result, = node.node.set_parameters(
+            [Parameter('effects.worn_brake.slide_2.coefficient', value=4.0)])
+        assert result.successful
+        fail(package, 'drive_memory')
+        node.send(message_of(ONE))
+        assert node.counters['EFFECT'] == 1
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)
+        fail(package, 'nowhere')
+        # The velocity of slide_2 times 3 or 4 N s/m.
+        change = np.subtract(node.answer(message_of(ONE)), answer)
+        velocity = DriveModel.load().drive_forces(ONE).mechanism.velocity[0]
+        np.testing.assert_allclose(change, [0, velocity[1], 0, 0, 0, 0], rtol=0, atol=1e-9)
+
+
+@pytest.mark.nodes
+def test_the_process_lives_on_and_ends_as_ever(ros_domain: int, tmp_path: Path) -> None:
+    file = model_file(install(tmp_path), 'worn_brake')
+    env = {**environment(ros_domain), 'WORN_BRAKE': 'columns raises', 'PYTHONPATH': os.pathsep.join(
+        filter(None, (str(tmp_path), os.environ.get('PYTHONPATH'))))}
+    server = [executable('feedforward'), '--ros-args', '--params-file', str(file)]
+    with bench() as running:
+        commands = running.listen(Float64MultiArray, '/feedforward/commands')
+        running.follow_status('/feedforward/status')
+        publisher = running.probe.create_publisher(
+            MultiDOFJointTrajectory, '/feedforward/trajectory', 100)
+        with node_process(server, ros_domain, tmp_path / 'log', env) as process:
+            assert running.spin_until(publisher.get_subscription_count, 20)
+            assert running.connected()
+            for _ in range(10):
+                publisher.publish(message_of(ONE))
+            assert running.spin_until(
+                lambda: running.status[-1]['counters']['EFFECT'] == 10), running.status[-1]
+            assert running.status[-1]['code'] == 'EFFECT'
+            assert not commands
+            process.terminate()
+            assert process.wait(5) == 0
+    log = (tmp_path / 'log').read_text()
+    assert 'Traceback' not in log
+    assert 'rejected, EFFECT: effect worn_brake: columns raised ZeroDivisionError' in log
+
+
+# --- the other nodes, and pprs --------------------------------------------------------------------
+
+
+@pytest.mark.nodes
+def test_the_monitor_counts_tells_and_goes_on(package: ModuleType) -> None:
+    values = {name.replace('__', '.'): value for name, value in parameters('worn_brake').items()}
+    with bench() as running:
+        monitor = MonitorBench(running, **values)
+        monitor.send(300)
+        assert len(monitor.residual) > 100
+        fail(package, 'columns')
+        monitor.send(200)
+        silent = len(monitor.residual)
+        assert monitor.node._counters['EFFECT'] > 0
+        assert monitor.bench.spin_until(lambda: monitor.bench.status[-1]['code'] == 'EFFECT')
+        assert 'effect worn_brake: columns raised' in monitor.bench.status[-1]['message']
+        result, = monitor.node.set_parameters(
+            [Parameter('effects.worn_brake.slide_2.coefficient', value=4.0)])
+        assert result.successful, result.reason
+        fail(package, 'drive_memory')
+        monitor.send(200)
+        assert len(monitor.residual) == silent
+        fail(package, 'nowhere')
+        monitor.send(400)
+        assert len(monitor.residual) > silent + 200
+        assert monitor.bench.status[-1]['code'] == 'OK'
+
+
+@pytest.mark.nodes
+def test_the_simulated_robot_asks_no_effect_and_refuses_one_that_cannot_be_built(
+    package: ModuleType,
+) -> None:
+    values = [Parameter(name.replace('__', '.'), value=value)
+              for name, value in parameters('worn_brake', 'hose').items()]
+    fail(package, 'columns')
+
+    def cycles(running: Bench) -> int:
+        return int(running.status[-1]['counters']['cycles']) if running.status else 0
+
+    with bench() as running:
+        running.follow_status('/simulated_robot/status')
+        running.add(SimulatedRobotNode, parameter_overrides=values)
+        assert running.spin_until(lambda: cycles(running) > 100)
+        fail(package, '__init__')
+        with pytest.raises(EffectError, match='effect worn_brake: __init__ raised'):
+            SimulatedRobotNode(context=running.context, parameter_overrides=values)
+
+
+@pytest.mark.nodes
+@pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot'])
+def test_a_node_whose_effect_cannot_be_built_ends_with_one_sentence(
+    ros_domain: int, tmp_path: Path, node: str,
+) -> None:
+    file = model_file(install(tmp_path), 'worn_brake')
+    done = run(tmp_path, '__init__ raises', executable(node), '--ros-args', '--params-file', file)
+    assert done.returncode == 2
+    assert 'Traceback' not in done.stderr
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith('effect worn_brake: __init__ raised ZeroDivisionError')
+
+
+def run(folder: Path, fault: str, *command: object) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join(filter(None, (str(folder), os.environ.get('PYTHONPATH'))))
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True,
+                          timeout=120, cwd=folder,
+                          env={**os.environ, 'PYTHONPATH': path, 'WORN_BRAKE': fault})
+
+
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot that the paper's model explains."""
+    forces = DriveModel.load().drive_forces(
+        Excitation(6.0, seed=3).motion(np.arange(0, 6.0, 0.002)))
+    noise = np.random.default_rng(0).normal(scale=0.05, size=forces.total.shape)
+    file = tmp_path_factory.mktemp('recording') / 'run.csv'
+    write_recording(file, Recording.from_arrays(
+        'run', np.arange(len(noise)) * 0.002, forces.mechanism.position, None,
+        forces.total + noise, DRIVES))
+    return file
+
+
+@pytest.mark.parametrize(('command', 'fault'), [
+    ('compare', 'columns raises'), ('compare', 'columns nan'), ('compare', 'drive_memory exits'),
+    ('diagnose', 'columns longer'), ('adopt', 'columns raises')])
+def test_a_command_ends_with_one_sentence(
+    tmp_path: Path, recording: Path, command: str, fault: str,
+) -> None:
+    install(tmp_path)
+    words = {'compare': [recording, '--model', model_file(tmp_path, 'worn_brake')],
+             'diagnose': [recording],
+             'adopt': ['worn_brake', recording, '--output', tmp_path / 'better.yaml']}[command]
+    done = run(tmp_path, fault, executable('pprs'), command, *words)
+    assert done.returncode == 2, done.stderr
+    assert 'Traceback' not in done.stderr
+    place = fault.split()[0]
+    assert done.stderr.splitlines()[-1].startswith(
+        f'pprs {command}: effect worn_brake: {place} ')
+    assert not (tmp_path / 'better.yaml').exists()

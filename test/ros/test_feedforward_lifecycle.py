@@ -1,0 +1,242 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The feedforward node under a supervisor, and how it ends."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from node_bench import Bench, bench
+from rclpy.parameter import Parameter
+from ros_processes import executable, node_process
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.ros.feedforward import FeedforwardNode
+
+pytestmark = pytest.mark.nodes
+
+MOTION = random_motion(np.random.default_rng(3), 1)
+MESSAGE = message_of(MOTION)
+
+
+class Supervisor:
+    """Calls the lifecycle services over DDS."""
+
+    def __init__(self, running: Bench) -> None:
+        self.bench = running
+        self._change = running.probe.create_client(ChangeState, '/feedforward/change_state')
+        self._get = running.probe.create_client(GetState, '/feedforward/get_state')
+
+    def call(self, client: Any, request: Any) -> Any:
+        """Call a service and return its response."""
+        assert self.bench.spin_until(client.service_is_ready)
+        future = client.call_async(request)
+        assert self.bench.spin_until(future.done)
+        return future.result()
+
+    def change(self, transition: int) -> bool:
+        """Return whether a transition was made."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return bool(self.call(self._change, request).success)
+
+    def state(self) -> str:
+        """Return the state's label."""
+        return str(self.call(self._get, GetState.Request()).current_state.label)
+
+
+@pytest.fixture
+def supervised() -> Iterator[tuple[FeedforwardBench, Supervisor]]:
+    """Give a node that waits for its supervisor."""
+    overrides = [Parameter('autostart', value=False), Parameter('command_timeout', value=0.0)]
+    with bench() as running:
+        node = FeedforwardBench(running, parameter_overrides=overrides)
+        yield node, Supervisor(running)
+
+
+def test_a_supervisor_leads_it_through_its_states(
+    supervised: tuple[FeedforwardBench, Supervisor],
+) -> None:
+    node, supervisor = supervised
+    assert supervisor.state() == 'unconfigured'
+    assert not supervisor.change(Transition.TRANSITION_ACTIVATE)
+    for _ in range(2):
+        assert supervisor.change(Transition.TRANSITION_CONFIGURE)
+        assert supervisor.state() == 'inactive'
+        node.connect()
+        # An inactive node drops what it gets, and does not answer it later.
+        silent = len(node.commands)
+        for _ in range(3):
+            node.publisher.publish(MESSAGE)
+        node.bench.spin_for(0.2)
+        assert len(node.commands) == silent
+        assert supervisor.change(Transition.TRANSITION_ACTIVATE)
+        node.bench.spin_for(0.2)
+        assert len(node.commands) == silent
+        expected = DriveModel.load().drive_forces(MOTION).total[0]
+        np.testing.assert_allclose(node.answer(MESSAGE), expected, rtol=0, atol=EQUAL)
+        # The last word of an active node holds the pose.
+        assert supervisor.change(Transition.TRANSITION_DEACTIVATE)
+        assert node.bench.spin_until(lambda silent=silent: len(node.commands) == silent + 2)
+        np.testing.assert_allclose(node.commands[-1].data, held(MOTION), rtol=0, atol=EQUAL)
+        assert supervisor.change(Transition.TRANSITION_CLEANUP)
+        assert supervisor.state() == 'unconfigured'
+        assert node.bench.spin_until(lambda: not node.publisher.get_subscription_count())
+    assert supervisor.change(Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
+    assert supervisor.state() == 'finalized'
+    assert node.wait_for_status(code='FINALIZED')
+
+
+def test_a_transition_that_rclpy_raises_at_is_refused(
+    supervised: tuple[FeedforwardBench, Supervisor],
+) -> None:
+    node, supervisor = supervised
+    service, = (each for each in node.node.services if each.srv_name.endswith('/change_state'))
+
+    def raises(request: ChangeState.Request, response: ChangeState.Response) -> None:
+        raise RuntimeError('Transition is not registered.')
+
+    # As rclpy of Jazzy does at an activation before the configuration.
+    allowed, service.callback = service.callback, node.node._refusing(raises)
+    assert not supervisor.change(Transition.TRANSITION_ACTIVATE)
+    service.callback = allowed
+    assert supervisor.change(Transition.TRANSITION_CONFIGURE)
+
+
+def held(motion: PlatformMotion) -> np.ndarray:
+    """Return the forces that hold the last pose."""
+    rest = PlatformMotion.at_rest(motion.position[-1:], motion.orientation[-1:])
+    return DriveModel.load().drive_forces(rest).parts['rigid_body'][0]
+
+
+def test_parameters_set_while_inactive_are_in_force_when_active(
+    supervised: tuple[FeedforwardBench, Supervisor],
+) -> None:
+    node, supervisor = supervised
+    assert node.node.set_parameters([Parameter('masses.payload', value=2.0)])[0].successful
+    assert supervisor.change(Transition.TRANSITION_CONFIGURE)
+    assert node.node.set_parameters([Parameter('feedforward_scale', value=0.5)])[0].successful
+    assert supervisor.change(Transition.TRANSITION_ACTIVATE)
+    node.connect()
+    light, heavy = np.abs(held(MOTION)).sum(), np.abs(node.answer(MESSAGE)).sum()
+    # Half of the force for half as much mass again, roughly: neither change alone gives that.
+    assert 0.5 * light < heavy < light
+
+
+def test_a_node_that_is_active_by_itself_can_still_be_managed() -> None:
+    with feedforward_bench() as node:
+        supervisor = Supervisor(node.bench)
+        assert supervisor.state() == 'active'
+        assert supervisor.change(Transition.TRANSITION_DEACTIVATE)
+        # No command was in force, so that there is nothing to hold.
+        node.bench.spin_for(0.1)
+        assert not node.commands
+        assert supervisor.change(Transition.TRANSITION_ACTIVATE)
+        node.answer(MESSAGE)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_the_timeouts_action_as_its_last_word(
+    ros_domain: int, tmp_path: Path, number: signal.Signals,
+) -> None:
+    command = [executable('feedforward'), '--ros-args', '-p', 'command_timeout:=0.0']
+    with bench() as running, node_process(command, ros_domain, tmp_path / 'log') as process:
+        commands = running.listen(Float64MultiArray, '/feedforward/commands')
+        publisher = running.probe.create_publisher(
+            MultiDOFJointTrajectory, '/feedforward/trajectory', 10)
+        assert running.spin_until(publisher.get_subscription_count, 20)
+        assert running.connected()
+        publisher.publish(MESSAGE)
+        assert running.spin_until(lambda: commands)
+        process.send_signal(number)
+        began = time.monotonic()
+        assert running.spin_until(lambda: process.poll() is not None, 10)
+        # A second on a machine that has one to spare; a busy one is given five.
+        assert time.monotonic() - began < 5
+        assert process.returncode == 0
+        assert running.spin_until(lambda: len(commands) == 2, 2)
+        np.testing.assert_allclose(commands[-1].data, held(MOTION), rtol=0, atol=EQUAL)
+    assert 'Traceback' not in (tmp_path / 'log').read_text()
+
+
+def test_a_signal_during_the_start_ends_it_too(ros_domain: int, tmp_path: Path) -> None:
+    for delay in (0.0, 0.2, 0.4, 0.6):
+        with node_process([executable('feedforward')], ros_domain, tmp_path / 'log') as process:
+            time.sleep(delay)
+            process.send_signal(signal.SIGTERM)
+            process.wait(10)
+        assert 'Traceback' not in (tmp_path / 'log').read_text()
+
+
+def test_killed_and_started_again_it_answers_from_the_first_message_it_gets(
+    ros_domain: int, tmp_path: Path,
+) -> None:
+    command = [executable('feedforward')]
+    with bench() as running:
+        commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
+        running.follow_status('/feedforward/status')
+        publisher = running.probe.create_publisher(
+            MultiDOFJointTrajectory, '/feedforward/trajectory', 1000)
+        timer = running.probe.create_timer(0.01, lambda: publisher.publish(MESSAGE))
+        for _ in range(2):
+            commands.clear()
+            with node_process(command, ros_domain, tmp_path / 'log') as process:
+                assert running.spin_until(lambda: len(commands) > 50, 20)
+                running.status.clear()
+                assert running.spin_until(
+                    lambda: running.status and running.status[-1]['counters']['accepted'] > 20)
+                counters = running.status[-1]['counters']
+                assert counters['received'] == counters['accepted']
+                process.kill()
+                process.wait(5)
+        timer.cancel()
+
+
+def test_two_namespaces_do_not_disturb_each_other() -> None:
+    with bench() as running:
+        nodes = [running.add(
+            FeedforwardNode, namespace=name, parameter_overrides=[
+                Parameter('masses.payload', value=payload),
+                Parameter('command_timeout', value=0.0)])
+            for name, payload in (('left', 0.5), ('right', 3.0))]
+        answers = [running.listen(Float64MultiArray, f'/{name}/feedforward/commands')
+                   for name in ('left', 'right')]
+        publishers = [running.probe.create_publisher(
+            MultiDOFJointTrajectory, f'/{name}/feedforward/trajectory', 100)
+            for name in ('left', 'right')]
+        assert running.spin_until(lambda: all(p.get_subscription_count() for p in publishers))
+        assert running.connected()
+        bad = message_of(MOTION)
+        bad.joint_names = ['gripper']
+        for _ in range(10):
+            publishers[0].publish(MESSAGE)
+            publishers[1].publish(bad)
+            publishers[1].publish(MESSAGE)
+        assert running.spin_until(lambda: all(len(answer) == 10 for answer in answers))
+        assert nodes[0]._counters['NAMES'] == 0
+        assert nodes[1]._counters['NAMES'] == 10
+        sums = [np.abs(answer[-1].data).sum() for answer in answers]
+        assert sums[0] < sums[1]
+
+
+def test_a_publisher_that_disappears_and_returns_is_stale_and_then_recovered() -> None:
+    with feedforward_bench(command_timeout=0.15) as node:
+        answer = node.answer(MESSAGE)
+        node.bench.probe.destroy_publisher(node.publisher)
+        node.wait_for_status(code='STALE')
+        node.publisher = node.bench.probe.create_publisher(
+            MultiDOFJointTrajectory, '/feedforward/trajectory', 100)
+        node.connect()
+        assert node.answer(MESSAGE) == answer
+        node.wait_for_status(code='OK')

@@ -1,0 +1,283 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The feedforward node over DDS with real messages."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from feedforward_bench import (
+    EQUAL,
+    FeedforwardBench,
+    feedforward_bench,
+    message_of,
+    random_motion,
+)
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.rejection import CODES
+
+pytestmark = pytest.mark.nodes
+
+
+@pytest.fixture
+def feedforward() -> Iterator[FeedforwardBench]:
+    with feedforward_bench() as running:
+        yield running
+
+
+def test_forces_equal_the_python_api(feedforward: FeedforwardBench) -> None:
+    rng, model = np.random.default_rng(5), DriveModel.load()
+    for count, points in enumerate((1, 1, 1, 7, 40), start=1):
+        motion = random_motion(rng, points)
+        expected = model.drive_forces(motion)
+        found = feedforward.answer(message_of(motion))
+        np.testing.assert_allclose(found, expected.total[0], rtol=0, atol=EQUAL)
+        assert feedforward.bench.spin_until(
+            lambda count=count: len(feedforward.joint_trajectory) == count)
+        answer = feedforward.joint_trajectory[-1]
+        assert tuple(answer.joint_names) == DRIVES
+        state = expected.mechanism
+        for name, values in (('effort', expected.total), ('positions', state.position),
+                             ('velocities', state.velocity), ('accelerations', state.acceleration)):
+            np.testing.assert_allclose([getattr(point, name) for point in answer.points], values,
+                                       rtol=0, atol=EQUAL)
+
+
+def test_joint_command_is_stamped_with_header_plus_time_from_start(
+    feedforward: FeedforwardBench,
+) -> None:
+    stamp = Time(sec=12, nanosec=700_000_000)
+    message = message_of(random_motion(np.random.default_rng(1), 2), stamp)
+    message.points[0].time_from_start.nanosec = 500_000_000
+    message.points[1].time_from_start.nanosec = 600_000_000
+    feedforward.answer(message)
+    assert feedforward.bench.spin_until(lambda: feedforward.joint_command)
+    command = feedforward.joint_command[-1]
+    assert (command.header.stamp.sec, command.header.stamp.nanosec) == (13, 200_000_000)
+    assert tuple(command.name) == DRIVES
+    assert list(command.effort) == list(feedforward.commands[-1].data)
+
+
+def test_parts_are_published_while_somebody_listens_and_sum_to_the_command(
+    feedforward: FeedforwardBench,
+) -> None:
+    running = feedforward.bench
+    motion = random_motion(np.random.default_rng(2), 1)
+    parts = {name: running.listen(JointState, f'/feedforward/effort/{name}')
+             for name in ('rigid_body', 'active_friction', 'passive_friction')}
+    assert running.spin_until(lambda: all(
+        feedforward.node.count_subscribers(f'/feedforward/effort/{name}') for name in parts))
+    total = feedforward.answer(message_of(motion))
+    assert running.spin_until(lambda: all(parts.values()))
+    np.testing.assert_allclose(
+        np.sum([received[-1].effort for received in parts.values()], axis=0), total, atol=EQUAL)
+    expected = DriveModel.load().drive_forces(motion).parts
+    for name, received in parts.items():
+        np.testing.assert_allclose(received[-1].effort, expected[name][0], rtol=0, atol=EQUAL)
+
+
+# --- messages that break a rule -----------------------------------------------------------------
+
+def empty(m: MultiDOFJointTrajectory) -> None:
+    m.points = []
+
+
+def wrong_name(m: MultiDOFJointTrajectory) -> None:
+    m.joint_names = ['gripper']
+
+
+def two_names(m: MultiDOFJointTrajectory) -> None:
+    m.joint_names = ['platform', 'platform']
+
+
+def foreign_frame(m: MultiDOFJointTrajectory) -> None:
+    m.header.frame_id = 'world'
+
+
+def no_velocity(m: MultiDOFJointTrajectory) -> None:
+    m.points[1].velocities = []
+
+
+def no_acceleration(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].accelerations = []
+
+
+def two_transforms(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].transforms = [m.points[0].transforms[0], m.points[0].transforms[0]]
+
+
+def nan_position(m: MultiDOFJointTrajectory) -> None:
+    m.points[1].transforms[0].translation.y = float('nan')
+
+
+def infinite_acceleration(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].accelerations[0].angular.z = float('-inf')
+
+
+def zero_quaternion(m: MultiDOFJointTrajectory) -> None:
+    rotation = m.points[0].transforms[0].rotation
+    rotation.x = rotation.y = rotation.z = rotation.w = 0.0
+
+
+def long_quaternion(m: MultiDOFJointTrajectory) -> None:
+    m.points[1].transforms[0].rotation.w = 1e200
+
+
+def times_stand_still(m: MultiDOFJointTrajectory) -> None:
+    m.points[1].time_from_start = m.points[0].time_from_start
+
+
+def times_run_back(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].time_from_start.sec = 5
+
+
+def out_of_reach(m: MultiDOFJointTrajectory) -> None:
+    m.points[1].transforms[0].translation.x = 0.6
+
+
+def beyond_the_stroke(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].transforms[0].translation.z = 3.0
+
+
+def absurdly_far(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].transforms[0].translation.x = 1e308
+
+
+def rod_lies_flat(m: MultiDOFJointTrajectory) -> None:
+    # R - A.e = 0.15 - (x + 0.1) = -0.2999 m of the rod's 0.3 m: sin u = 0.026 < 0.05.
+    for point in m.points:
+        pose = point.transforms[0]
+        pose.translation.x, pose.translation.y, pose.translation.z = 0.3499, 0.0, 0.5
+        pose.rotation.x = pose.rotation.y = pose.rotation.z = 0.0
+        pose.rotation.w = 1.0
+
+
+def force_over_limit(m: MultiDOFJointTrajectory) -> None:
+    m.points[1].accelerations[0].linear.z = 1000.0
+
+
+def overflow_in_the_model(m: MultiDOFJointTrajectory) -> None:
+    m.points[0].velocities[0].angular.x = 1e300
+
+
+DAMAGES: list[tuple[str, Callable[[MultiDOFJointTrajectory], None]]] = [
+    ('EMPTY', empty), ('NAMES', wrong_name), ('NAMES', two_names), ('FRAME', foreign_frame),
+    ('SIZE', no_velocity), ('SIZE', no_acceleration), ('SIZE', two_transforms),
+    ('NON_FINITE', nan_position), ('NON_FINITE', infinite_acceleration),
+    ('QUATERNION', zero_quaternion), ('QUATERNION', long_quaternion),
+    ('TIME', times_stand_still), ('TIME', times_run_back), ('WORKSPACE', out_of_reach),
+    ('WORKSPACE', beyond_the_stroke), ('WORKSPACE', absurdly_far), ('SINGULAR', rod_lies_flat),
+    ('LIMIT', force_over_limit), ('OUTPUT', overflow_in_the_model)]
+
+
+def test_every_code_of_the_interface_is_provoked_here() -> None:
+    # EFFECT is no message's fault: test_failing_effects.py
+    assert {code for code, _ in DAMAGES} == set(CODES) - {'EFFECT'}
+
+
+def test_damaged_messages_are_counted_explained_silent_and_survived(
+    feedforward: FeedforwardBench,
+) -> None:
+    running, good = feedforward.bench, message_of(random_motion(np.random.default_rng(3), 2))
+    answer = feedforward.answer(good)
+    for code, damage in DAMAGES:
+        message = copy.deepcopy(good)
+        damage(message)
+        counters, silent = dict(feedforward.node._counters), len(feedforward.commands)
+        feedforward.send(message)
+        expected = {**counters, 'received': counters['received'] + 1, code: counters[code] + 1}
+        assert feedforward.node._counters == expected, damage.__name__
+        assert running.spin_until(lambda code=code: running.status[-1]['code'] == code)
+        assert running.status[-1]['counters'][code] >= 1
+        assert running.status[-1]['level'] == 'ERROR'
+        assert running.status[-1]['message']
+        # Both topics come from one publisher thread: the next valid answer is the next command.
+        assert feedforward.answer(good) == answer
+        assert len(feedforward.commands) == silent + 1, damage.__name__
+    assert all(np.isfinite(command.data).all() for command in feedforward.commands)
+
+
+def test_independent_chains_refuse_near_a_right_angle_and_never_publish_its_force() -> None:
+    upright = np.array([[0.05, 0.0, 0.5]])  # cos u_1 = (0.15 - 0.05 - 0.1) / 0.3 = 0
+    twist = np.array([[0.1, 0.2, 0.3]])
+    with feedforward_bench(friction__approach='independent_chains') as node:
+        motion = PlatformMotion(upright, [[0, 0, 0, 1.0]], twist, twist, twist, twist)
+        node.send(message_of(motion))
+        assert node.node._counters['SINGULAR'] == 1
+        away = PlatformMotion(upright - [[0.1, 0, 0]], [[0, 0, 0, 1.0]], twist, twist, twist, twist)
+        assert np.abs(node.answer(message_of(away))).max() < 100.0
+        assert len(node.commands) == 1
+
+
+def test_old_messages_are_rejected_where_max_age_says_so() -> None:
+    with feedforward_bench(max_age=0.5) as node:
+        motion = random_motion(np.random.default_rng(4), 1)
+        now = node.node.get_clock().now().nanoseconds
+        node.send(message_of(motion, conversions.time(now - 2_000_000_000)))
+        assert node.node._counters['TIME'] == 1
+        node.answer(message_of(motion, conversions.time(now)))
+        node.answer(message_of(motion))
+
+
+def test_a_parameter_change_acts_on_the_next_message_and_a_bad_one_on_none(
+    feedforward: FeedforwardBench,
+) -> None:
+    motion = random_motion(np.random.default_rng(6), 1)
+    before = feedforward.answer(message_of(motion))
+    bad, = feedforward.node.set_parameters([Parameter('masses.payload', value=-1.0)])
+    assert not bad.successful
+    assert 'masses.payload is -1.0' in bad.reason
+    unknown, = feedforward.node.set_parameters([Parameter('masses.paylod', value=1.0)])
+    assert not unknown.successful
+    assert 'did you mean masses.payload' in unknown.reason
+    assert feedforward.answer(message_of(motion)) == before
+    good, = feedforward.node.set_parameters([Parameter('masses.payload', value=3.0)])
+    assert good.successful
+    after = np.array(feedforward.answer(message_of(motion)))
+    heavier = DriveModel.load().values | {'masses.payload': 3.0}
+    np.testing.assert_allclose(
+        after, build_model(heavier).drive_forces(motion).total[0], rtol=0, atol=EQUAL)
+    assert np.abs(after - before).max() > 1.0
+
+
+def test_an_effect_added_while_running_appears_in_the_command_and_on_its_own_topic(
+    feedforward: FeedforwardBench,
+) -> None:
+    motion = random_motion(np.random.default_rng(7), 1)
+    before = np.array(feedforward.answer(message_of(motion)))
+    for name, value in (('effects.effort_offset.lift_2.force', 1.5),
+                        ('effects.active', ['effort_offset'])):
+        result, = feedforward.node.set_parameters([Parameter(name, value=value)])
+        assert result.successful, result.reason
+    part = feedforward.bench.listen(JointState, '/feedforward/effort/effort_offset')
+    assert feedforward.bench.spin_until(
+        lambda: feedforward.node.count_subscribers('/feedforward/effort/effort_offset'))
+    after = np.array(feedforward.answer(message_of(motion)))
+    np.testing.assert_allclose(after - before, [0, 0, 0, 0, 1.5, 0], atol=EQUAL)
+    assert feedforward.bench.spin_until(lambda: part)
+    assert list(part[-1].effort) == [0, 0, 0, 0, 1.5, 0]
+
+
+def test_memory_advances_with_first_points_only() -> None:
+    effect = {'effects__active': ['hysteresis'], 'effects__hysteresis__slide_1__force': 2.0,
+              'effects__hysteresis__slide_1__distance': 0.01}
+    with feedforward_bench(**effect) as node:
+        rng = np.random.default_rng(8)
+        motions = [random_motion(rng, points) for points in (5, 3, 1, 4)]
+        model, state = node.node._settings.model, node.node._settings.model.initial_state()
+        for motion in motions:
+            found = node.answer(message_of(motion))
+            expected = model.drive_forces(motion[:1], state).total[0]
+            np.testing.assert_allclose(found, expected, rtol=0, atol=EQUAL)

@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What keeps a drive safe: limits, scale, stale commands, warnings before rejections."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.ros import conversions
+
+pytestmark = pytest.mark.nodes
+
+TIMEOUT = 0.15  # [s]
+MOTION = random_motion(np.random.default_rng(11), 3)
+FORCES = DriveModel.load().drive_forces(MOTION)
+
+
+def gravity(motion: PlatformMotion) -> np.ndarray:
+    """Return the forces that hold the last pose: minus the gradient of potential energy."""
+    zero = np.zeros((1, 3))
+    rest = PlatformMotion(motion.position[-1:], motion.orientation[-1:], zero, zero, zero, zero)
+    return DriveModel.load().drive_forces(rest).parts['rigid_body'][0]
+
+
+def test_a_force_over_the_nodes_own_limit_is_rejected_and_below_it_passes() -> None:
+    peak = np.abs(FORCES.total).max(axis=0)
+    with feedforward_bench(effort_limits=(peak * 1.01).tolist()) as node:
+        node.answer(message_of(MOTION))
+        tight = (peak * 1.01).tolist()
+        tight[4] = float(peak[4] * 0.99)
+        result, = node.node.set_parameters([Parameter('effort_limits', value=tight)])
+        assert result.successful, result.reason
+        node.send(message_of(MOTION))
+        assert node.counters['LIMIT'] == 1
+        assert 'lift_2' in node.wait_for_status(code='LIMIT')['message']
+        assert len(node.commands) == 1
+
+
+def test_clamped_forces_are_within_the_limit_on_every_topic_and_told() -> None:
+    limits = np.abs(FORCES.total).max(axis=0) * [0.5, 2, 2, 0.9, 2, 2]
+    with feedforward_bench(effort_limits=limits.tolist(), limit_policy='clamp') as node:
+        found = node.answer(message_of(MOTION))
+        expected = np.clip(FORCES.total, -limits, limits)
+        np.testing.assert_allclose(found, expected[0], rtol=0, atol=EQUAL)
+        assert node.bench.spin_until(lambda: node.joint_trajectory and node.joint_command)
+        efforts = [point.effort for point in node.joint_trajectory[-1].points]
+        np.testing.assert_allclose(efforts, expected, rtol=0, atol=EQUAL)
+        np.testing.assert_allclose(node.joint_command[-1].effort, expected[0], rtol=0, atol=EQUAL)
+        status = node.wait_for_status(code='CLAMPED')
+        assert status['level'] == 'WARN'
+        assert status['counters']['clamped'] == 1
+
+
+def test_clamping_never_lets_a_number_through_that_is_none() -> None:
+    motion = random_motion(np.random.default_rng(1), 1)
+    message = message_of(motion)
+    message.points[0].velocities[0].angular.x = 1e300
+    with feedforward_bench(limit_policy='clamp') as node:
+        node.send(message)
+        assert node.counters['OUTPUT'] == 1
+        node.answer(message_of(motion))
+        assert len(node.commands) == 1
+
+
+def test_the_smaller_of_the_models_and_the_nodes_limit_counts() -> None:
+    with feedforward_bench(limits__effort=[0.5] * 6, effort_limits=[1000.0] * 6) as node:
+        node.send(message_of(MOTION))
+        assert node.counters['LIMIT'] == 1
+
+
+def test_the_scale_multiplies_everything_that_goes_out_and_what_is_compared_with_limits() -> None:
+    limits = (np.abs(FORCES.total).max(axis=0) * 0.5).tolist()
+    with feedforward_bench(feedforward_scale=0.25, effort_limits=limits) as node:
+        part = node.bench.listen(JointState, '/feedforward/effort/rigid_body')
+        assert node.bench.spin_until(
+            lambda: node.node.count_subscribers('/feedforward/effort/rigid_body'))
+        found = node.answer(message_of(MOTION))
+        np.testing.assert_allclose(found, 0.25 * FORCES.total[0], rtol=0, atol=EQUAL)
+        assert node.bench.spin_until(lambda: part and node.joint_trajectory)
+        np.testing.assert_allclose(
+            part[-1].effort, 0.25 * FORCES.parts['rigid_body'][0], rtol=0, atol=EQUAL)
+        np.testing.assert_allclose([p.effort for p in node.joint_trajectory[-1].points],
+                                   0.25 * FORCES.total, rtol=0, atol=EQUAL)
+
+
+@pytest.mark.parametrize('action', ['hold_gravity', 'zero', 'silent'])
+def test_a_stale_command_is_acted_on_once_and_the_next_message_recovers(action: str) -> None:
+    with feedforward_bench(command_timeout=TIMEOUT, timeout_action=action) as node:
+        answer = node.answer(message_of(MOTION))
+        for round_number in (1, 2):
+            node.wait_for_status(code='STALE', level='STALE')
+            node.bench.spin_for(3 * TIMEOUT)
+            assert node.counters['stale'] == round_number
+            if action == 'silent':
+                assert len(node.commands) == round_number
+            else:
+                assert len(node.commands) == 2 * round_number
+                expected = gravity(MOTION) if action == 'hold_gravity' else np.zeros(6)
+                np.testing.assert_allclose(node.commands[-1].data, expected, rtol=0, atol=EQUAL)
+                assert node.bench.spin_until(
+                    lambda count=2 * round_number: len(node.joint_command) == count)
+                held = node.joint_command[-1]
+                np.testing.assert_allclose(held.velocity, 0, atol=0)
+                np.testing.assert_allclose(
+                    held.position, FORCES.mechanism.position[-1], rtol=0, atol=EQUAL)
+            assert node.answer(message_of(MOTION)) == answer
+            assert node.wait_for_status(level='OK', code='OK')
+
+
+def test_nothing_goes_stale_before_the_first_command_nor_with_a_timeout_of_0() -> None:
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.bench.spin_for(3 * TIMEOUT)
+        rejected = message_of(MOTION)
+        rejected.joint_names = ['gripper']
+        node.send(rejected)
+        node.bench.spin_for(3 * TIMEOUT)
+        assert node.counters['stale'] == 0
+        result, = node.node.set_parameters([Parameter('command_timeout', value=0.0)])
+        assert result.successful
+        node.answer(message_of(MOTION))
+        node.bench.spin_for(3 * TIMEOUT)
+        assert node.counters['stale'] == 0
+        # Switched on in mid-stream, it counts for the command that is in force.
+        node.node.set_parameters([Parameter('command_timeout', value=TIMEOUT)])
+        node.wait_for_status(code='STALE')
+
+
+def test_the_stale_timer_counts_from_the_trajectorys_end_and_a_shorter_one_replaces_it() -> None:
+    long = message_of(MOTION)
+    long.points[-1].time_from_start.sec = 2
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.answer(long)
+        node.bench.spin_for(4 * TIMEOUT)
+        assert node.counters['stale'] == 0
+        node.answer(message_of(MOTION))
+        node.wait_for_status(code='STALE')
+
+
+def test_a_rejected_message_does_not_keep_a_command_fresh() -> None:
+    bad = message_of(MOTION)
+    bad.header.frame_id = 'world'
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.answer(message_of(MOTION))
+        for _ in range(8):
+            node.send(bad)
+            node.bench.spin_for(TIMEOUT / 4)
+        assert node.counters['stale'] == 1
+
+
+def test_holding_stays_within_limits_and_scale() -> None:
+    with feedforward_bench(command_timeout=TIMEOUT, feedforward_scale=0.5, limit_policy='clamp',
+                           effort_limits=[4.0] * 6) as node:
+        node.answer(message_of(MOTION))
+        node.wait_for_status(code='STALE')
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)
+        np.testing.assert_allclose(node.commands[-1].data,
+                                   np.clip(0.5 * gravity(MOTION), -4, 4), rtol=0, atol=EQUAL)
+
+
+def test_a_pose_that_can_no_longer_be_held_leaves_the_last_command() -> None:
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.answer(message_of(MOTION))
+        result, = node.node.set_parameters([Parameter('geometry.rod_length', value=0.05)])
+        assert result.successful
+        assert 'stays in force' in node.wait_for_status(code='STALE')['message']
+        assert len(node.commands) == 1
+
+
+def at(x: float, z: float) -> PlatformMotion:
+    zero = np.zeros((1, 3))
+    return PlatformMotion([[x, 0.0, z]], [[0, 0, 0, 1.0]], zero, zero, zero, zero)
+
+
+def test_warnings_come_before_the_rejection() -> None:
+    # cos u_1 = (0.15 - x - 0.1) / 0.3; the rod's sine falls to its limit of 0.05 near x = 0.35,
+    # and with it the sine's share of the margin, 1 - 0.05 / sin u_1.
+    def sine(margin: float) -> float:
+        return float(0.05 + 0.3 * np.sqrt(1 - (0.05 / (1 - margin)) ** 2))
+
+    with feedforward_bench(
+            warning_margin=0.2, limits__condition_number=1e6, limits__slide_stroke=[-1.0, 1.0],
+            limits__lift_stroke=[-1.0, 2.0]) as node:
+        node.answer(message_of(at(0.0, 0.5)))
+        node.wait_for_status(code='OK')
+        node.answer(message_of(at(sine(0.3), 0.5)))
+        assert node.wait_for_status(code='OK')
+        node.bench.spin_for(0.02)
+        node.answer(message_of(at(sine(0.1), 0.5)))
+        status = node.wait_for_status(code='NEAR_SINGULAR', level='WARN')
+        assert status['singularity_margin'] == pytest.approx(0.1, abs=0.01)
+        node.send(message_of(at(sine(-0.1), 0.5)))
+        assert node.counters['SINGULAR'] == 1
+
+
+def test_the_end_of_a_stroke_is_announced() -> None:
+    # A lift is at z minus the rod's height, 0.3 sin u with cos u = 1/6; its stroke ends at 0.8 m.
+    height = 0.3 * np.sqrt(1 - 1 / 36)
+    with feedforward_bench() as node:
+        node.answer(message_of(at(0.0, 0.79 + height)))
+        status = node.wait_for_status(code='NEAR_WORKSPACE', level='WARN')
+        assert status['workspace_margin'] == pytest.approx(0.01 / 0.45, abs=1e-3)
+        node.send(message_of(at(0.0, 0.81 + height)))
+        assert node.counters['WORKSPACE'] == 1
+
+
+def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
+    with feedforward_bench(max_age=0.2, command_timeout=TIMEOUT) as node:
+        now = node.node.get_clock().now().nanoseconds
+        node.answer(message_of(MOTION, conversions.time(now)))
+        for _ in range(5):
+            node.send(message_of(MOTION, conversions.time(now - 10**9)))
+            node.bench.spin_for(TIMEOUT / 3)
+        assert node.counters['TIME'] == 5
+        assert node.counters['stale'] == 1
+
+
+def test_messages_that_queue_up_are_told() -> None:
+    with feedforward_bench(lag_warning=0.01) as node:
+        message = message_of(random_motion(np.random.default_rng(2), 1))
+        # Nobody spins: the messages wait for the node, at the median a quarter second.
+        for _ in range(50):
+            node.publisher.publish(message)
+        end = node.node.get_clock().now().nanoseconds + 250_000_000
+        while node.node.get_clock().now().nanoseconds < end:
+            pass
+        assert node.bench.spin_until(lambda: node.counters['accepted'] == 50)
+        status = node.wait_for_status(lagging=True)
+        assert status['lag']['p50'] > 0.01
+        node.answer(message)
+        assert node.wait_for_status(code='LAG')['level'] == 'WARN'
+
+
+def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
+    with feedforward_bench() as node:
+        for _ in range(20):
+            node.answer(message_of(MOTION))
+        assert node.bench.spin_until(
+            lambda: node.bench.status[-1]['counters']['accepted'] == 20)
+        status = node.bench.status[-1]
+        assert status['state'] == 'active'
+        assert 0 < status['compute_time']['p50'] <= status['compute_time']['p99']
+        assert status['compute_time']['p99'] <= status['compute_time']['max'] < 1.0
+        assert status['rate'] > 0
+        assert 0 < status['singularity_margin'] < 1
+        assert status['model']['files'][0]['file'].endswith('config/paper.yaml')
+        before = status['model']['sha256']
+        node.node.set_parameters([Parameter('masses.payload', value=1.5)])
+        assert node.bench.spin_until(
+            lambda: node.bench.status[-1]['model']['sha256'] != before)
+
+
+def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
+    messages = pytest.importorskip('diagnostic_msgs.msg')
+    with feedforward_bench() as node:
+        told = node.bench.listen(messages.DiagnosticArray, '/diagnostics', 10)
+        assert node.bench.connected()
+        bad = message_of(MOTION)
+        bad.points = []
+        node.send(bad)
+        assert node.bench.spin_until(
+            lambda: told and told[-1].status[0].message.startswith('EMPTY'))
+        status = told[-1].status[0]
+        assert (status.name, status.level) == ('/feedforward', b'\x02')
+        assert {value.key: value.value for value in status.values}['EMPTY'] == '1'

@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The monitor over DDS: joint_states in, model effort, residual and running error out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from node_bench import Bench, bench
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.monitor import MonitorNode
+
+pytestmark = pytest.mark.nodes
+
+RATE = 500
+ORDER = (3, 0, 5, 1, 4, 2)  # drives are matched by name, in any order
+START = 1_700_000_000_000_000_000  # [ns]; stamps since 1970, as on a robot
+# What smoothing over 0.12 s leaves of exact positions below 0.6 Hz, most of it where friction
+# turns over within a millimetre per second.
+RECONSTRUCTION = 0.01  # [N]
+OFFSET = 0.5  # [N]
+
+
+class MonitorBench:
+    """The node, what it says, and a robot whose efforts the model explains."""
+
+    def __init__(self, running: Bench, **values: object) -> None:
+        self.bench = running
+        self.node = running.add(MonitorNode, parameter_overrides=[
+            Parameter(name, value=value) for name, value in {'error_span': 0.5, **values}.items()])
+        self.model_effort = running.listen(JointState, '/monitor/model_effort', 1000)
+        self.residual = running.listen(JointState, '/monitor/residual', 1000)
+        self.error = running.listen(Float64MultiArray, '/monitor/error', 1000)
+        running.follow_status('/monitor/status')
+        self.publisher = running.probe.create_publisher(JointState, '/joint_states', 1000)
+        assert running.spin_until(self.publisher.get_subscription_count)
+        assert running.connected()
+        motion = Excitation(6.0, seed=3).motion(np.arange(0, 6.0, 1 / RATE))
+        forces = DriveModel.load().drive_forces(motion)
+        self.position, self.effort = forces.mechanism.position, forces.total
+        self.sent = 0
+
+    def send(self, count: int, change: Array | float = 0.0) -> None:
+        """Publish the next samples, efforts changed by a constant per drive."""
+        for row in range(self.sent, self.sent + count):
+            message = conversions.joint_state(
+                START + row * 1_000_000_000 // RATE, self.effort[row] + change,
+                self.position[row], self.position[row])
+            message.velocity = []
+            message.name = [DRIVES[k] for k in ORDER] + ['gripper']
+            for field in ('position', 'effort'):
+                values = list(getattr(message, field))
+                setattr(message, field, [values[k] for k in ORDER] + [float('nan')])
+            self.publisher.publish(message)
+            # No faster than the node takes them: the queue is finite.
+            if row % 20 == 0:
+                assert self.arrived(row + 1)
+        self.sent += count
+        assert self.arrived(self.sent)
+        self.bench.spin_for(0.2)
+
+    def arrived(self, count: int) -> bool:
+        """Spin until the node has received so many messages."""
+        return self.bench.spin_until(lambda: self.node._counters['received'] >= count)
+
+
+@pytest.fixture
+def monitor() -> Iterator[MonitorBench]:
+    with bench() as running:
+        yield MonitorBench(running)
+
+
+def stamps(messages: list[JointState]) -> list[int]:
+    return [conversions.nanoseconds(message.header.stamp) for message in messages]
+
+
+def test_a_model_that_explains_the_robot_leaves_nothing(monitor: MonitorBench) -> None:
+    monitor.send(1500)
+    assert len(monitor.residual) == len(monitor.model_effort) > 1300
+    residual = np.array([message.effort for message in monitor.residual])
+    assert np.sqrt(np.mean(residual ** 2, axis=0)).max() < RECONSTRUCTION
+    # At the measured stamps: each answer is the effort sent with that stamp, minus the residual.
+    rows = (np.array(stamps(monitor.model_effort)) - START) * RATE // 1_000_000_000
+    assert np.all(np.diff(rows) == 1)
+    model = np.array([message.effort for message in monitor.model_effort])
+    np.testing.assert_allclose(model + residual, monitor.effort[rows], rtol=0, atol=1e-9)
+    assert tuple(monitor.residual[0].name) == DRIVES
+    assert max(monitor.error[-1].data) < RECONSTRUCTION
+
+
+def test_what_the_model_lacks_is_the_residual_and_falls_when_it_is_added(
+    monitor: MonitorBench,
+) -> None:
+    change = np.array([0, 0, 0, 0, OFFSET, 0])
+    monitor.send(900, change)
+    np.testing.assert_allclose(monitor.error[-1].data, change, atol=RECONSTRUCTION)
+    for name, value in (('effects.effort_offset.lift_2.force', OFFSET),
+                        ('effects.active', ['effort_offset'])):
+        result, = monitor.node.set_parameters([Parameter(name, value=value)])
+        assert result.successful, result.reason
+    monitor.send(600, change)
+    assert max(monitor.error[-1].data) < RECONSTRUCTION
+
+
+def test_an_effort_that_is_not_a_number_is_no_measurement(monitor: MonitorBench) -> None:
+    monitor.send(600)
+    monitor.effort[600:900, 2] = np.nan
+    monitor.send(500)
+    residual = np.array([message.effort for message in monitor.residual])
+    assert np.isnan(residual[:, 2]).sum() == 300
+    assert np.isfinite(np.delete(residual, 2, axis=1)).all()
+    assert np.isfinite(monitor.error[-1].data).all()
+    assert np.isfinite([message.effort for message in monitor.model_effort]).all()
+
+
+def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survived(
+    monitor: MonitorBench,
+) -> None:
+    monitor.send(200)
+    good = conversions.joint_state(START, monitor.effort[0], monitor.position[0],
+                                   monitor.position[0])
+    for code, change in (('NAMES', {'name': ['a', 'b']}), ('SIZE', {'position': [0.0] * 5}),
+                         ('NON_FINITE', {'position': [float('inf')] * 6})):
+        message = JointState(name=good.name, position=good.position, effort=good.effort)
+        for field, value in change.items():
+            setattr(message, field, value)
+        monitor.publisher.publish(message)
+        assert monitor.bench.spin_until(lambda code=code: monitor.node._counters[code] == 1)
+        assert monitor.bench.spin_until(
+            lambda code=code: monitor.bench.status[-1]['code'] == code)
+    monitor.node._counters['received'] = monitor.sent
+    monitor.send(300)
+    assert monitor.bench.status[-1]['code'] == 'OK'
+
+
+def test_a_message_that_arrives_cut_off_is_counted_and_survived(monitor: MonitorBench) -> None:
+    message = conversions.joint_state(
+        START, monitor.effort[0], monitor.position[0], monitor.position[0])
+    data = bytes(serialize_message(message))
+    for length in (30, len(data) - 60, len(data) - 9):
+        monitor.publisher.publish(data[:length])
+    assert monitor.arrived(3)
+    assert monitor.node._counters['SIZE'] == 3
+    monitor.send(250)
+    assert monitor.node._counters['compared'] > 0
+
+
+def test_positions_that_no_platform_has_are_told_and_survived(monitor: MonitorBench) -> None:
+    monitor.send(200)
+    monitor.position[200:400, 0] += 1.0
+    monitor.send(200)
+    assert monitor.node._counters['WORKSPACE'] > 0
+    monitor.send(400)
+    assert max(monitor.error[-1].data) < RECONSTRUCTION

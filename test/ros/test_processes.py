@@ -1,0 +1,163 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The installed executables as processes over DDS, as `ros2 run` starts them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from node_bench import Bench, bench
+from ros_processes import environment, executable, node_process
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.measurement.files.pose_files import read_poses, write_poses
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.ros.trajectory_request import read_trajectory
+
+pytestmark = pytest.mark.nodes
+
+PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
+EQUAL = 1e-12
+
+
+@pytest.fixture
+def running() -> Iterator[Bench]:
+    with bench() as probe:
+        yield probe
+
+
+def play(domain: int, *parameters: str) -> subprocess.CompletedProcess[str]:
+    arguments = [word for parameter in parameters for word in ('-p', parameter)]
+    return subprocess.run([executable('play_trajectory'), '--ros-args', *arguments],
+                          env=environment(domain), capture_output=True, text=True, timeout=30)
+
+
+def test_the_papers_path_goes_in_and_its_forces_come_out(
+    running: Bench, ros_domain: int, tmp_path: Path,
+) -> None:
+    commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
+    stamped = running.listen(JointState, '/feedforward/joint_command', 1000)
+    # No timeout: a player that stalls on a busy machine must not add a command.
+    server = [executable('feedforward'), '--ros-args', '--params-file', str(PAPER),
+              '-p', 'command_timeout:=0.0', '-p', 'timeout_action:=silent']
+    player = [executable('play_trajectory'), '--ros-args', '-p', 'rate:=100.0']
+    times = np.arange(0.0, HelicalPath.duration + 0.01, 0.01)
+    with node_process(server, ros_domain, tmp_path / 'server.log') as feedforward:
+        assert running.connected()
+        with node_process(player, ros_domain, tmp_path / 'player.log') as playing:
+            assert running.spin_until(lambda: len(stamped) == len(commands) == len(times), 20)
+            assert playing.wait(5) == 0
+        feedforward.send_signal(signal.SIGTERM)
+        assert feedforward.wait(2) == 0
+    expected = DriveModel.load(PAPER).drive_forces(HelicalPath().motion(times))
+    np.testing.assert_allclose([c.data for c in commands], expected.total, rtol=0, atol=EQUAL)
+    np.testing.assert_allclose([c.position for c in stamped], expected.mechanism.position,
+                               rtol=0, atol=EQUAL)
+
+
+def test_a_csv_of_poses_is_played_as_the_motion_that_it_is(
+    running: Bench, ros_domain: int, tmp_path: Path,
+) -> None:
+    motion = Excitation(duration=2.0, seed=3).motion(np.arange(0, 2.0, 0.02))
+    write_poses(tmp_path / 'poses.csv', motion)
+    received = running.listen(MultiDOFJointTrajectory, '/feedforward/trajectory', 1000)
+    done = play(ros_domain, 'source:=csv', f'file:={tmp_path / "poses.csv"}', 'rate:=50.0',
+                'points:=2')
+    assert done.returncode == 0, done.stderr
+    assert running.spin_until(lambda: len(received) == len(motion))
+    assert [len(message.points) for message in received] == [2] * (len(motion) - 1) + [1]
+    played = [read_trajectory(message, 1, 0.0).motion for message in received]
+    for name in ('position', 'orientation', 'linear_velocity', 'angular_acceleration'):
+        np.testing.assert_allclose([getattr(p, name)[0] for p in played], getattr(motion, name),
+                                   rtol=0, atol=EQUAL)
+
+
+def test_poses_without_twists_get_those_of_a_spline_through_them(tmp_path: Path) -> None:
+    motion = Excitation(duration=4.0, seed=4).motion(np.arange(0, 4.0, 0.01))
+    file = tmp_path / 'poses.csv'
+    table = np.column_stack((motion.time, motion.position, motion.orientation))
+    np.savetxt(file, table, delimiter=',', header='time,x,y,z,qx,qy,qz,qw', comments='',
+               fmt='%.17g')
+    read = read_poses(file)
+    inner = slice(20, -20)
+    # Poses at 100 Hz of a motion that starts within 0.4 s: what remains is the truncation of
+    # the splines, quintic in position and cubic on SO(3), below 1 % of each quantity's size.
+    for name, tolerance in (('linear_velocity', 1e-4), ('angular_velocity', 1e-3),
+                            ('linear_acceleration', 1e-2), ('angular_acceleration', 5e-2)):
+        assert np.abs(getattr(motion, name)).max() > 10 * tolerance
+        np.testing.assert_allclose(getattr(read, name)[inner], getattr(motion, name)[inner],
+                                   rtol=0, atol=tolerance)
+
+
+MISTAKES = {
+    'feedforward masses.payload:=-1.0': 'masses.payload is -1.0, must be at least',
+    'feedforward masses.paylod:=1.0': 'did you mean masses.payload',
+    'feedforward max_age:=-1.0': 'max_age is -1.0',
+    'play_trajectory rate:=0.0': 'rate is 0.0',
+    'play_trajectory source:=spiral': "source is 'spiral'",
+    'play_trajectory source:=csv': "file is ''",
+    'play_trajectory file:=5': 'file is 5',
+    'play_trajectory repeat:=0': 'repeat is 0',
+    'play_trajectory ratee:=5.0': 'ratee is 5.0',
+    'feedforward geometry.base_radius:=0.2': 'equations is missing, must',
+    'feedforward timeout_action:=brake': "timeout_action is 'brake'",
+    'feedforward effort_limits:=[1.0,2.0]': 'effort_limits is [1.0, 2.0]',
+    'feedforward feedforward_scale:=2.0': 'feedforward_scale is 2.0, must be',
+    'play_trajectory points:=0': 'points is 0',
+}
+
+
+@pytest.mark.parametrize('mistake', MISTAKES)
+def test_a_wrong_parameter_is_one_sentence_and_status_2(ros_domain: int, mistake: str) -> None:
+    name, parameter = mistake.split(' ')
+    done = subprocess.run([executable(name), '--ros-args', '-p', parameter],
+                          env=environment(ros_domain), capture_output=True, text=True, timeout=20)
+    assert done.returncode == 2
+    assert MISTAKES[mistake] in done.stderr
+    assert 'Traceback' not in done.stderr
+
+
+def test_a_parameter_file_that_ros_cannot_read_is_one_sentence(
+    ros_domain: int, tmp_path: Path,
+) -> None:
+    file = tmp_path / 'model.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    gravity: [0, 0.0, -9.81]\n')
+    done = subprocess.run([executable('feedforward'), '--ros-args', '--params-file', str(file)],
+                          env=environment(ros_domain), capture_output=True, text=True, timeout=20)
+    assert done.returncode == 2
+    assert str(file) in done.stderr
+    assert 'Traceback' not in done.stderr
+
+
+def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None:
+    # A folder in front of the path whose rclpy cannot be imported stands for a machine without.
+    (tmp_path / 'rclpy.py').write_text('raise ImportError("not here")')
+    code = ('from pprs_dynamics.ros.executables import feedforward; '
+            'raise SystemExit(feedforward())')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=20,
+                          env={**environment(0), 'PYTHONPATH': str(tmp_path)})
+    assert done.returncode == 2
+    assert done.stderr.strip().startswith('feedforward needs ROS 2: source an installation')
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_sigint_ends_the_node_cleanly_within_a_second(
+    running: Bench, ros_domain: int, tmp_path: Path,
+) -> None:
+    with node_process([executable('feedforward')], ros_domain, tmp_path / 'log') as process:
+        assert running.spin_until(
+            lambda: running.probe.count_publishers('/feedforward/commands'), 20)
+        process.send_signal(signal.SIGINT)
+        # A second on a machine that has one to spare; a busy one is given ten.
+        assert process.wait(10) == 0
+    assert 'Traceback' not in (tmp_path / 'log').read_text()

@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Reading and writing serialised messages gives what message objects give."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from feedforward_bench import feedforward_bench, message_of, random_motion
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.answer_cdr import AnswerBytes
+from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.trajectory_cdr import read_points
+from pprs_dynamics.ros.trajectory_request import read_serialised, read_trajectory
+from pprs_dynamics.ros.whole import is_whole, message_in
+
+pytestmark = pytest.mark.nodes
+
+POINTS = st.integers(1, 30)
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_message(points: int, seed: int) -> MultiDOFJointTrajectory:
+    rng = np.random.default_rng(seed)
+    message = message_of(random_motion(rng, points))
+    message.header.frame_id = str(rng.choice(['', 'base']))
+    message.header.stamp.sec = int(rng.integers(-2**31, 2**31))
+    message.header.stamp.nanosec = int(rng.integers(0, 10**9))
+    message.points[0].time_from_start.sec = -int(rng.integers(0, 2)) * points
+    return message
+
+
+def outcome(read: object, data: object) -> object:
+    """Return what a reader gives: its numbers, or its refusal."""
+    try:
+        request = read(data, 1_000, 0.0)  # type: ignore[operator]
+    except Exception as error:
+        return type(error), str(error)
+    motion = request.motion
+    return (request.start, request.offsets.tolist(), motion.position.tobytes(),
+            motion.orientation.tobytes(), motion.linear_velocity.tobytes(),
+            motion.angular_velocity.tobytes(), motion.linear_acceleration.tobytes(),
+            motion.angular_acceleration.tobytes())
+
+
+@settings(max_examples=200, deadline=None)
+@given(POINTS, SEEDS)
+def test_bytes_and_objects_give_the_same_numbers(points: int, seed: int) -> None:
+    message = random_message(points, seed)
+    data = serialize_message(message)
+    assert read_points(data) is not None
+    assert outcome(read_serialised, data) == outcome(read_trajectory, message)
+
+
+def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
+    """Change what makes the layout."""
+    point = message.points[int(rng.integers(len(message.points)))]
+    kind = int(rng.integers(8))
+    if kind == 0:
+        message.header.frame_id = 'b' * int(rng.integers(1, 12))
+    elif kind == 1:
+        message.joint_names = ['platform'] * int(rng.choice([0, 2, 3]))
+    elif kind == 2:
+        message.joint_names = [str(rng.choice(['plätform', 'plat', '平台']))]
+    elif kind == 3:
+        point.velocities = point.velocities * int(rng.choice([0, 2]))
+    elif kind == 4:
+        point.accelerations = point.accelerations * int(rng.choice([0, 3]))
+    elif kind == 5:
+        point.transforms = point.transforms * int(rng.choice([0, 2]))
+    elif kind == 6:
+        message.points = []
+    else:
+        point.velocities, point.accelerations = [], point.accelerations * 2
+
+
+@settings(max_examples=300, deadline=None)
+@given(POINTS, SEEDS)
+def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
+    points: int, seed: int,
+) -> None:
+    message = random_message(points, seed)
+    alter(message, np.random.default_rng(seed))
+    data = serialize_message(message)
+    assert read_points(data) is None
+    assert outcome(read_serialised, data) == outcome(read_trajectory, message)
+
+
+@settings(max_examples=200, deadline=None)
+@given(POINTS, SEEDS)
+def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(points: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    data = bytearray(serialize_message(random_message(points, seed)))
+    for _ in range(int(rng.integers(1, 5))):
+        data[int(rng.integers(len(data)))] = int(rng.integers(256))
+    points_read = read_points(bytes(data))
+    if points_read is None:
+        return
+    # Where the bytes still have the layout, ROS itself reads the same from them.
+    message = deserialize_message(bytes(data), MultiDOFJointTrajectory)
+    assert conversions.nanoseconds(message.header.stamp) == points_read[0]
+    for point, row, offset in zip(message.points, points_read[1], points_read[2], strict=True):
+        position = point.transforms[0].translation
+        np.testing.assert_array_equal([position.x, position.y, position.z], row[:3])
+        angular = point.accelerations[0].angular
+        np.testing.assert_array_equal([angular.x, angular.y, angular.z], row[16:])
+        assert conversions.nanoseconds(point.time_from_start) == offset
+
+
+def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected() -> None:
+    data = bytearray(serialize_message(random_message(1, 2)))
+    data[1] = 0
+    assert read_points(bytes(data)) is None
+
+
+@pytest.mark.parametrize('points', [1, 2, 17])
+def test_answers_are_the_messages_that_rclpy_would_send(points: int) -> None:
+    forces = DriveModel.load().drive_forces(random_motion(np.random.default_rng(3), points))
+    mechanism, effort = forces.mechanism, forces.total
+    for stamp in (0, -1_500_000_000, 7_000_000_001, 2**31 * 10**9 + 5):
+        command = deserialize_message(AnswerBytes(DRIVES).commands(effort[0]), Float64MultiArray)
+        assert command == Float64MultiArray(data=effort[0].tolist())
+        for values in ((effort[0],), (effort[0], mechanism.position[0], mechanism.velocity[0])):
+            state = deserialize_message(AnswerBytes(DRIVES).joint_state(stamp, *values), JointState)
+            assert state == conversions.joint_state(stamp, *values)
+        offsets = np.arange(points) * 1_234_567_891
+        data = AnswerBytes(DRIVES).joint_trajectory(stamp, offsets, forces, effort)
+        trajectory = deserialize_message(data, JointTrajectory)
+        assert len(data) == len(serialize_message(trajectory))
+        assert tuple(trajectory.joint_names) == DRIVES
+        assert trajectory.header.stamp == conversions.time(stamp)
+        for k, point in enumerate(trajectory.points):
+            for field, expected in (('positions', mechanism.position),
+                                    ('velocities', mechanism.velocity),
+                                    ('accelerations', mechanism.acceleration),
+                                    ('effort', effort)):
+                np.testing.assert_array_equal(getattr(point, field), expected[k])
+            assert point.time_from_start == conversions.duration(int(offsets[k]))
+
+
+def test_truncated_bytes_over_dds_are_counted_and_survived() -> None:
+    good = message_of(random_motion(np.random.default_rng(5), 3))
+    data = bytes(serialize_message(good))
+    with feedforward_bench() as node:
+        answer = node.answer(data)
+        for length in (12, 20, 48, 120, len(data) - 9, len(data) - 1):
+            node.send(data[:length])
+        counters = node.counters
+        assert counters['received'] == 7
+        assert counters['accepted'] == 1
+        huge = bytearray(data)
+        struct.pack_into('<I', huge, 44, 2**32 - 1)
+        node.send(bytes(huge))
+        assert node.answer(good) == answer
+        assert sum(node.counters[code] for code in ('SIZE', 'EMPTY', 'NAMES', 'FRAME')) == 7
+
+
+def test_a_message_cut_off_within_padding_is_noticed() -> None:
+    # Without this look at the lengths, what lies behind the bytes in memory becomes numbers.
+    data = serialize_message(random_message(3, 4))
+    assert is_whole(data)
+    for length in range(len(data)):
+        assert not is_whole(data[:length])
+        with pytest.raises(Rejection, match=r'^SIZE'):
+            read_serialised(data[:length], 1)
+
+
+@settings(max_examples=100, deadline=None)
+@given(POINTS, SEEDS)
+def test_every_whole_message_is_taken_for_one(points: int, seed: int) -> None:
+    message = random_message(points, seed)
+    alter(message, np.random.default_rng(seed))
+    assert is_whole(serialize_message(message))
+
+
+def joint_state(frame: str, names: list[str], values: list[float]) -> JointState:
+    message = JointState(name=names, position=values, effort=values)
+    message.header.frame_id = frame
+    return message
+
+
+@pytest.mark.parametrize('message', [
+    joint_state('', list(DRIVES), [1.0] * 6), joint_state('base', ['a'], [2.0]),
+    joint_state('b', [], []), Float64MultiArray(data=[1.0] * 6), Float64MultiArray()])
+def test_other_messages_are_taken_whole_or_not_at_all(message: object) -> None:
+    data = bytes(serialize_message(message))
+    assert message_in(data, type(message)) == message
+    # What is serialised may be followed by up to 8 bytes that mean nothing.
+    whole = next(length for length in range(len(data) + 1)
+                 if is_whole(data[:length], type(message)))
+    assert whole >= len(data) - 8
+    assert message_in(data[:whole], type(message)) == message
+    for length in range(whole):
+        with pytest.raises(Rejection, match=r'^SIZE: .* no whole (sensor|std)_msgs/'):
+            message_in(data[:length], type(message))
+
+
+def test_an_array_with_dimensions_is_whole() -> None:
+    message = Float64MultiArray(data=[1.0, 2.0])
+    message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)
+                          for label in ('drive', 'x', 'four')]
+    data = bytes(serialize_message(message))
+    assert message_in(data, Float64MultiArray) == message
+    assert not is_whole(data[:-9], Float64MultiArray)

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The simulated arm: an engine of its own, hidden effects, and what the diagnosis makes of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+
+from pprs_dynamics import ArmModel
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
+from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, simulate_arm
+
+
+@pytest.fixture(scope='module')
+def model(tmp_path_factory: pytest.TempPathFactory) -> ArmModel:
+    """Return an arm whose links are not those of its URDF, and with joints in another order."""
+    described = arm.real_arm(tmp_path_factory.mktemp('arm'))
+    mass = np.array(described.arm.inertial) * np.array([1.3, 0.9, 1.1])[:, None]
+    found = build_model({
+        **described.values, 'links.mass': tuple(mass[:, 0]),
+        'links.moment': tuple(mass[:, 1:4].ravel()),
+        'links.inertia': tuple(mass[:, 4:][:, [0, 2, 5, 1, 3, 4]].ravel()),
+        'arm.armature': (0.4, 0.2, 1.0)}, described.source)
+    assert isinstance(found, ArmModel)
+    return found
+
+
+def test_the_engine_moves_the_bodies_of_the_model(model: ArmModel) -> None:
+    motion = draw_motion(model, 10.0, 0)
+    engine = ArmEngine(model)
+    assert engine.torques(motion) == pytest.approx(
+        model.drive_forces(motion).parts['rigid_body']
+        - np.array(model.values['arm.armature']) * motion.acceleration, abs=1e-8)
+
+
+def test_a_hidden_payload_is_a_point_at_the_tool(model: ArmModel) -> None:
+    motion = draw_motion(model, 10.0, 1)
+    engine = ArmEngine(model)
+    before = engine.torques(motion)
+    engine.add_payload(model, 1.5, np.zeros(3))
+    loaded = build_model({**model.values, 'effects.active': ['payload_mass'],
+                          'effects.payload_mass.mass': 1.5}, model.source)
+    assert engine.torques(motion) - before == pytest.approx(
+        loaded.drive_forces(motion).parts['payload_mass'], abs=1e-8)
+
+
+def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
+    motion = draw_motion(model, 10.0, 1)
+    engine = ArmEngine(model)
+    before = engine.torques(motion)
+    engine.add_to_link(model, 1, 0.7)
+    loaded = build_model({**model.values, 'effects.active': ['link_mass'],
+                          'effects.link_mass.link_2': 0.7}, model.source)
+    assert engine.torques(motion) - before == pytest.approx(
+        loaded.drive_forces(motion).parts['link_mass'], abs=1e-8)
+
+
+@pytest.mark.parametrize('name', ['link_3', 'link_4'])
+def test_a_link_that_is_the_payloads_or_not_there_is_refused(model: ArmModel, name: str) -> None:
+    with pytest.raises(ModelError, match=f'link_mass.{name} is 0.7, must be left out'):
+        build_model({**model.values, 'effects.active': ['link_mass'],
+                     f'effects.link_mass.{name}': 0.7}, model.source)
+
+
+def test_without_effects_the_model_leaves_noise(model: ArmModel) -> None:
+    run = simulate_arm(model, (), 0, noise=0.3)
+    error = run.effort - model.drive_forces(run.motion).total
+    assert np.std(error, axis=0) == pytest.approx(np.full(3, 0.3), rel=0.1)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_every_hidden_effect_shows(model: ArmModel, name: str) -> None:
+    plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=10.0)
+                     for names in ((), (name,)))
+    shown = hidden.position - plain.position if name == 'homing_error' else (
+        hidden.effort - plain.effort)
+    assert np.abs(shown).max() > (0.005 if name == 'homing_error' else 0.05)
+    assert hidden.effects[0]['name'] == name
+    assert (hidden.effects[0]['drives'] is None) == (
+        name not in {*FORMS, 'effort_gain', 'time_delay', 'homing_error'})
+
+
+@pytest.mark.parametrize(('name', 'seed'), [
+    ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3)])
+def test_what_is_hidden_is_named(model: ArmModel, name: str, seed: int) -> None:
+    run = simulate_arm(model, (name,), seed)
+    assert run.motion.time is not None
+    found = diagnose(model, [Recording.from_arrays(
+        'run', run.motion.time, run.position, None, run.effort, model.drives)])
+    named = {found.effects[0].name} | {other for rivals in found.indistinguishable
+                                       if rivals[0] == found.effects[0].name for other in rivals}
+    assert name in named
+    if name in ('payload_mass', 'link_mass'):
+        for parameter, value in run.effects[0]['parameters'].items():
+            assert found.effects[0].parameters[parameter].value == pytest.approx(value, rel=0.05)
+
+
+def test_the_command_writes_recording_and_truth(tmp_path: Path,
+                                                capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(arm.write_arm(tmp_path))
+    output, truth = str(tmp_path / 'run.csv'), tmp_path / 'truth.json'
+    assert main(['simulate', '--model', path, '--output', output, '--effect', 'payload_mass',
+                 '--duration', '5', '--json', str(truth)]) == 0
+    assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
+    assert main(['simulate', '--model', path, '--output', output, '--effect', 'rod_mass']) == 2
+    assert 'no hidden effect of an arm' in capsys.readouterr().err
+
+
+def test_statements_have_the_units_of_joints(model: ArmModel, tmp_path: Path,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    without = build_model({**model.values, 'friction.coulomb': (0.0, 4.0, 0.0)}, model.source)
+    from pprs_dynamics.inference.diagnosis.localisation import localise
+    from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+    run = simulate_arm(model, (), 0)
+    assert run.motion.time is not None
+    recording = Recording.from_arrays('run', run.motion.time, run.position, None, run.effort,
+                                      model.drives)
+    said = {one.drive: one.text for one in localise(
+        measure_residuals(without, [recording])[0]).statements if one.kind == 'friction'}
+    assert 'N m' in said['turn']
+    assert 'N m' not in said['reach']
+    assert ' N' in said['reach']

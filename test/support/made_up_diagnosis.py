@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Small diagnoses made up by hand, for what is said and drawn of them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.found_effects import (
+    FoundEffect,
+    RankedEffect,
+    RankedSet,
+    WithinModelError,
+)
+from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+SAMPLES, PERIOD = 1500, 0.01
+NOISE = 0.05  # [N]
+
+
+@cache
+def made_up_residuals() -> Residuals:
+    """Return a motion of all drives, with nothing but noise between model and effort."""
+    rng = np.random.default_rng(3)
+    time = np.arange(SAMPLES) * PERIOD
+    phase = 2 * np.pi * np.outer(time, 0.2 + 0.05 * np.arange(6))
+    position, velocity = 0.05 * np.sin(phase), 0.05 * np.cos(phase)
+    model = 5.0 + 20 * position
+    platform = {f'platform_{name}': 0.03 * np.sin((2 + k) * time)
+                for k, name in enumerate(('x', 'y', 'z', 'tilt', 'turn'))}
+    return Residuals(
+        DRIVES, time, np.zeros(SAMPLES, dtype=int), model + NOISE * rng.normal(size=model.shape),
+        model, {}, {'position': position, 'velocity': velocity, 'acceleration': -position,
+                    'load': 8 + position, 'rod_angle': 1 + position, **platform}, PERIOD)
+
+
+def found_effect(name: str, drives: tuple[str, ...] | None = ('lift_2',), value: float = 0.6,
+                 held_out_after: float = 0.056, only: tuple[str, ...] = (),
+                 **changes: Any) -> FoundEffect:
+    """Return an effect with a value for every parameter, or for those of `only`."""
+    effect = CATALOGUE[name]
+    parameters = {
+        f'{place}{p.name}': Estimate(value, 0.01, p.unit) if not only or p.name in only
+        else Estimate(0.0, 0.0, p.unit)
+        for place in ([''] if drives is None else [f'{d}.' for d in drives])
+        for p in effect.parameters}
+    force = np.zeros((SAMPLES, 6))
+    velocity = made_up_residuals().variables['velocity']
+    for d in range(6):
+        if drives is None or DRIVES[d] in drives:
+            force[:, d] = value * np.sign(velocity[:, d])
+    values = {'parameters': parameters, 'evidence': 120.4, 'error_before': 0.25,
+              'error_after': 0.0510, 'held_out_before': 0.26, **changes}
+    return FoundEffect(effect, drives, force=force, held_out_after=held_out_after, **values)
+
+
+def statement(drive: str = 'slide_1', variable: str = 'position', kind: str = 'range',
+              limits: tuple[float, float] | None = (0.01, 0.02)) -> Statement:
+    """Return what remains somewhere."""
+    return Statement(drive, variable, limits, 0.41, 0.07, f'{drive}: 41% of its squared error lies '
+                     'somewhere, in 7% of the time; it is shifted there by +0.3 N', 77.0, kind, 0.3,
+                     0.3 ** 2 * 0.07)
+
+
+def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
+    """Return a diagnosis; `changes` are its fields."""
+    residuals, model = made_up_residuals(), DriveModel.load()
+    effects = changes.get('effects', ())
+    missing = sum((one.force for one in effects), np.zeros((SAMPLES, 6)))
+    given = Residuals(DRIVES, residuals.time, residuals.segment, residuals.measured + missing,
+                      residuals.model, {}, residuals.variables, PERIOD)
+    fields: dict[str, Any] = {
+        'verdict': verdict, 'effects': (), 'indistinguishable': (), 'candidates': tuple(
+            RankedEffect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
+        'suspects': (), 'depends_on': (), 'within_model_error': (), 'sets': (),
+        'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
+        'noise_floors': dict.fromkeys(DRIVES, NOISE),
+        'notes': (), 'model': model, 'adopted': model, 'residuals': given,
+        'remaining': residuals.error, 'noise_floor': NOISE}
+    return Diagnosis(**{**fields, **changes})
+
+
+def white_noise() -> NoiseSpectrum:
+    """Return the noise between model and effort."""
+    return NoiseSpectrum(np.array([1.0]), np.array([NOISE ** 2, 0.0]), PERIOD)
+
+
+def within_model_error(of: str = 'coulomb_friction') -> WithinModelError:
+    """Return a small further effect that may be the lack of fit of another."""
+    return WithinModelError('hysteresis', ('lift_2',), 0.021, (of,))
+
+
+def ranked_sets(*names: str) -> tuple[RankedSet, ...]:
+    """Return sets of one effect each, every one 7 worse than the one before."""
+    return tuple(RankedSet(((name, ('lift_2',)),), 7.0 * k) for k, name in enumerate(names))
+
+
+def calibration(after: float = 1.02) -> Calibration:
+    """Return a payload that was weighed with a tolerance of 5 %."""
+    return Calibration('masses.payload', None, 1.0, after, 0.002, 'kg')
+
+
+SUSPECT = RankedEffect('effort_offset', ('slide_3',), -4.2, 0.06)

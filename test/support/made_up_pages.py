@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Every page of the package, of what is made up: quick to make, with something in every place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from made_up_diagnosis import (
+    NOISE,
+    calibration,
+    found_effect,
+    made_up_diagnosis,
+    made_up_residuals,
+    ranked_sets,
+)
+
+from pprs_dynamics import DriveModel, __version__
+from pprs_dynamics.app.fleet.store import Store, key_of
+from pprs_dynamics.app.fleet.trend import fleet_trends
+from pprs_dynamics.app.report.adoption_page import adoption_page
+from pprs_dynamics.app.report.comparison_page import comparison_page
+from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+from pprs_dynamics.app.report.experiment_page import experiment_page
+from pprs_dynamics.app.report.fleet_page import fleet_page
+from pprs_dynamics.app.report.history_page import history_page
+from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.inference.adoption.adopt import VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.comparison import compare
+from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.experiments.next_experiment import (
+    Accuracy,
+    ExpectedEvidence,
+    Experiment,
+)
+from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.ledger import Step
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+DAY = 86400 * 10 ** 6  # [us]
+
+
+def made_up_pages(folder: Path) -> dict[str, Page]:
+    """Return all pages but that of the robot, by command."""
+    diagnosis = made_up_diagnosis(
+        effects=(found_effect('coulomb_friction', ('lift_2', 'slide_1')),),
+        sets=ranked_sets('coulomb_friction', 'hysteresis'))
+    words = word_diagnosis(diagnosis, GivenFiles(('my run.mcap',), ('other.mcap',)))
+    return {
+        'diagnosis': diagnosis_page(diagnosis, words, made_up_residuals(), ['my run.mcap']),
+        'comparison': comparison_page(
+            DriveModel.load(), [], diagnosis.residuals, compare(diagnosis.residuals), ['so'],
+            'pprs diagnose run.mcap'),
+        'adoption': _adoption(diagnosis.residuals), 'history': _history(),
+        'experiment': _experiment(), 'fleet': _fleet(folder / 'store')}
+
+
+def _adoption(before: Residuals) -> Page:
+    model, after = DriveModel.load(), made_up_residuals()
+    friction = found_effect('coulomb_friction').force
+    with_it = replace(after, parts={'coulomb_friction': friction})
+    return adoption_page(Adoption(
+        EffectRequest(CATALOGUE['coulomb_friction']), ('lift_2',), True, False,
+        'the error on held-out data falls', (), ('the recordings call for time_delay, too',),
+        {'lift_2.force': Estimate(0.6, 0.01, 'N')}, (calibration(),), ('load_friction',), model,
+        model, before, with_it, 0.25, 0.051, 0.26, 0.052, VALIDATION, NOISE,
+        dict.fromkeys(DRIVES, NOISE)), [], [], 'pprs diagnose run.mcap --model better.yaml')
+
+
+def _history() -> Page:
+    step = Step(
+        effect='coulomb_friction', error_before=0.2, error_after=0.1, held_out_before=0.21,
+        held_out_after=0.11, held_out_on='blocks', noise_floor=0.09, recordings=('a.csv', 'b.csv'),
+        sha256=('0' * 64, 'f' * 64), spans=(0.0, 20.0, 5.0, 25.0),
+        date='2026-11-21T08:00:00+00:00', version='0.1.0', forced=False, drives=('lift_1',),
+        parameters=('lift_1.force',), values=(1.5,), std=(0.02,), units=('N',),
+        measured=DRIVES, drive_errors_before=(0.1,) * 3 + (0.3,) * 3,
+        drive_errors_after=(0.1,) * 6, calibrated=('masses.payload',))
+    return history_page('better.yaml', [step, replace(step, effect='base_tilt', drives=())])
+
+
+def _experiment() -> Page:
+    path, model = Excitation(duration=4.0, seed=1), DriveModel.load()
+    experiment = Experiment(
+        'separate', ('coulomb_friction', 'load_friction'),
+        (ExpectedEvidence('coulomb_friction', 'load_friction', 9.9, 120.0, 0.99),),
+        (Accuracy('masses.payload', 'kg', 0.02, 0.01, 0.002),), 120.0, (),
+        {f'velocity of {name}': 0.1 * k + 0.3 for k, name in enumerate(DRIVES)}, 4.0, path.motion,
+        lambda time: model.drive_forces(path.motion(time)), model)
+    return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)),
+                           'ros2 run pprs_dynamics play_trajectory')
+
+
+def _fleet(folder: Path) -> Page:
+    store, rng = Store(str(folder)), np.random.default_rng(7)
+    for robot in ('a robot with a long name', 'b'):
+        for day in range(30):
+            row = {'recording': f'{day}.csv', 'path': f'/{robot}/{day}.csv',
+                   'sha256': f'{robot} {day}', 'time': (20_000 + day) * DAY, 'model': 'm',
+                   'options': 'auto', 'version': __version__, 'drive': 'slide_2',
+                   'effect': 'coulomb_friction', 'parameter': 'force',
+                   'value': 0.05 * max(day - 10, 0) * (robot == 'b') + 0.05 * rng.normal(),
+                   'std': 0.1, 'unit': 'N', 'conditions': [('temperature', 20.0)]}
+            store.write(robot, key_of(f'{robot} {day}', 'm', 'auto', __version__), [row])
+    return fleet_page(fleet_trends(store), 'temperature')

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings of a robot with known effects that its model lacks, for tests of the workbench."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import default_parameters
+
+STEP = 0.002  # [s]
+NOISE = 0.05  # [N], half of its variance white
+HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
+          'effects.coulomb_friction.lift_2.force': 0.6, 'effects.payload_mass.mass': 0.15}
+
+
+def write_hidden(path: Path, seed: int, duration: float = 16.0,
+                 hidden: Mapping[str, Any] = HIDDEN) -> Path:
+    """Write a recording of the paper's robot with effects, and return its path."""
+    robot = build_model({**default_parameters(), **hidden})
+    assert isinstance(robot, DriveModel)
+    motion = Excitation(duration=duration, seed=seed).motion(np.arange(0.0, duration, STEP))
+    forces = robot.drive_forces(motion)
+    rng = np.random.default_rng(seed)
+    white, slow = rng.normal(0, NOISE / 2 ** 0.5, (2, *forces.total.shape))
+    noise = white + lfilter([(1 - 0.9 ** 2) ** 0.5], [1, -0.9], slow, axis=0)
+    position = forces.mechanism.position + rng.normal(0, 1e-6, forces.total.shape)
+    write_recording(path, Recording.from_arrays(
+        path.stem, motion.time, position, forces.mechanism.velocity, forces.total + noise))
+    return path

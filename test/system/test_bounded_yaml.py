@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parameter files that would take forever, or a stack, to read: one sentence within a second."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from ros_processes import executable
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.system.bounded_yaml import DEEPEST, LARGEST
+
+HEAD = '/**:\n  ros__parameters:\n'
+PAPER = Path(__file__).parents[2] / 'config/paper.yaml'
+
+
+def expanding() -> str:
+    """Ten lines that stand for 10^10 values."""
+    lines = ['    a: &a [x, x, x, x, x, x, x, x, x, x]']
+    lines += [f'    {name}: &{name} [{", ".join([f"*{of}"] * 10)}]'
+              for of, name in zip('abcdefghi', 'bcdefghij', strict=True)]
+    return HEAD + '\n'.join(lines) + '\n'
+
+
+def block(depth: int) -> str:
+    return HEAD + ''.join('  ' * (level + 2) + 'a:\n' for level in range(depth))
+
+
+FILES = {
+    'expanding aliases': (expanding(), 'is an alias'),
+    'an alias of itself': ('/**: &a\n  ros__parameters: {b: *a}\n', 'is an alias'),
+    'merged mappings': (f'{HEAD}    a: &a {{b: 1}}\n    c: {{<<: *a}}\n', 'is an alias'),
+    'nested mappings': (f'{HEAD}    a: {"{a: " * 1000}1{"}" * 1000}\n', f'more than {DEEPEST}'),
+    'an open list': (f'{HEAD}    a: {"[" * 100_000}\n', f'more than {DEEPEST}'),
+    'nested blocks': (block(300), f'more than {DEEPEST}'),
+    'size': (HEAD + '    a: 1.0\n' * (LARGEST // 5), 'larger than'),
+    'a number of any length': (f'{HEAD}    gravity: {"9" * 5000}\n', 'has 5000 characters'),
+    'a number to base 60': (f'{HEAD}    gravity: {":".join(["1"] * 50_000)}\n', 'characters'),
+    'a tagged time': (f'{HEAD}    gravity: !!timestamp soon\n', 'is a tag'),
+    'a tagged truth': (f'{HEAD}    gravity: !!bool maybe\n', 'is a tag'),
+    'an object': (f'{HEAD}    gravity: !!python/object:os.system x\n', 'is a tag')}
+
+
+@pytest.mark.parametrize('content', FILES.values(), ids=FILES.keys())
+def test_files_out_of_bounds_are_one_sentence_within_a_second(
+    tmp_path: Path, content: tuple[str, str],
+) -> None:
+    text, reason = content
+    file = tmp_path / 'model.yaml'
+    file.write_text(text)
+    start = time.process_time()
+    with pytest.raises(UnreadableFileError, match=reason) as caught:
+        DriveModel.load(file)
+    assert time.process_time() - start < 1.0
+    assert len(str(caught.value)) < 300
+    assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('number', [':'.join(['59'] * 300) + '.5', '0x' + 'f' * 900, '9' * 900])
+def test_numbers_within_bounds_that_are_none_are_one_sentence(
+    tmp_path: Path, number: str,
+) -> None:
+    file = tmp_path / 'model.yaml'
+    file.write_text(PAPER.read_text().replace('base_radius: 0.15', f'base_radius: {number}'))
+    done = subprocess.run([executable('pprs'), 'history', file.name, '--model', 'none'],
+                          cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert len(done.stderr) < 400
+
+
+def test_a_file_without_end_is_not_read_to_its_end() -> None:
+    with pytest.raises(UnreadableFileError, match='larger than'):
+        DriveModel.load('/dev/zero')
+
+
+def test_text_with_the_tag_of_a_string_is_what_ros_reads(tmp_path: Path) -> None:
+    file = tmp_path / 'model.yaml'
+    file.write_text(PAPER.read_text().replace('elbow: up', 'elbow: !!str up'))
+    assert DriveModel.load(file).robot.geometry.elbow == 'up'
+
+
+@pytest.mark.parametrize('kind', ['an open list', 'nested mappings', 'size'])
+def test_nodes_refuse_such_files_before_ros_reads_them(tmp_path: Path, kind: str) -> None:
+    text, reason = FILES[kind]
+    (tmp_path / 'model.yaml').write_text(text)
+    done = subprocess.run(
+        [executable('feedforward'), '--ros-args', '--params-file', 'model.yaml'], cwd=tmp_path,
+        capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2
+    assert reason in done.stderr
+    assert len(done.stderr.splitlines()) == 1
