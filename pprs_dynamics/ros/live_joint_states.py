@@ -29,15 +29,13 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.residuals.live import LiveComparison
+from pprs_dynamics.measurement.residuals.live import ERROR_SPAN, LiveComparison
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.model_parameters import NodeModel
 from pprs_dynamics.ros.qos import UNANSWERED
 from pprs_dynamics.ros.rejection import Rejection
 
 NAME = 'workbench'
-NODES = ('monitor', 'feedforward')
-WINDOW, ERROR_SPAN = 0.12, 2.0  # [s], the monitor's defaults
 JUDGED = 0.05  # [s] between looks at what came in
 MOST_SAMPLES = 300_000  # in the ring: ten minutes at 500 Hz
 SHOWN = 20.0  # [s] of residuals that are kept to be drawn
@@ -50,15 +48,20 @@ class LiveJointStates(Node):
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
+    model : ForceModel
     topic : str
         Of sensor_msgs/JointState.
+    monitor, feedforward : str
+        Names of the nodes that get effects, absolute or in the namespace of this one.
+    options
+        Of `rclpy.node.Node`.
     """
 
-    def __init__(self, model: NodeModel, topic: str, **options: Any) -> None:
+    def __init__(self, model: ForceModel, topic: str, monitor: str, feedforward: str,
+                 **options: Any) -> None:
         super().__init__(NAME, **options)
         self.model = model
-        self._comparison = LiveComparison(model, WINDOW, ERROR_SPAN)
+        self._comparison = LiveComparison(model)
         self._lock = threading.Lock()
         self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
         self._residuals: deque[tuple[float, Any]] = deque()
@@ -69,11 +72,12 @@ class LiveJointStates(Node):
         self._monitor: list[float] | None = None
         self._heard = 0.0
         self.create_subscription(JointState, topic, self._on_state, UNANSWERED, raw=True)
-        self.create_subscription(Float64MultiArray, '/monitor/error', self._on_error, UNANSWERED)
+        self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, UNANSWERED)
         self.create_timer(JUDGED, self._judge)
-        self.clients_of = {name: AsyncParameterClient(self, f'/{name}') for name in NODES}
+        self.clients_of = {name: AsyncParameterClient(self, name)
+                           for name in (monitor, feedforward)}
 
-    def use_model(self, model: NodeModel) -> None:
+    def use_model(self, model: ForceModel) -> None:
         """Compare with another model from now on."""
         with self._lock:
             self.model = model
@@ -158,15 +162,20 @@ class LiveSource:
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
+    model : ForceModel
         That running nodes have as well.
-    topic : str
+    topic, monitor, feedforward : str
+        As `LiveJointStates`.
+    namespace : str
+        In which relative names are resolved.
     """
 
-    def __init__(self, model: NodeModel, topic: str = 'joint_states') -> None:
+    def __init__(self, model: ForceModel, topic: str = 'joint_states', monitor: str = 'monitor',
+                 feedforward: str = 'feedforward', namespace: str = '') -> None:
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = LiveJointStates(model, topic, context=self._context)
+        self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
+                                     context=self._context)
         self._base: Mapping[str, Any] = model.values
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -193,12 +202,12 @@ class LiveSource:
         """Write what the ring holds as a recording."""
         write_recording(path, self._node.taken())
 
-    def set_model(self, model: Any) -> dict[str, str]:
+    def set_model(self, model: ForceModel) -> dict[str, str]:
         """Set a model's effects on the running nodes, and compare with it here.
 
         Parameters
         ----------
-        model : DriveModel or ArmModel
+        model : ForceModel
 
         Returns
         -------
@@ -209,7 +218,7 @@ class LiveSource:
                    if key != ACTIVE and not key.startswith('history.')
                    and self._base.get(key) != value}
         answers = {name: self._set(name, changes, list(model.values.get(ACTIVE, ())))
-                   for name in NODES}
+                   for name in self._node.clients_of}
         if any(not answer for answer in answers.values()):
             self._node.use_model(model)
         return answers

@@ -13,7 +13,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import EffectError, PprsError
-from pprs_dynamics.measurement.residuals.live import Compared, LiveComparison
+from pprs_dynamics.measurement.residuals.live import (
+    ARM_WINDOW,
+    ERROR_SPAN,
+    WINDOW,
+    Compared,
+    LiveComparison,
+)
 from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.keys import is_arm
 from pprs_dynamics.physics.model.preparation import prepare
@@ -25,16 +31,14 @@ from pprs_dynamics.ros.rejection import CODES, Rejection
 from pprs_dynamics.ros.status import StatusReporter
 
 PARAMETERS = (
-    NodeParameter('window', 0.12, 'of the smoothing that gives velocity and acceleration; '
+    NodeParameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
                   'answers lag by half of it [s]', lower=0.01, upper=2.0),
-    NodeParameter('error_span', 2.0, 'over which ~/error is taken [s]', lower=0.05, upper=600.0),
+    NodeParameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
+                  upper=600.0),
     NodeParameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
                   lower=1.0, upper=1000.0),
 )
 
-
-# Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
-ARM_WINDOW = 0.25  # [s]
 
 
 class MonitorNode(ExplainsRefusals):

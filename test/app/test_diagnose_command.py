@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -18,10 +17,8 @@ from browser import Seen, chromium, needs_browser
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.commands.diagnosis_cache import diagnosis_key, kept_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effects import draw_effect
@@ -118,17 +115,7 @@ def test_the_terminal_says_verdict_fall_and_the_next_command_in_25_lines(folder:
         assert part in shown
 
 
-def test_adopt_after_diagnose_need_not_diagnose_again(folder: Path) -> None:
-    """With what `diagnose` kept; and not once a recording or the model is another."""
-    shutil.copy(folder / 'run.csv', folder / 'copy.csv')
-    assert kept_diagnosis(diagnosis_key(DriveModel.load(), [str(folder / 'copy.csv')], None)), (
-        'the contents count, not the name')
-    other = build_model({**DriveModel.load().values, 'masses.payload': 1.001})
-    assert kept_diagnosis(diagnosis_key(other, [str(folder / 'run.csv')], None)) is None
-    with (folder / 'copy.csv').open('a') as file:
-        file.write('\n')
-    assert kept_diagnosis(
-        diagnosis_key(DriveModel.load(), [str(folder / 'copy.csv')], None)) is None
+def test_the_effect_that_is_named_is_adopted(folder: Path) -> None:
     done = pprs('adopt', HIDDEN, 'run.csv', '--validate', '<b>other<b>.mcap', '--output',
                 'adopted.yaml', cwd=folder)
     assert done.returncode == 0, done.stderr

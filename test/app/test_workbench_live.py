@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import made_up_arm as arm
 import numpy as np
 import pytest
 import rclpy
@@ -25,6 +26,7 @@ from workbench_bench import NOISE, write_hidden
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.ros import conversions
 
 pytestmark = [pytest.mark.nodes, needs_browser]
@@ -36,25 +38,26 @@ THINNED = 5  # of the recorded samples one is published: 100 Hz
 class Replay:
     """Publishes a recording as joint states, in real time, again and again onwards."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, topic: str = '/joint_states',
+                 thinned: int = THINNED) -> None:
         self.context = Context()
         rclpy.init(context=self.context)
         self.node = Node('replay', context=self.context)
-        self.publisher = self.node.create_publisher(JointState, '/joint_states', 100)
-        self.recording = recording
+        self.publisher = self.node.create_publisher(JointState, topic, 100)
+        self.recording, self.thinned = recording, thinned
         self.ends = threading.Event()
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
 
     def _run(self) -> None:
-        rows = np.arange(0, len(self.recording.time), THINNED)
+        rows = np.arange(0, len(self.recording.time), self.thinned)
         stamp, began, sent = START, time.monotonic(), 0
         while True:
             stamp += 1_000_000_000  # a gap: the motion begins anew
             for row in rows:
                 message = conversions.joint_state(
                     stamp, self.recording.effort[row], self.recording.position[row],
-                    self.recording.position[row])
+                    self.recording.position[row], self.recording.drives)
                 message.velocity = []
                 self.publisher.publish(message)
                 stamp += 10_000_000
@@ -81,6 +84,51 @@ def bench(tmp_path: Path, ros_domain: int) -> Iterator[Workbench]:
         running = stack.enter_context(workbench(recorded, '--live', folder=tmp_path))
         running.enter()
         yield running
+
+
+def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
+    tmp_path: Path, ros_domain: int,
+) -> None:
+    real = arm.real_arm(tmp_path)
+    more = arm.real_arm(tmp_path, **{'friction.viscous': (14.0, 5.0, 20.0)})
+    model = arm.write_arm(tmp_path, **{key: list(value) for key, value in arm.FRICTION.items()})
+    assert load_model(model).values == real.values
+    with ExitStack() as stack:
+        stack.enter_context(node_process(
+            [executable('monitor'), '--ros-args', '--params-file', str(model), '-r', '__ns:=/left',
+             '-r', '__node:=watch'], ros_domain, tmp_path / 'monitor.log'))
+        replay = Replay(arm.record(more, arm.motion(20.0)), '/left/joint_states', 1)
+        stack.callback(replay.close)
+        bench = stack.enter_context(workbench(
+            '--live', '--model', model, '--namespace', '/left', '--monitor', 'watch',
+            '--feedforward', '/right/control', folder=tmp_path))
+        bench.enter()
+        assert bench.screen()['units']['turn']['effort'] == 'N m'
+
+        def live() -> dict[str, Any]:
+            found: dict[str, Any] = bench.get('/api/live').json
+            return found
+
+        def awaited(holds: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+            end = time.monotonic() + 60
+            while not holds(found := live()):
+                assert time.monotonic() < end, found
+                time.sleep(0.2)
+            return found
+        found = awaited(lambda found: found['monitor_error'] and found['kept'] > 8)
+        # The same comparison, in the same window.
+        np.testing.assert_allclose(found['error'], found['monitor_error'], rtol=0.2)
+        assert found['error'][0] > 2 * found['error'][1]
+        assert bench.post('/api/live/take').status == 200
+        bench.settled()
+        revision = bench.screen()['revision']
+        assert bench.post('/api/tick', effect='viscous_friction', drives=['turn'],
+                          revision=revision).status == 200
+        bench.settled()
+        assert bench.post('/api/live/set').json == {'nodes': {
+            'watch': '', '/right/control': 'does not run'}}
+        awaited(lambda found: found['error'][0] and max(
+            found['error'][0], found['monitor_error'][0]) < 0.5)
 
 
 def rms(page: Page, key: str) -> float:

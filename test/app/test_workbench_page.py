@@ -192,7 +192,7 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
                                '.is_ticked')
     page.settled()
     page.tab.keyboard.press('Escape')
-    assert page.tab.locator('#share-list li').count() == 0
+    page.tab.wait_for_function("!document.querySelector('#share-list li')")
 
 
 def test_a_region_of_a_scatter_leads_to_its_times(page: Page) -> None:

@@ -5,18 +5,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import socket
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ros_processes import executable
+from starlette.responses import PlainTextResponse
 from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
+from pprs_dynamics.app.workbench.server.access import AccessControl, Keys
 from pprs_dynamics.app.workbench.server.folders import Folders, NotOfferedError
 
 SECRET = 'no business of a browser'
@@ -108,6 +112,52 @@ def test_another_page_may_neither_read_nor_change(bench: Workbench, origin: str)
     assert bench.screen()['revision'] == before
 
 
+# Each is the right request but for one thing, which one layer alone can refuse.
+LAYERS = {
+    'nothing': ('POST', {}, 200), 'nothing of a read': ('GET', {'origin': None}, 200),
+    'host': ('POST', {'host': 'evil.example:8000'}, 421),
+    'two hosts': ('POST', {'host': ['127.0.0.1:8000', 'evil.example']}, 421),
+    'no host': ('POST', {'host': None}, 421),
+    'origin': ('POST', {'origin': 'http://evil.example'}, 403),
+    'origin of a read': ('GET', {'origin': 'http://evil.example'}, 403),
+    'no origin': ('POST', {'origin': None}, 403),
+    'two origins': ('POST', {'origin': ['http://127.0.0.1:8000'] * 2}, 403),
+    'site': ('POST', {'sec-fetch-site': 'cross-site'}, 403),
+    'neighbour': ('GET', {'sec-fetch-site': 'same-site', 'origin': None}, 403),
+    'cookie': ('POST', {'cookie': 'pprs_workbench_8000=guess'}, 401),
+    'no cookie': ('POST', {'cookie': None}, 401),
+    'length': ('POST', {'content-length': '64001'}, 413),
+    'a length of many digits': ('POST', {'content-length': '9' * 5000}, 413),
+    'a length that is none': ('POST', {'content-length': '-1'}, 413)}
+
+
+@pytest.mark.parametrize('layer', LAYERS)
+def test_each_layer_refuses_by_itself(layer: str) -> None:
+    method, changed, status = LAYERS[layer]
+    keys = Keys('127.0.0.1', 8000)
+    cookie = keys.exchange(keys.address.rpartition('=')[2])
+    right = {'host': '127.0.0.1:8000', 'origin': 'http://127.0.0.1:8000',
+             'sec-fetch-site': 'same-origin', 'cookie': f'pprs_workbench_8000={cookie}',
+             'content-length': '2'}
+    sent: list[dict[str, Any]] = []
+
+    async def inside(scope: Any, receive: Any, send: Any) -> None:
+        await PlainTextResponse('reached')(scope, receive, send)
+
+    async def receive() -> dict[str, Any]:
+        return {'type': 'http.request', 'body': b'{}'}
+
+    async def send(message: dict[str, Any]) -> None:
+        sent.append(message)
+    headers = [(name.encode(), one.encode()) for name, value in {**right, **changed}.items()
+               for one in ([value] if isinstance(value, str) else value or [])]
+    scope = {'type': 'http', 'method': method, 'path': '/api/tick', 'query_string': b'',
+             'headers': headers, 'server': ('127.0.0.1', 8000), 'scheme': 'http'}
+    asyncio.run(AccessControl(inside, keys, {})(scope, receive, send))
+    assert sent[0]['status'] == status
+    assert (sent[1]['body'] == b'reached') is (status == 200)
+
+
 def test_a_change_says_where_it_comes_from_and_is_json(bench: Workbench) -> None:
     before = bench.screen()['revision']
     body = json.dumps({'effect': 'payload_mass', 'revision': before}).encode()
@@ -138,7 +188,9 @@ def test_answers_run_and_load_nothing_from_elsewhere_and_cannot_be_framed(
 
 @pytest.mark.parametrize('name', [
     '../secret.csv', '0/../secret.csv', '0//etc/passwd', '/etc/passwd', '0/link.csv', '1/one.csv',
-    '0/', '0', '', '0/one.csv\0', '-1/one.csv', '0/..', '0/./../secret.csv', '\u0660/one.csv'])
+    '0/', '0', '', '0/one.csv\0', '-1/one.csv', '0/..', '0/./../secret.csv', '\u0660/one.csv',
+    '0/' + 'x' * 5000 + '.csv', '0/' + 'x/' * 5000, '9' * 5000 + '/one.csv', '0/\ud800.csv',
+    'survey/' + '9' * 5000])
 def test_no_path_outside_the_given_folders_is_opened(
     bench: Workbench, folder: Path, name: str,
 ) -> None:
@@ -199,13 +251,40 @@ def test_a_body_that_goes_on_is_cut_off(bench: Workbench) -> None:
     b'', b'[]', b'{', b'[' * 20_000, b'{"effect": 1, "revision": 1}', b'\xff',
     b'{"effect": "payload_mass"}', b'{"effect": "payload_mass", "revision": true}',
     b'{"effect": "payload_mass", "revision": 1, "drives": [[]]}',
-    b'{"effect": "../../etc/passwd", "revision": 1}'])
+    b'{"effect": "../../etc/passwd", "revision": 1}', b'{"effect": "\\ud800", "revision": 1}',
+    b'{"effect": "payload_mass", "revision": ' + b'9' * 400 + b'}',
+    b'{"effect": "payload_mass", "revision": 1.5}', b'{"effect": "x", "revision": 1e999}'])
 def test_a_bad_body_is_a_sentence(bench: Workbench, body: bytes) -> None:
     answer = bench.send('POST', '/api/tick', body, Origin=f'http://{bench.host}',
                         Content_Type='application/json')
     assert answer.status == 400
     assert answer.json['error']
     assert b'Traceback' not in answer.body
+
+
+@pytest.mark.parametrize('number', ['NaN', 'Infinity', '1e18', '-1', '1e999', '9' * 400, 'true',
+                                    '"20"', '[]'])
+def test_a_number_that_is_none_is_a_sentence(bench: Workbench, number: str) -> None:
+    revision = bench.screen()['revision']
+    for path, body in (
+            ('experiment', f'{{"duration": {number}}}'),
+            ('choose', f'{{"effect": "x", "key": "y", "value": {number}, "revision": {revision}}}'),
+            ('shares', f'{{"time": [0, {number}], "drive": []}}'),
+            ('shares', f'{{"x": "time", "y": "time", "x_range": [0, {number}], "y_range": [0, 1], '
+             '"drive": "\\udfff"}')):
+        answer = bench.send('POST', f'/api/{path}', body.encode(), Origin=f'http://{bench.host}',
+                            Content_Type='application/json')
+        assert answer.status == 400, (path, answer.body)
+        assert answer.json['error']
+
+
+def test_an_upgrade_is_a_request_like_others(bench: Workbench) -> None:
+    upgrade = {'Upgrade': 'websocket', 'Connection': 'Upgrade', 'Sec_WebSocket_Version': '13',
+               'Sec_WebSocket_Key': 'dGhlIHNhbXBsZSBub25jZQ=='}
+    answer = bench.send('GET', '/api/events', cookie='a=b', **upgrade)
+    assert answer.status == 401
+    assert b'terminal' in answer.body
+    assert bench.send('GET', '/api/nothing', **upgrade).status == 404
 
 
 def test_a_second_browser_sees_the_same_session_and_cannot_corrupt_it(bench: Workbench) -> None:

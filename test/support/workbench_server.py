@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import http.client
 import json
-import os
 import re
 import subprocess
 import time
@@ -121,7 +120,7 @@ def workbench(*arguments: object, folder: Path) -> Iterator[Workbench]:
     with (folder / 'workbench.log').open('w') as log:
         process = subprocess.Popen(
             [executable('pprs'), 'workbench', '--no-browser', *map(str, arguments)], text=True,
-            stdout=subprocess.PIPE, stderr=log, env={**os.environ, 'XDG_CACHE_HOME': str(folder)})
+            stdout=subprocess.PIPE, stderr=log)
         try:
             assert process.stdout is not None
             yield Workbench(process, process.stdout.readline().strip())

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.commands.arguments import MODEL, PAGE, add_details, output_file
-from pprs_dynamics.app.commands.diagnosis_cache import diagnosis_key, kept_diagnosis
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import (
     add_recordings,
@@ -23,7 +22,7 @@ from pprs_dynamics.app.report.adoption_page import adoption_page
 from pprs_dynamics.app.report.adoption_tables import adoption_view
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.inference.adoption.adopt import adopt, original
+from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, check_output
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
@@ -55,10 +54,9 @@ def run(options: argparse.Namespace) -> int:
     request.require_place(model)
     recordings = read_recordings(options, screen, model)
     validation = read_validation(options, screen, model, recordings)
-    known = kept_diagnosis(diagnosis_key(original(model), options.recordings, options.topic))
     with progress_bar(screen, f'adopting {request.name}') as progress:
         answer = adopt(model, request, recordings, validation, options.force,
-                       lambda share: progress(share, 1.0), known)
+                       lambda share: progress(share, 1.0))
     screen.print(adoption_view(answer, options.details))
     if options.json:
         write_json(options.json, answer.to_json())

@@ -15,7 +15,6 @@ from pprs_dynamics.app.commands.arguments import (
     add_details,
     output_file,
 )
-from pprs_dynamics.app.commands.diagnosis_cache import diagnosis_key, keep
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import (
     add_recordings,
@@ -64,7 +63,6 @@ def run(options: argparse.Namespace) -> int:
     validate = read_validation(options, screen, model, recordings)
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
-    keep(diagnosis_key(model, options.recordings, options.topic), diagnosis)
     rivals = rival_effects(diagnosis, validate)
     words = word_diagnosis(diagnosis, GivenFiles(
         tuple(options.recordings), tuple(options.validate),

@@ -9,6 +9,7 @@ Serves one page on this machine; its first line on stdout is the address with a 
 from __future__ import annotations
 
 import argparse
+import re
 
 from pprs_dynamics.app.commands.arguments import number
 from pprs_dynamics.app.workbench.reading import Files
@@ -18,10 +19,12 @@ from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.app.workbench.server.surveys import Surveys
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.errors import MissingLibraryError
-from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.system.plain_text import displayed
 
 HOST = '127.0.0.1'
 ANY = ('', '0.0.0.0', '::', '*')
+ROS_NAME = re.compile(r'/|/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'holds several, and to listen to with --live')
     parser.add_argument('--live', action='store_true',
                         help='listen to joint_states, and set effects on running nodes')
+    for node in ('monitor', 'feedforward'):
+        parser.add_argument(f'--{node}', metavar='NODE', type=_ros_name, default=node,
+                            help=f'name of the node that --live speaks to (default {node})')
+    parser.add_argument('--namespace', metavar='NAME', type=_ros_name, default='/',
+                        help='in which --live looks for topic and nodes')
     parser.add_argument('--port', type=number(0, 65535), default=0.0,
                         help='to listen on (default: any that is free)')
     parser.add_argument('--host', type=_one_address, default=HOST,
@@ -51,8 +59,8 @@ def run(options: argparse.Namespace) -> int:
 
     def begin() -> Session | None:
         return Session.of(files) if files.recordings else None
-    live = _live(options) if options.live else None
-    hub = Hub(begin, options.model, Folders.of(options.recordings),
+    live = _live(options, files.model) if options.live else None
+    hub = Hub(begin, files.model, options.model, Folders.of(options.recordings),
               Surveys.of(options.recordings), live)
     serve(hub, options.host, int(options.port), not options.no_browser)
     return 0
@@ -66,11 +74,19 @@ def _one_address(text: str) -> str:
     return text
 
 
-def _live(options: argparse.Namespace) -> LiveSource:
-    model = DriveModel.load(options.model)
+def _ros_name(text: str) -> str:
+    """Read the name of a node or a namespace, absolute or not."""
+    if not ROS_NAME.fullmatch(text):
+        raise argparse.ArgumentTypeError(f'{displayed(text)!r} must be a name of ROS 2: letters, '
+                                         'digits and _ between /')
+    return text
+
+
+def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
     try:
         from pprs_dynamics.ros.live_joint_states import LiveSource as JointStates
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
-    source: LiveSource = JointStates(model, options.topic or 'joint_states')
+    source: LiveSource = JointStates(model, options.topic or 'joint_states', options.monitor,
+                                     options.feedforward, options.namespace)
     return source

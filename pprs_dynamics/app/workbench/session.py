@@ -38,6 +38,7 @@ from pprs_dynamics.inference.adoption.adopt import Adoption, original
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.experiments.next_experiment import check_duration
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -259,12 +260,13 @@ class Session(TickBoard):
 
         Raises
         ------
-        SessionError
-            For a model of another mechanism.
+        PprsError
+            For a model of another mechanism, or a duration that no design is made for.
         """
         model = self.model
         if not isinstance(model, (DriveModel, ArmModel)):
             raise SessionError(f'no motions are designed for {model.title}')
+        check_duration(duration)
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
             found: DesignedMotion = run_apart(designed, model, self.what_if.recordings, duration,

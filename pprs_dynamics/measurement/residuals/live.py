@@ -19,8 +19,13 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
+WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
+# Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
+ARM_WINDOW = 0.25  # [s]
+ERROR_SPAN = 2.0  # [s] over which the running error is taken
 # Stamps to see before their step is known; more than a late first message or two.
 STAMPS_TO_LEARN = 50
 
@@ -50,22 +55,24 @@ class LiveComparison:
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
-    window : float
-        Duration of the smoothing window [s].
+    model : ForceModel
+    window : float, optional
+        Duration of the smoothing window [s]; that of the kind of model where it is not given.
     span : float
         Duration over which the running error is taken [s].
     """
 
-    def __init__(self, model: DriveModel | ArmModel, window: float, span: float) -> None:
-        self._window, self._span = window, span
+    def __init__(self, model: ForceModel, window: float | None = None, span: float = ERROR_SPAN,
+                 ) -> None:
+        self._window = window or (ARM_WINDOW if isinstance(model, ArmModel) else WINDOW)
+        self._span = span
         self._stamps: list[float] = []
         self._live: LiveReconstruction | None = None
         self._waiting: list[LiveSample] = []
         self._recent: deque[tuple[float, Array]] = deque()
         self.use_model(model)
 
-    def use_model(self, model: DriveModel | ArmModel) -> None:
+    def use_model(self, model: ForceModel) -> None:
         """Compare with another model from the next sample on; the running error starts afresh."""
         self._model = model
         self._state = model.initial_state()
@@ -164,7 +171,7 @@ class LiveComparison:
 
     def _followed(self, position: Array, velocity: Array, acceleration: Array) -> Any:
         """Return what the drives move."""
-        if isinstance(self._model, ArmModel):
+        if not isinstance(self._model, DriveModel):
             return JointMotion(position, velocity, acceleration)
         found = solve_forward_motion(
             self._model.robot.geometry, position, velocity, acceleration, self._seed)

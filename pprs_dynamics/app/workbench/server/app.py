@@ -27,16 +27,19 @@ from starlette.routing import Route
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
-from pprs_dynamics.app.workbench.server.bodies import (
+from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
+from pprs_dynamics.app.workbench.server.hub import Hub
+from pprs_dynamics.app.workbench.server.packing import attached, binary
+from pprs_dynamics.app.workbench.server.request_fields import (
     BadRequestError,
+    body_of,
+    drives_of,
     number_of,
     range_of,
     revision_of,
     text_of,
 )
-from pprs_dynamics.app.workbench.server.guard import Guard, Keys, TooLongError
-from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.packing import attached, binary
+from pprs_dynamics.app.workbench.shown import units_to_json
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.motion_files import write_motion
 
@@ -74,7 +77,7 @@ def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -
                 for name, work in post.items())]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers={
         StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413)})
-    return Guard(app, keys, {UPLOAD: MOST_UPLOADED}, used)
+    return AccessControl(app, keys, {UPLOAD: MOST_UPLOADED}, used)
 
 
 def _status(status: int) -> Callable[[Request, Exception], Response]:
@@ -95,13 +98,7 @@ def with_body(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[
     async def endpoint(request: Request) -> Response:
         if request.headers.get('content-type') != 'application/json':
             raise BadRequestError('the body must be application/json')
-        try:
-            body = json.loads(await request.body())
-        except (ValueError, RecursionError):
-            raise BadRequestError('the body is no JSON') from None
-        if not isinstance(body, dict):
-            raise BadRequestError('the body must be an object')
-        return await run_in_threadpool(work, body)
+        return await run_in_threadpool(work, body_of(await request.body()))
     return endpoint
 
 
@@ -150,7 +147,7 @@ class Api:
                   'has_folders': bool(hub.folders.roots or hub.surveys.recordings)}
         session = hub.session
         if session is None:
-            return binary({**common, 'is_empty': True}, {})
+            return binary({**common, **units_to_json(hub.model), 'is_empty': True}, {})
         with session.steady():
             return binary({**common, **session.to_json()}, {'now': session.now.T})
 
@@ -171,11 +168,7 @@ class Api:
         """Tick or untick an effect."""
         effect, revision = text_of(body, 'effect'), revision_of(body)
         if body.get('is_ticked', True):
-            drives = body.get('drives')
-            if drives is not None and not (isinstance(drives, list) and drives and all(
-                    isinstance(name, str) for name in drives)):
-                raise BadRequestError('drives must be a list of names')
-            self.hub.the_session.tick(effect, drives, revision)
+            self.hub.the_session.tick(effect, drives_of(body), revision)
         else:
             self.hub.the_session.untick(effect, revision)
         return self.screen(body)

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from pprs_dynamics.app.workbench.server.request_fields import index_of
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.plain_text import displayed
 
@@ -66,11 +68,14 @@ class Folders:
             For any other, by whatever way it leads outside: `..`, an absolute path, a link.
         """
         number, _, inside = name.partition('/')
-        if number.isascii() and number.isdecimal() and int(number) < len(self.roots) and inside:
-            root = self.roots[int(number)].resolve()
-            path = (root / inside).resolve() if '\0' not in inside else root
-            if path != root and path.is_relative_to(root) and path.exists():
-                return path
+        at = index_of(number, len(self.roots))
+        if at is not None and inside:
+            root = self.roots[at].resolve()
+            # Too long, or with characters that no file system has.
+            with suppress(OSError, ValueError):
+                path = (root / inside).resolve()
+                if path != root and path.is_relative_to(root) and path.exists():
+                    return path
         raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the folders '
                               'that were given')
 

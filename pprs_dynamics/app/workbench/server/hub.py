@@ -53,7 +53,8 @@ class Hub:
     ----------
     begin : callable
         Makes the session, or returns None where no recording was given; may take seconds.
-    model : str
+    model : ForceModel
+    path : str
         The model file, for recordings that are opened later.
     folders : Folders
         In which browsers may choose recordings.
@@ -62,9 +63,10 @@ class Hub:
     live : LiveSource, optional
     """
 
-    def __init__(self, begin: Callable[[], Session | None], model: str, folders: Folders,
-                 surveys: Surveys, live: LiveSource | None = None) -> None:
-        self.model, self.folders, self.surveys, self.live = model, folders, surveys, live
+    def __init__(self, begin: Callable[[], Session | None], model: ForceModel, path: str,
+                 folders: Folders, surveys: Surveys, live: LiveSource | None = None) -> None:
+        self.model, self.path, self.live = model, path, live
+        self.folders, self.surveys = folders, surveys
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
@@ -142,7 +144,7 @@ class Hub:
         """
         with self._opening:
             if self.session is None:
-                self._use(Session.open(paths, self.model))
+                self._use(Session.open(paths, self.path))
             else:
                 for path in paths:
                     self.session.add(path, is_held_out)

@@ -53,8 +53,8 @@ def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
     try:
         import uvicorn
 
+        from pprs_dynamics.app.workbench.server.access import Keys
         from pprs_dynamics.app.workbench.server.app import application
-        from pprs_dynamics.app.workbench.server.guard import Keys
     except ImportError:
         raise MissingLibraryError('starlette and uvicorn', 'the workbench', 'workbench') from None
     bound = listening(host, port)
@@ -69,6 +69,7 @@ def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
     config = uvicorn.Config(
         application(hub, keys, used), log_level='warning', access_log=False, server_header=False,
         date_header=False, limit_concurrency=MOST_CONNECTIONS, proxy_headers=False,
-        timeout_graceful_shutdown=LAST_WORDS)
+        timeout_graceful_shutdown=LAST_WORDS,
+        ws='none')  # an upgrade is a request like others
     with bound:
         uvicorn.Server(config).run(sockets=[bound])

@@ -12,6 +12,7 @@ from typing import Any
 
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.workbench.server.folders import NotOfferedError
+from pprs_dynamics.app.workbench.server.request_fields import index_of
 from pprs_dynamics.system.plain_text import displayed
 
 PREFIX = 'survey'
@@ -83,9 +84,9 @@ class Surveys:
         NotOfferedError
             For any other.
         """
-        _, _, number = name.partition('/')
-        if number.isascii() and number.isdecimal() and int(number) < len(self.recordings):
-            return self.recordings[int(number)].path
+        at = index_of(name.partition('/')[2], len(self.recordings))
+        if at is not None:
+            return self.recordings[at].path
         raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the surveys')
 
 

@@ -2,7 +2,6 @@
 'use strict';
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const DRIVE_UNIT = 'N';
 
 /* Gaps are null to uPlot; typed arrays stay typed where there are none. */
 const withGaps = (values) => {
@@ -90,7 +89,7 @@ class Curves {
                {stroke: css('--now'), width: 1, points: {show: false}}],
       hooks: {
         setSelect: [(u) => this.select(u, d)],
-        setCursor: [(u) => this.read(u, reading)],
+        setCursor: [(u) => this.read(u, reading, drive)],
         draw: [(u) => this.bands(u)],
       },
     }, [this.time, this.before[d], this.now[d] || this.before[d]], place);
@@ -185,7 +184,7 @@ class Curves {
     u.ctx.restore();
   }
 
-  read(u, reading) {
+  read(u, reading, drive) {
     const k = u.cursor.idx;
     if (k === null || k === undefined || u.cursor.left < 0) {
       reading.textContent = '';
@@ -194,7 +193,7 @@ class Curves {
     const say = (v) => (v === null || v === undefined ? '–' : (v >= 0 ? '+' : '−')
       + Math.abs(v).toFixed(3));
     reading.textContent = `${u.data[0][k].toFixed(2)} s: ${say(u.data[1][k])} → `
-      + `${say(u.data[2][k])} ${DRIVE_UNIT}`;
+      + `${say(u.data[2][k])} ${unitOf(drive)}`;
   }
 
   key(event) {

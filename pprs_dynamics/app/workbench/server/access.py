@@ -88,7 +88,7 @@ class Keys:
             return bool(same)
 
 
-class Guard:
+class AccessControl:
     """Refuses what does not come from our own page with our own cookie.
 
     Parameters
@@ -106,10 +106,8 @@ class Guard:
         self.app, self.keys, self.uploads, self.used = app, keys, uploads, used
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        if scope['type'] == 'lifespan':
+        if scope['type'] != 'http':  # the start and the end; there are no websockets here
             await self.app(scope, receive, send)
-            return
-        if scope['type'] != 'http':  # no websockets here
             return
         request = Request(scope)
 
@@ -154,7 +152,7 @@ class Guard:
             return _refuse(401, 'open the address that stands in the terminal, with its token')
         length = headers.get('content-length', '0')
         most = self.uploads.get(request.url.path, MOST_BYTES)
-        if not length.isdecimal() or int(length) > most:
+        if not length.isdecimal() or len(length) > len(str(most)) or int(length) > most:
             return _refuse(413, f'the body is too long, must be at most {most} bytes')
         return None
 

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Fields of requests, judged: what is not as the page sends it is refused in a sentence.
+
+Every function raises `BadRequestError`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from pprs_dynamics.errors import PprsError
+
+MOST_DIGITS = 25  # of a number: a float has 17, and its exponent
+
+
+class BadRequestError(PprsError, ValueError):
+    """A request that is not what the page sends."""
+
+
+def body_of(content: bytes) -> dict[str, Any]:
+    """Return the fields of a JSON object, all numbers finite and all text Unicode."""
+    try:
+        body = json.loads(content, parse_int=lambda text: int(_number(text)),
+                          parse_float=_number, parse_constant=_number)
+        json.dumps(body, ensure_ascii=False).encode()  # raises for lone surrogates
+    except (ValueError, RecursionError):
+        raise BadRequestError('the body is no JSON of finite numbers and of text') from None
+    if not isinstance(body, dict):
+        raise BadRequestError('the body must be an object')
+    return body
+
+
+def text_of(body: Any, key: str) -> str:
+    """Return a text."""
+    value = body.get(key)
+    if not isinstance(value, str):
+        raise BadRequestError(f'{key} must be a text')
+    return value
+
+
+def number_of(body: Any, key: str) -> float:
+    """Return a number."""
+    return float(_is_number(body.get(key), f'{key} must be a number'))
+
+
+def range_of(body: Any, key: str) -> tuple[float, float]:
+    """Return two numbers."""
+    value, rule = body.get(key), f'{key} must be two numbers'
+    if not isinstance(value, list) or len(value) != 2:
+        raise BadRequestError(rule)
+    return float(_is_number(value[0], rule)), float(_is_number(value[1], rule))
+
+
+def revision_of(body: Any) -> int:
+    """Return the revision that a change counts on."""
+    value = _is_number(body.get('revision'), 'revision must be a whole number')
+    if value != int(value):
+        raise BadRequestError('revision must be a whole number')
+    return int(value)
+
+
+def drives_of(body: Any) -> list[str] | None:
+    """Return names of drives, None where none are given."""
+    value = body.get('drives')
+    if value is not None and not (isinstance(value, list) and value and all(
+            isinstance(name, str) for name in value)):
+        raise BadRequestError('drives must be a list of names')
+    return value
+
+
+def index_of(text: str, count: int) -> int | None:
+    """Return a place in a list of so many entries, None where the text is none."""
+    is_place = text.isascii() and text.isdecimal() and len(text) <= MOST_DIGITS
+    return int(text) if is_place and int(text) < count else None
+
+
+def _number(text: str) -> float:
+    if len(text) > MOST_DIGITS or not math.isfinite(float(text)):
+        raise ValueError(text)
+    return float(text)
+
+
+def _is_number(value: Any, rule: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise BadRequestError(rule)
+    return value
