@@ -11,12 +11,13 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo demo-feedforward test reproduce feedforward localisation score adoption benchmark \
-	reliability reliability-full experiments decisions fleet workbench lint clean
+	reliability reliability-full experiments decisions fleet workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
 	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
+	@echo 'make docs       the documentation as a site, into build/docs/html'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
 	@echo 'make feedforward   the table and picture of docs/feedforward.md (15 minutes)'
 	@echo 'make localisation  how often compare is right about where the model fails (long; it can be stopped)'
@@ -45,6 +46,11 @@ test: $(VENV)/.test lint
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+# -W: a warning is an error; all of them are shown first.
+docs: $(VENV)/.docs
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d build/docs/doctrees docs build/docs/html
+	@echo 'build/docs/html/index.html'
 
 reproduce: $(VENV)/.demo
 	$(BIN)/pprs reproduce --output output
@@ -96,9 +102,14 @@ $(VENV)/.test: $(VENV)/.demo
 	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,test]'
 	@touch $@
 
+$(VENV)/.docs: $(VENV)/.demo
+	@echo 'Installing Sphinx for the documentation ...'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,arm,fleet,docs]'
+	@touch $@
+
 $(VENV)/bin/python:
 	@test -n '$(PYTHON)' || { echo 'pprs_dynamics needs Python 3.11, 3.12 or 3.13: none was found on PATH (or set PYTHON=...)' >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo 'python -m venv failed; on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 
 clean:
-	rm -rf $(VENV) output build install log *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) output build install log docs/generated *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -38,10 +38,13 @@ setup(
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
+        # The site of the documentation: Markdown and notebooks, in a theme that reads on a phone.
+        'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8', 'pin>=3'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',
-                 'types-PyYAML', 'scipy-stubs', 'colcon-common-extensions', 'colcon-ros',
+                 'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
+                 'colcon-common-extensions', 'colcon-ros',
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.
                  'setuptools<80'],
     },

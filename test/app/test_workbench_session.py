@@ -291,7 +291,8 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
 
 
 def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
-    notebook = json.loads((Path(__file__).parents[2] / 'docs' / 'workbench.ipynb').read_text())
+    file = Path(__file__).parents[2] / 'docs' / 'workbench_session.ipynb'
+    notebook = json.loads(file.read_text())
     assert notebook['nbformat'] == 4
     names: dict[str, Any] = {'__name__': '__main__'}
     for cell in notebook['cells']:

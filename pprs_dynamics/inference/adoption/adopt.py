@@ -109,7 +109,7 @@ class Adoption:
         return self.request.name
 
     def to_json(self) -> dict[str, Any]:
-        """Return the keys of the interface, and what the README adds to them."""
+        """Return the JSON of `pprs adopt`."""
         return {
             'adopted': self.adopted, 'reason': self.reason, 'effect': self.effect,
             'drives': None if self.drives is None else list(self.drives),

@@ -112,7 +112,7 @@ class Diagnosis:
     chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the JSON of the interface, and what the README adds to it."""
+        """Return the JSON: the keys that docs/commands.md lists."""
         return {
             'verdict': self.verdict,
             'effects': [one.to_json() for one in self.effects],

@@ -96,7 +96,7 @@ class RankedSet:
     cost: float
 
     def to_json(self) -> dict[str, Any]:
-        """Return what the README adds to the interface."""
+        """Return an entry of `sets` in the JSON."""
         return {'cost': self.cost, 'effects': [
             {'name': name, 'drives': listed(drives)} for name, drives in self.names]}
 

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The site of the documentation: `make docs` writes it into build/docs/html."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+DOCS = Path(__file__).parent
+sys.path[:0] = [str(DOCS), str(DOCS.parent), str(DOCS.parent / 'test' / 'support')]
+
+import api_pages  # noqa: E402
+import effect_pages  # noqa: E402
+
+import pprs_dynamics  # noqa: E402
+
+project = 'pprs_dynamics'
+author = 'The pprs_dynamics founders'
+copyright = f'2026 {author}'
+version = release = pprs_dynamics.__version__
+
+extensions = ['myst_nb', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
+exclude_patterns = ['*_text.md', 'example_effect/*.egg-info']
+html_theme = 'furo'
+html_title = f'pprs_dynamics {version}'
+html_static_path: list[str] = []
+
+# Headings get the anchors that a reader of the repository's pages sees, too.
+myst_heading_anchors = 3
+myst_enable_extensions = ['dollarmath']
+# Notebooks are run by tests; the site shows what is in the file.
+nb_execution_mode = 'off'
+
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_custom_sections = [('Class attributes', 'params_style')]
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'description'
+autodoc_typehints_description_target = 'documented'
+autodoc_default_options = {'members': True, 'show-inheritance': True}
+# Some names stand in two modules; a link then leads to the first.
+suppress_warnings = ['ref.python']
+autodoc_mock_imports = ['rclpy', 'std_msgs', 'sensor_msgs', 'trajectory_msgs', 'geometry_msgs',
+                        'builtin_interfaces', 'diagnostic_msgs', 'rcl_interfaces',
+                        'lifecycle_msgs']
+
+
+def write_generated_pages(app: Sphinx) -> None:
+    """Write the pages of the API and of the effects below docs/generated, which git ignores."""
+    folder = DOCS / 'generated'
+    api_pages.write(folder / 'api')
+    effect_pages.write(folder / 'effects')
+
+
+def escape_marks(app: Sphinx, what: str, name: str, thing: object, options: object,
+                 lines: list[str]) -> None:
+    """Keep |v| and *arguments of docstrings from being read as marks of reStructuredText."""
+    lines[:] = [re.sub(r'(?<![*\\])\*(?=\w)', r'\*', line.replace('|', r'\|')) for line in lines]
+
+
+def setup(app: Sphinx) -> None:
+    """Let Sphinx write the generated pages before it looks for sources."""
+    app.connect('builder-inited', write_generated_pages)
+    # Before napoleon, which makes marks of its own.
+    app.connect('autodoc-process-docstring', escape_marks, priority=400)

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Pages of the catalogue: each effect's card, its parameters, and a plot of its law.
+
+The plot is what the effect adds to the measured effort of the drive where it adds most, along a
+random motion of the paper's robot (of a small arm where it acts in arms only), with a typical
+value of each parameter.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use('Agg')
+import made_up_arm
+import matplotlib.pyplot as plt
+import numpy as np
+
+from pprs_dynamics import ArmModel, DriveModel, PlatformMotion
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.three_pprs.forward_kinematics import (
+    solve_forward_kinematics,
+)
+
+SECONDS, RATE = 20.0, 200.0
+# What an effect's force is drawn over, where it is not the drive's velocity.
+OVER = {'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
+        'effort_offset': 'time', 'force_ripple': 'position', 'friction_drift': 'time',
+        'homing_error': 'position', 'link_mass': 'position', 'payload_inertia': 'acceleration',
+        'payload_mass': 'position', 'payload_moment': 'position', 'payload_offset': 'position',
+        'platform_inertia': 'acceleration', 'revolute_stiffness': 'position',
+        'rod_mass': 'position', 'base_tilt': 'position', 'external_wrench': 'position'}
+# Values of one drive or of the structure where the parameters' scales do not show the law.
+TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
+           'force_ripple': {'force': 0.3, 'phase': 0.0, 'pitch': 0.01},
+           'hysteresis': {'force': 0.5, 'distance': 0.002},
+           'homing_error': {'zero': 0.002},
+           'load_friction': {'coefficient': 0.05},
+           'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
+           'time_delay': {'delay': 0.02}}
+UNITS = {'time': 's', 'position': 'm', 'velocity': 'm/s', 'acceleration': 'm/s²', 'effort': 'N'}
+
+
+def values(effect: type[CatalogueEffect]) -> dict[str, float]:
+    """Return typical values: those above, else each required parameter's scale."""
+    return TYPICAL.get(effect.name) or {
+        each.name: each.scale for each in effect.parameters if each.default is None
+    } or {each.name: each.scale for each in effect.parameters[:1]}
+
+
+def block(effect: type[CatalogueEffect], drive: str) -> dict[str, Any]:
+    """Return the keys of a model file with the effect alone, on one drive or in the structure."""
+    middle = f'effects.{effect.name}.' + (f'{drive}.' if issubclass(effect, DriveEffect) else '')
+    return {'effects.active': [effect.name],
+            **{middle + name: value for name, value in values(effect).items()}}
+
+
+@cache
+def platform() -> tuple[DriveModel, PlatformMotion]:
+    """Return the paper's robot and a motion of it."""
+    return DriveModel.load(), Excitation(SECONDS, seed=3).motion(np.arange(0, SECONDS, 1 / RATE))
+
+
+def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
+    """Return states of a drive of the 3-PPRS by name, what the effect adds to it, its name."""
+    model, motion = platform()
+    changed = DriveModel.from_parameters({**model.values, **block(effect, 'slide_1')})
+    plain = model.drive_forces(motion)
+    state = plain.mechanism
+    at = motion
+    if changed.position_error.any():
+        # Positions are read with the error, so that the model is evaluated at another pose.
+        poses = solve_forward_kinematics(model.robot.geometry,
+                                         state.position + changed.position_error)
+        at = PlatformMotion.from_poses(motion.time, poses.position, poses.orientation)
+    forces = changed.drive_forces(at)
+    added = changed.measured(forces).total - plain.total
+    if changed.position_error.any():
+        added = -added
+    drive = int(np.argmax((added ** 2).sum(axis=0)))
+    return ({'time': motion.time, 'position': state.position[:, drive],
+             'velocity': state.velocity[:, drive], 'acceleration': state.acceleration[:, drive],
+             'effort': plain.total[:, drive]}, added[:, drive], model.drives[drive])
+
+
+def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
+    """Return the same of a joint of a small arm."""
+    with tempfile.TemporaryDirectory() as folder:
+        model = made_up_arm.real_arm(Path(folder))
+        changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
+    assert isinstance(changed, ArmModel)
+    motion = made_up_arm.motion(SECONDS, RATE, seed=3)
+    plain = model.drive_forces(motion)
+    added = changed.drive_forces(motion).total - plain.total
+    joint = int(np.argmax((added ** 2).sum(axis=0)))
+    return ({'time': motion.time, 'position': motion.position[:, joint],
+             'velocity': motion.velocity[:, joint], 'acceleration': motion.acceleration[:, joint],
+             'effort': plain.total[:, joint]}, added[:, joint], model.drives[joint])
+
+
+def draw(effect: type[CatalogueEffect], file: Path) -> None:
+    """Draw what an effect adds over time and over what it depends on most."""
+    in_arm = PLATFORM not in effect.acts_in
+    states, added, drive = arm_law(effect) if in_arm else platform_law(effect)
+    over = OVER.get(effect.name, 'velocity')
+    force, units = ('N m', {**UNITS, 'position': 'rad', 'velocity': 'rad/s',
+                            'acceleration': 'rad/s²'}) if in_arm else ('N', UNITS)
+    figure, axes = plt.subplots(1, 1 if over == 'time' else 2, figsize=(8.0, 2.6), sharey=True,
+                                layout='constrained', squeeze=False)
+    for panel, name in zip(axes[0], ('time', over), strict=False):
+        panel.plot(states[name], added, '-' if name == 'time' else '.', color='#2563eb',
+                   linewidth=1.0, markersize=1.5, rasterized=name != 'time')
+        panel.set_xlabel(f'{name} [{units[name]}]')
+        panel.grid(alpha=0.3)
+    axes[0, 0].set_ylabel(f'added on {drive} [{force}]')
+    figure.savefig(file, dpi=150, metadata={'Date': None})
+    plt.close(figure)
+
+
+def page(effect: type[CatalogueEffect]) -> str:
+    """Return an effect's page."""
+    card = effect.card
+    given = ', '.join(f'`{name}` = {value:g}' for name, value in values(effect).items())
+    rows = [f'| `{each.name}` | {each.symbol} | {each.unit} | {each.description} | '
+            f'{"" if each.default is None else f"{each.default:g}"} |'
+            for each in effect.parameters]
+    kinds = {'platform': '3-PPRS', 'axis': 'single axis', 'arm': 'serial arm'}
+    return '\n'.join([
+        f'# {effect.name}', '', (effect.__doc__ or '').strip().splitlines()[0], '',
+        '```text', card.equation, '```', '',
+        f'![What {effect.name} adds to a drive]({effect.name}.svg)', '',
+        f'With {given}.', '',
+        f'**In the residual:** {card.looks_like}.', '', f'**Usual causes:** {card.causes}.', '',
+        f'**To confirm it:** {card.confirm}.', '',
+        '| parameter | symbol | unit | meaning | default |', '|---|---|---|---|---|', *rows, '',
+        f'Acts in: {", ".join(kinds[kind] for kind in kinds if kind in effect.acts_in)}. '
+        f'Source: `pprs_dynamics/physics/effects/laws/{effect.name}.py`.', '',
+        f'Reference: {card.reference}.', ''])
+
+
+def write(target: Path) -> None:
+    """Write pages and plots into a folder; those of effects that are gone are removed."""
+    target.mkdir(parents=True, exist_ok=True)
+    for file in target.iterdir():
+        if file.stem not in CATALOGUE:
+            file.unlink()
+    for name, effect in CATALOGUE.items():
+        file, text = target / f'{name}.md', page(effect)
+        if file.is_file() and file.read_text(encoding='utf-8') == text:
+            continue
+        draw(effect, target / f'{name}.svg')
+        file.write_text(text, encoding='utf-8')
