@@ -72,7 +72,7 @@ class RandomMotion:
         return PlatformMotion(value[:3].T + HOME, orientation, rate[:3].T, omega, gain[:3].T,
                               epsilon, time)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
         return asdict(self)
 

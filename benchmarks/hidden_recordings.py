@@ -211,7 +211,7 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
         'noise_by_drive': np.sqrt(np.mean(place.treat(noise) ** 2, axis=0)).tolist(),
         'drive_width': list(place.settings.drive_width),
         'passive_width': place.settings.passive_width,
-        'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.to_json()}
+        'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.to_dict()}
     # As it comes back from a file.
     return place.model, recording, json.loads(json.dumps(truth))
 

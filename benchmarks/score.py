@@ -97,7 +97,7 @@ def diagnose_case(case: Case, diagnose: Diagnose, recordings: Path | None) -> di
         start = time.perf_counter()
         diagnosis = diagnose(model, [recording])
         seconds = time.perf_counter() - start
-        said = diagnosis.to_json()
+        said = diagnosis.to_dict()
         left = {drive: float(error) for drive, error in zip(
             model.drives, np.sqrt(np.nanmean(np.square(diagnosis.remaining), axis=0)),
             strict=True)}

@@ -137,7 +137,7 @@ class LiveJointStates(Node):
                                      effort=np.stack([effort for _, _, effort in samples]),
                                      drives=self.model.drives)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return how it stands, and what was left of late [N]."""
         now = time.monotonic()
         with self._lock:
@@ -194,9 +194,9 @@ class LiveSource:
         self._context.try_shutdown()
         self._thread.join(PATIENCE)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return state and running errors."""
-        return self._node.to_json()
+        return self._node.to_dict()
 
     def take(self, path: Path) -> None:
         """Write what the ring holds as a recording."""

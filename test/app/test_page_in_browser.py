@@ -240,7 +240,7 @@ def test_where_it_fails_is_ranked_by_squared_error_and_nothing_slight_is_listed(
     assert sizes == sorted(sizes, reverse=True)
     for one in comparison.where:
         assert one.mean_square >= 0.01 * comparison.drives[one.drive].rms ** 2
-    assert [one['drive'] for one in comparison.to_json()['where']] == [
+    assert [one['drive'] for one in comparison.to_dict()['where']] == [
         one.drive for one in comparison.where]
     assert set(comparison.drives) == set(DRIVES)
 

@@ -104,7 +104,7 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     shown = session.settle()
     assert shown.estimates['drive_spring']['axis.stiffness'].value == pytest.approx(SPRING, rel=0.1)
     assert session.overall().now < 0.5 * session.overall().before
-    json.dumps(session.to_json(), allow_nan=False)
+    json.dumps(session.to_dict(), allow_nan=False)
 
 
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

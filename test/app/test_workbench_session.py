@@ -192,7 +192,7 @@ def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) ->
 def test_everything_on_the_screen_is_json(session: Session) -> None:
     session.tick('payload_mass')
     session.settle()
-    found = json.loads(json.dumps(session.to_json(), allow_nan=False))
+    found = json.loads(json.dumps(session.to_dict(), allow_nan=False))
     assert len(found['effects']) == 25
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 
@@ -246,7 +246,7 @@ def test_a_job_is_cancelled_at_its_next_report() -> None:
     with pytest.raises(Cancelled):
         job.result(10)
     assert shares == [0, 1, 2, 3]
-    assert job.to_json()['error'] == ''
+    assert job.to_dict()['error'] == ''
     assert not job.is_running
 
 
@@ -311,7 +311,7 @@ def test_an_arm_is_shown_in_its_own_words_and_units(tmp_path: Path) -> None:
     session = Session(model, {'run': arm.record(real, arm.motion(10.0))})
     session.tick('viscous_friction', ['turn'])
     session.settle()
-    state = session.to_json()
+    state = session.to_dict()
     assert state['unit'] == 'N or N m'
     assert state['units']['turn'] == {'effort': 'N m', 'position': 'rad', 'velocity': 'rad/s',
                                       'acceleration': 'rad/s²'}

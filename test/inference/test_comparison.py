@@ -58,7 +58,7 @@ def test_numbers_are_those_the_interface_defines(width: int) -> None:
     rng = np.random.default_rng(3)
     effort = rng.normal(5.0, 2.0, (200, width)) * (1 + np.arange(width))
     error = rng.normal(0.3, 0.1, (200, width))
-    found = json.loads(json.dumps(compare(recording(error, effort), NOWHERE).to_json()))
+    found = json.loads(json.dumps(compare(recording(error, effort), NOWHERE).to_dict()))
     assert list(found['drives']) == [f'drive_{k}' for k in range(width)]
     for k, numbers in enumerate(found['drives'].values()):
         rms = np.sqrt((error[:, k] ** 2).sum() / 200)
@@ -90,7 +90,7 @@ def test_a_constant_effort_has_no_relative_error_and_raises_no_warning() -> None
     with warnings.catch_warnings():
         warnings.simplefilter('error')
         found = compare(still, NOWHERE)
-    numbers = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    numbers = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert numbers['drives']['drive_0']['relative'] is None
     assert numbers['overall']['relative'] is None
     assert 'constant' in found.drives['drive_0'].verdict

@@ -127,7 +127,7 @@ class Answer:
     def __init__(self, data: dict[str, Any]) -> None:
         self.data = data
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         return self.data
 
 

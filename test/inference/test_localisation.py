@@ -80,7 +80,7 @@ def test_a_range_and_its_shares_are_those_of_the_error_in_it() -> None:
     assert first.amplitude == pytest.approx(0.4, abs=0.05)
     assert first.text.startswith('lift_2: ')
     assert 'mm/s' in first.text
-    assert set(first.to_json()) == {'drive', 'variable', 'range', 'share_of_error',
+    assert set(first.to_dict()) == {'drive', 'variable', 'range', 'share_of_error',
                                     'share_of_time', 'text'}
 
 

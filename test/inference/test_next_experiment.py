@@ -329,7 +329,7 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     found = drawn.assess(drawn.screen(draws=1)[0].path)
     told = experiment_of(question, found)
     assert told.separates == ()
-    assert told.to_json()['does_not_separate'] == [['coulomb_friction', 'load_friction']]
+    assert told.to_dict()['does_not_separate'] == [['coulomb_friction', 'load_friction']]
     assert 'hardly tell coulomb_friction from load_friction' in told.text
     # Thirty thousand times the effect is told from its rival.
     strong = [replace(one, truth=3e4 * one.truth) for one in both]

@@ -78,7 +78,7 @@ def test_what_a_step_holds_comes_back(stages: list[dict[str, Any]]) -> None:
     assert set(first.added) == {'effects.active', 'effects.coulomb_friction.lift_1.force'}
     assert second.previous['effects.active'] == ['coulomb_friction']
     assert second.rivals == ('external_wrench',)
-    assert json.dumps(first.to_json())
+    assert json.dumps(first.to_dict())
 
 
 def test_tolerances_count_from_the_numbers_of_the_first_file(stages: list[dict[str, Any]]) -> None:

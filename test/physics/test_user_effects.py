@@ -207,7 +207,7 @@ effort = effort + 0.05 * np.random.default_rng(0).normal(size=effort.shape)
 recording = Recording.from_arrays('made', time, forces.mechanism.position, effort=effort)
 found = diagnose(given, [recording])
 answer = adopt(given, EffectRequest.of('effort_filter'), [recording], diagnosis=found)
-print(json.dumps({'found': found.to_json(), 'adopted': answer.to_json()}))
+print(json.dumps({'found': found.to_dict(), 'adopted': answer.to_dict()}))
 """
 
 

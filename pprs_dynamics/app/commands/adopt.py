@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
                        lambda share: progress(share, 1.0))
     screen.print(adoption_view(answer, options.details))
     if options.json:
-        write_json(options.json, answer.to_json())
+        write_json(options.json, answer.to_dict())
     if options.report:
         files = GivenFiles(tuple(options.recordings), tuple(options.validate), options.output)
         page = adoption_page(answer, recordings, validation,

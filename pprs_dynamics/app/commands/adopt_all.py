@@ -42,7 +42,7 @@ def adopt_what_was_found(
                      else escape(headline(step)))
     screen.print(f'[bold]{outcome.ended}[/]: {escape(outcome.reason)}')
     if options.json:
-        write_json(options.json, {**diagnosis.to_json(), 'adoption': outcome.to_json()})
+        write_json(options.json, {**diagnosis.to_dict(), 'adoption': outcome.to_dict()})
     if outcome.adopted or outcome.ended != REFUSED:
         write_model(options.output, outcome.model.values, base)
         count = len(outcome.adopted)

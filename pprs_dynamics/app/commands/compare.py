@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     command = files.command('diagnose', '--report', 'why.html')
     screen.print(comparison_view(comparison, command, options.details))
     if options.json:
-        write_json(options.json, {**comparison.to_json(), 'verdict': comparison.verdict})
+        write_json(options.json, {**comparison.to_dict(), 'verdict': comparison.verdict})
     if options.report:
         page = comparison_page(model, recordings, residuals, comparison, notes, command)
         screen.print(f'page: {shown(page.write(options.report))}')

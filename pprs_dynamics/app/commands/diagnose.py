@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
         '' if options.model == DEFAULT_MODEL else str(options.model)), rivals)
     screen.print(diagnosis_view(diagnosis, words, options.details))
     if options.json:
-        write_json(options.json, diagnosis.to_json())
+        write_json(options.json, diagnosis.to_dict())
     if options.report:
         with progress_bar(screen, 'page') as progress:
             after, _ = measure_residuals(diagnosis.adopted, recordings, progress)

@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         screen.print(numbers_table(fit))
     screen.print(f'model: {shown(options.output)}')
     if options.json:
-        write_json(options.json, fit.to_json())
+        write_json(options.json, fit.to_dict())
     if options.report:
         page = fit_page(model, fit, [one.name for one in recordings],
                         [one.name for one in validate])

@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         return 1
     screen.print(history_view(steps, unit))
     if options.json:
-        write_json(options.json, {'steps': [step.to_json() for step in steps]})
+        write_json(options.json, {'steps': [step.to_dict() for step in steps]})
     if options.report and options.report.endswith('.png'):
         screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')
     elif options.report:

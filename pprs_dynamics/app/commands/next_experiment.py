@@ -112,7 +112,7 @@ def run(options: argparse.Namespace) -> int:
             'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
             '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     if options.json:
-        write_json(options.json, {**experiment.to_json(), 'purpose': options.purpose,
+        write_json(options.json, {**experiment.to_dict(), 'purpose': options.purpose,
                                   'seed': options.seed, 'rate': options.rate,
                                   'output': options.output})
     if options.report:
@@ -138,7 +138,7 @@ def _excite_arm(options: argparse.Namespace, model: ArmModel, limits: ArmLimits,
     screen.print('limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share:.0%}' for name, share in found.limits.items()))
     if options.json:
-        write_json(options.json, {**found.to_json(), 'purpose': options.purpose,
+        write_json(options.json, {**found.to_dict(), 'purpose': options.purpose,
                                   'seed': options.seed, 'rate': options.rate,
                                   'output': options.output})
     if options.report:

@@ -12,7 +12,7 @@ from pprs_dynamics.app.commands.arguments import PAGE, output_file
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.trend import fleet_trends
-from pprs_dynamics.app.fleet.words import sentences, to_json
+from pprs_dynamics.app.fleet.words import sentences, to_dict
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     for text in sentences(fleet):
         screen.print(shown(text))
     if options.json:
-        write_json(options.json, to_json(fleet))
+        write_json(options.json, to_dict(fleet))
     if options.report:
         screen.print(f'page: {shown(fleet_page(fleet, options.beside).write(options.report))}')
     return 0

@@ -136,7 +136,7 @@ def _counted(count: int, noun: str) -> str:
     return f'{count} {noun}{"s" * (count != 1)}'
 
 
-def to_json(fleet: FleetTrends) -> dict[str, Any]:
+def to_dict(fleet: FleetTrends) -> dict[str, Any]:
     """Return the trends as data for JSON."""
     return {
         'sentences': sentences(fleet), 'options': fleet.options, 'robots': list(fleet.robots),

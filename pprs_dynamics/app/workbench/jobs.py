@@ -78,7 +78,7 @@ class Job(Generic[Result]):
             raise self.error
         return self._result  # type: ignore[return-value]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return how it stands."""
         error = self.error
         return {'kind': self.kind, 'what': self.what, 'share': round(self.share, 3),

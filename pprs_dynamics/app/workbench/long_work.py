@@ -58,4 +58,4 @@ def designed(model: DriveModel | ArmModel, recordings: Sequence[Recording], dura
     """Return the motion of `pprs next-experiment`."""
     found = next_experiment(model, recordings, duration=duration, seed=seed, progress=progress)
     count = int(found.duration * RATE + 1e-9) + 1
-    return DesignedMotion(found.to_json(), found.motion(np.arange(count) / RATE))
+    return DesignedMotion(found.to_dict(), found.motion(np.arange(count) / RATE))

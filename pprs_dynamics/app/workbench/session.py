@@ -25,11 +25,11 @@ from pprs_dynamics.app.workbench.reading import (
 )
 from pprs_dynamics.app.workbench.shown import (
     Share,
-    effect_to_json,
+    effect_to_dict,
     finite,
     names_of,
-    recordings_to_json,
-    units_to_json,
+    recordings_to_dict,
+    units_to_dict,
 )
 from pprs_dynamics.app.workbench.tick_board import TickBoard
 from pprs_dynamics.app.workbench.what_if import WhatIf
@@ -333,7 +333,7 @@ class Session(TickBoard):
         model = self.ticked_model() if with_ticked else self.model
         write_model(path, model.values, self.base)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return all that one screen shows, but for the curves."""
         with self._lock:
             shown, diagnosis, adoption = self.shown, self.diagnosis, self.last_adoption
@@ -343,15 +343,15 @@ class Session(TickBoard):
                 'is_settled': shown.is_settled, 'is_approximate': shown.is_approximate,
                 'departure': finite(shown.departure), 'notice': shown.notice,
                 'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
-                'errors': {name: one.to_json() for name, one in self.errors().items()},
-                'overall': self.overall().to_json(), **units_to_json(self.model),
-                'effects': [effect_to_json(shown, effect, self.model, effect.name in called_for)
+                'errors': {name: one.to_dict() for name, one in self.errors().items()},
+                'overall': self.overall().to_dict(), **units_to_dict(self.model),
+                'effects': [effect_to_dict(shown, effect, self.model, effect.name in called_for)
                             for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
-                'steps': [step.to_json() for step in self.steps],
-                'jobs': {kind: job.to_json() for kind, job in self.jobs.items()},
-                'adoption': adoption.to_json() if adoption else None,
+                'steps': [step.to_dict() for step in self.steps],
+                'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
+                'adoption': adoption.to_dict() if adoption else None,
                 'experiment': self.experiment.promise if self.experiment else None,
-                'recordings': recordings_to_json(
+                'recordings': recordings_to_dict(
                     list(self.recordings.values()), self.what_if, self.now),
                 'held_out': [one.name for one in self.validation.values()]}

@@ -35,7 +35,7 @@ class DriveError:
     now: float
     noise: float
 
-    def to_json(self) -> dict[str, float | None]:
+    def to_dict(self) -> dict[str, float | None]:
         """Return it for JSON."""
         return {'before': finite(self.before), 'now': finite(self.now),
                 'noise': finite(self.noise)}
@@ -62,7 +62,7 @@ class Share:
     explained: float
     net: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {'effect': self.effect, 'drives': self.drives and list(self.drives),
                 'explained': self.explained, 'net': self.net}
@@ -129,7 +129,7 @@ class Shown:
             tick.effect.bends_columns for tick in self.ticks.values())
 
 
-def effect_to_json(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
+def effect_to_dict(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
                    is_called_for: bool) -> dict[str, Any]:
     """Return all that is shown of one effect."""
     card, drives = effect.card_in(model.kind), model.drives
@@ -148,7 +148,7 @@ def effect_to_json(shown: Shown, effect: type[CatalogueEffect], model: ForceMode
         'parameters': _parameters(shown, effect, model) if tick else []}
 
 
-def units_to_json(model: ForceModel) -> dict[str, Any]:
+def units_to_dict(model: ForceModel) -> dict[str, Any]:
     """Return the units of all drives together, and drive by drive."""
     return {'unit': common_effort(model.units), 'units': {
         drive: {'effort': unit.effort, 'position': unit.position, 'velocity': unit.of('m/s'),
@@ -177,7 +177,7 @@ def _parameters(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
     return rows
 
 
-def recordings_to_json(recordings: Sequence[Recording], what_if: WhatIf, now: Array,
+def recordings_to_dict(recordings: Sequence[Recording], what_if: WhatIf, now: Array,
                        ) -> list[dict[str, Any]]:
     """Return every recording with its times and its error before and now."""
     found, first = [], 0

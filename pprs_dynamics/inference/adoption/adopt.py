@@ -108,7 +108,7 @@ class Adoption:
         """Name of the effect."""
         return self.request.name
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the JSON of `pprs adopt`."""
         return {
             'adopted': self.adopted, 'reason': self.reason, 'effect': self.effect,
@@ -118,8 +118,8 @@ class Adoption:
             'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
             'forced': self.forced, 'objections': list(self.objections),
             'remarks': list(self.remarks), 'rivals': list(self.rivals),
-            'parameters': {key: one.to_json() for key, one in self.parameters.items()},
-            'calibrated': [one.to_json() for one in self.calibrated]}
+            'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
+            'calibrated': [one.to_dict() for one in self.calibrated]}
 
 
 def adopt(

@@ -47,10 +47,10 @@ class AdoptionRun:
         """The steps that were taken."""
         return tuple(step for step in self.steps if step.adopted)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the run for JSON."""
         return {'ended': self.ended, 'reason': self.reason,
-                'steps': [step.to_json() for step in self.steps]}
+                'steps': [step.to_dict() for step in self.steps]}
 
 
 def adopt_all(

@@ -107,14 +107,14 @@ class Comparison:
         """Whether there is anything but noise on any drive."""
         return bool(self.where) or any(one.grade != 'noise' for one in self.drives.values())
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
         return {
             'drives': {name: {key: _number(getattr(drive, key))
                               for key in ('rms', 'relative', 'bias', 'peak')}
                        for name, drive in self.drives.items()},
             'overall': {'rms': _number(self.rms), 'relative': _number(self.relative)},
-            'where': [statement.to_json() for statement in self.where]}
+            'where': [statement.to_dict() for statement in self.where]}
 
 
 def compare(residuals: Residuals, localisation: Localisation | None = None) -> Comparison:

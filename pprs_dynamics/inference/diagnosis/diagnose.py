@@ -111,21 +111,21 @@ class Diagnosis:
     selection: Selection | None = field(default=None, repr=False, compare=False)
     chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
         return {
             'verdict': self.verdict,
-            'effects': [one.to_json() for one in self.effects],
+            'effects': [one.to_dict() for one in self.effects],
             'indistinguishable': [list(names) for names in self.indistinguishable],
-            'candidates': [one.to_json() for one in self.candidates],
+            'candidates': [one.to_dict() for one in self.candidates],
             'depends_on': [
                 {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
                  'range': None if s.range is None else list(s.range), 'text': s.text}
                 for s in self.depends_on],
-            'suspects': [{key: value for key, value in s.to_json().items() if key != 'error_after'}
+            'suspects': [{key: value for key, value in s.to_dict().items() if key != 'error_after'}
                          for s in self.suspects],
-            'sets': [one.to_json() for one in self.sets],
-            'calibrated': [one.to_json() for one in self.calibrated],
+            'sets': [one.to_dict() for one in self.sets],
+            'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 

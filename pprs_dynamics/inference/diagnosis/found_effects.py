@@ -56,10 +56,10 @@ class FoundEffect:
         """Return whether the error on held-out data falls with it."""
         return self.held_out_after < self.held_out_before
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
-                'parameters': {key: one.to_json() for key, one in self.parameters.items()},
+                'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
                 'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
@@ -74,7 +74,7 @@ class RankedEffect:
     evidence: float
     error_after: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives), 'evidence': self.evidence,
                 'error_after': self.error_after}
@@ -95,7 +95,7 @@ class RankedSet:
     names: tuple[tuple[str, Drives], ...]
     cost: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return an entry of `sets` in the JSON."""
         return {'cost': self.cost, 'effects': [
             {'name': name, 'drives': listed(drives)} for name, drives in self.names]}

@@ -79,7 +79,7 @@ class Statement:
     mean_square: float
     rivals: tuple[str, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'drive': self.drive, 'variable': self.variable,
                 'range': None if self.range is None else list(self.range),

@@ -67,7 +67,7 @@ class ArmExcitation:
                 'rest does not show in any effort, or hardly. Whether links touch each other is '
                 'not checked.')
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return what it promises."""
         return {'separates': [], 'expected_evidence': 0.0, 'determined': self.determined,
                 'total': self.total, 'limits': self.limits, 'duration': self.series.duration}

@@ -60,7 +60,7 @@ class ExpectedEvidence:
     expected: float
     probability: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {'truth': self.truth, 'rival': self.rival, 'evidence_now': self.now,
                 'expected_evidence': self.expected, 'probability': self.probability}
@@ -86,7 +86,7 @@ class Accuracy:
     before: float
     after: float
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {'label': self.label, 'unit': self.unit, 'scale': self.scale,
                 'std_before': self.before, 'std_after': self.after}
@@ -172,15 +172,15 @@ class Experiment:
             'commission': 'This motion measures the model\'s numbers and shows all common '
                           'effects.'}[self.kind] + last
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the JSON of the interface, and what the documentation adds to it."""
         return {'separates': [list(pair) for pair in self.separates],
                 'does_not_separate': [list(pair) for pair in self.fails],
                 'expected_evidence': self.expected_evidence,
                 'question': self.kind, 'subjects': list(self.subjects),
                 'hidden': list(self.hidden), 'text': self.text,
-                'contests': [one.to_json() for one in self.contests],
-                'accuracy': [one.to_json() for one in self.accuracies],
+                'contests': [one.to_dict() for one in self.contests],
+                'accuracy': [one.to_dict() for one in self.accuracies],
                 'limits': self.limits, 'duration': self.duration}
 
 

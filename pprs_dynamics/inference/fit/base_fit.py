@@ -39,7 +39,7 @@ class FittedNumber:
     std: float
     unit: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the number for JSON."""
         return {'key': self.key, 'drive': self.drive, 'before': self.before, 'after': self.after,
                 'std': self.std if np.isfinite(self.std) else None, 'unit': self.unit}
@@ -70,9 +70,9 @@ class BaseFit:
     held_out: dict[str, float]
     held_out_on: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the fit for JSON."""
-        return {'numbers': [one.to_json() for one in self.numbers], 'notes': list(self.told),
+        return {'numbers': [one.to_dict() for one in self.numbers], 'notes': list(self.told),
                 'error_before': self.before, 'error_after': self.after,
                 'held_out': self.held_out, 'held_out_on': self.held_out_on}
 

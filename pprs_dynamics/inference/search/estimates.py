@@ -32,7 +32,7 @@ class Estimate:
     std: float
     unit: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'value': self.value, 'std': self.std, 'unit': self.unit}
 
@@ -53,7 +53,7 @@ class Calibration:
         """Name for people, e.g. masses.slides[2]."""
         return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'key': self.label, 'before': self.before, 'after': self.after, 'std': self.std,
                 'unit': self.unit}

@@ -87,7 +87,7 @@ class Step:
     previous: Mapping[str, Any] = field(default_factory=dict)
     added: tuple[str, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the step for JSON."""
         data = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         data['drives'] = list(self.drives) or None

@@ -39,7 +39,7 @@ from pprs_dynamics.app.workbench.server.request_fields import (
     revision_of,
     text_of,
 )
-from pprs_dynamics.app.workbench.shown import units_to_json
+from pprs_dynamics.app.workbench.shown import units_to_dict
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.motion_files import write_motion
 
@@ -147,9 +147,9 @@ class Api:
                   'has_folders': bool(hub.folders.roots or hub.surveys.recordings)}
         session = hub.session
         if session is None:
-            return binary({**common, **units_to_json(hub.model), 'is_empty': True}, {})
+            return binary({**common, **units_to_dict(hub.model), 'is_empty': True}, {})
         with session.steady():
-            return binary({**common, **session.to_json()}, {'now': session.now.T})
+            return binary({**common, **session.to_dict()}, {'now': session.now.T})
 
     def curves(self, query: Any) -> Response:
         """Answer times and the error before."""
@@ -193,7 +193,7 @@ class Api:
         else:
             drive = body.get('drive')
             mask = session.span(*range_of(body, 'time'), None if drive is None else [str(drive)])
-        return JSONResponse({'shares': [one.to_json() for one in session.shares(mask)],
+        return JSONResponse({'shares': [one.to_dict() for one in session.shares(mask)],
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
 
@@ -234,7 +234,7 @@ class Api:
 
     def ledger(self, query: Any) -> Response:
         """Answer the ledger alone."""
-        steps = [step.to_json() for step in self.hub.the_session.steps]
+        steps = [step.to_dict() for step in self.hub.the_session.steps]
         return attached('ledger.json', 'application/json',
                          json.dumps({'steps': steps}, indent=2).encode())
 
@@ -294,7 +294,7 @@ class Api:
 
     def live(self, query: Any) -> Response:
         """Answer how live data stand."""
-        return JSONResponse(self._live.to_json())
+        return JSONResponse(self._live.to_dict())
 
     def live_set(self, body: Any) -> Response:
         """Set the model with the ticked effects on the running nodes."""

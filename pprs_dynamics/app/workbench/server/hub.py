@@ -33,7 +33,7 @@ IDLE = 0.5  # [s] without a tick, after which the diagnosis begins
 class LiveSource(Protocol):
     """Joint states as they come in."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return state and running errors."""
 
     def take(self, path: Path) -> None:
