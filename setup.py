@@ -15,9 +15,8 @@ setup(
     maintainer='The pprs_dynamics founders',
     maintainer_email='pprs-dynamics@example.org',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed', 'app/report/*.css', 'app/report/*.js',
-                                 'app/report/plotly-basic.*', 'app/report/uplot.*',
-                                 'app/workbench/server/static/*']},
+    package_data={package_name: ['py.typed', 'app/browser/*',
+                                 'app/report/plotly-basic.*', 'app/report/uplot.*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

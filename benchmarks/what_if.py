@@ -46,7 +46,7 @@ def main() -> int:
         tab.wait_for_selector('#what-if[data-ready]')
         tab.evaluate("document.querySelector('#what-if').scrollIntoView()")
         tab.wait_for_timeout(500)
-        boxes = tab.query_selector_all('.effects th > label input')
+        boxes = tab.query_selector_all('.effect input')
         times = []
         for click in range(CLICKS):
             times.append(boxes[click % len(boxes)].evaluate(PAINTED))

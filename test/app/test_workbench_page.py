@@ -195,6 +195,39 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
     page.tab.wait_for_function("!document.querySelector('#share-list li')")
 
 
+def test_an_answer_that_comes_after_the_mark_was_forgotten_is_not_shown(page: Page) -> None:
+    held: list[Any] = []
+    page.tab.route('**/api/shares', lambda route: held.append(route))
+    page.mark(3, 0.3, 0.6)
+    page.tab.wait_for_function("document.getElementById('brush-drive').value === 'lift_1'")
+    page.tab.keyboard.press('Escape')
+    with page.tab.expect_response('**/api/shares'):
+        held[0].continue_()
+    page.tab.evaluate('new Promise((done) => requestAnimationFrame(() => setTimeout(done)))')
+    assert page.tab.locator('#share-list li').count() == 0
+
+
+def test_what_did_not_change_is_not_sent_again(page: Page, bench: Workbench) -> None:
+    """A change of one effect is not answered with all of them and all curves."""
+    whole = bench.get('/api/screen')
+    same = bench.get(f'/api/screen?since={whole.header["version"]}')
+    assert same.header['effects'] == []
+    assert same.arrays == {}
+    assert len(same.body) < 200 < 50_000 < len(whole.body)
+    tick = bench.post('/api/tick', effect='payload_mass', since=whole.header['version'],
+                      revision=whole.header['revision'])
+    assert 'payload_mass' in [one['name'] for one in tick.header['effects']]
+    assert tick.arrays['now'].shape == whole.arrays['now'].shape
+    assert 'recordings' in tick.header
+    assert 'verdict' not in tick.header
+    page.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
+    # The page, by changes alone, shows what a page shows that is opened now.
+    state = page.settled()
+    whole = bench.get('/api/screen').header
+    for key in ('effects', 'errors', 'overall', 'recordings', 'revision', 'stage'):
+        assert state[key] == whole[key]
+
+
 def test_a_region_of_a_scatter_leads_to_its_times(page: Page) -> None:
     page.tick('payload_mass')
     page.tab.keyboard.press('2')
@@ -208,7 +241,7 @@ def test_a_region_of_a_scatter_leads_to_its_times(page: Page) -> None:
     page.tab.locator('#share-list', has_text='friction on lift_2').wait_for()
     page.tab.locator('#spans button').click()
     assert page.tab.locator('#view-curves').is_visible()
-    whole = page.tab.evaluate('bench.curves.time.at(-1) - bench.curves.time[0]')
+    whole = page.tab.evaluate('bench.curves.times[0].at(-1) - bench.curves.times[0][0]')
     seen = page.tab.evaluate('bench.curves.range()')
     assert seen[1] - seen[0] < whole
 

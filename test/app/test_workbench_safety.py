@@ -46,7 +46,7 @@ def bench(folder: Path) -> Iterator[Workbench]:
 
 
 PATHS = ('/', '/api/screen', '/api/curves', '/api/events', '/api/model.yaml',
-         '/static/workbench.js', '/nothing')
+         '/static/workbench.mjs', '/nothing')
 
 
 @pytest.mark.parametrize('path', PATHS)

@@ -112,30 +112,33 @@ def errors(diagnosis: Diagnosis, fit: JointFit) -> Array:
 
 def tick(seen: Seen, tried: list[Tried]) -> None:
     """Tick these effects on these drives, and nothing else."""
-    wanted = []
-    for candidate, _ in tried:
-        drives = candidate.drives
-        wanted += [candidate.name] if drives is None else [
-            f'{candidate.name} on {DRIVES[d]}' for d in drives]
     seen.tab.evaluate('''(wanted) => {
-      const boxes = [...document.querySelectorAll('.effects input')];
-      const places = boxes.filter((box) => box.ariaLabel.includes(' on ')
-        || !box.closest('th').querySelector('.places input'));
-      for (const box of places) if (box.checked !== wanted.includes(box.ariaLabel)) box.click();
-    }''', wanted)
+      for (const row of document.querySelectorAll('.effect')) {
+        const box = row.querySelector('input'), drives = wanted[row.dataset.effect];
+        if (box.checked !== (drives !== undefined)) box.click();
+        if (!drives?.length) continue;
+        const chips = [...row.querySelectorAll('.chip')];
+        // What comes before what goes: without any drive it would be ticked no more.
+        for (const isOn of [false, true]) {
+          for (const chip of chips) {
+            const is = chip.ariaPressed === 'true', should = drives.includes(chip.textContent);
+            if (is === isOn && is !== should) chip.click();
+          }
+        }
+      }
+    }''', {one.name: [DRIVES[d] for d in one.drives or ()] for one, _ in tried})
 
 
 def shown(seen: Seen) -> Array:
     """Return the errors of the page, over all drives and on each, with all digits [N]."""
     found: Array = np.array(seen.tab.evaluate(
-        "[...document.querySelectorAll('#what-if .errors data')].map((cell) => +cell.value)"))
+        """[whatIf.state.overall, ...Object.values(whatIf.state.errors)].map((one) => one.now)"""))
     return found
 
 
 def evidence(seen: Seen, name: str) -> float:
-    return float(seen.tab.evaluate('''(name) => +[...document.querySelectorAll('.effects tr')]
-        .find((row) => row.querySelector('input')?.ariaLabel === name)
-        .querySelector('data').value''', name))
+    return float(seen.tab.evaluate(
+        '(name) => whatIf.state.effects.find((one) => one.name === name).evidence', name))
 
 
 @needs_browser
@@ -178,17 +181,17 @@ def test_errors_and_evidence_of_ticked_effects_are_those_of_the_regression(
 def test_a_tick_repaints_and_what_bends_others_is_marked(see: Any) -> None:
     seen = see()
     status = "document.querySelector('#what-if [role=status]').textContent"
-    picture = "document.querySelector('.chart canvas').toDataURL()"
+    picture = "document.querySelector('.curve canvas').toDataURL()"
     before, first = shown(seen), seen.tab.evaluate(picture)
     assert 'stribeck_friction' in seen.tab.evaluate(status)
-    label = '.effects th > label:has-text("{}") input'
+    label = '#tick-{}'
     # By keyboard: a tick box is a stop, and the space bar its switch.
     seen.tab.focus(label.format('stribeck_friction'))
     seen.tab.keyboard.press('Space')
     assert shown(seen)[1] > 2 * before[1]
     seen.tab.wait_for_function(f'{picture} !== {first!r}')
     assert '≈' not in seen.tab.evaluate(status)
-    assert 'time_delay ≈' in seen.tab.inner_text('.effects')
+    assert 'time delay ≈' in seen.tab.inner_text('.effect-list')
     seen.tab.check(label.format('time_delay'))
     assert '≈' in seen.tab.evaluate(status)
     seen.tab.click('#what-if button')
@@ -199,19 +202,19 @@ def test_a_tick_repaints_and_what_bends_others_is_marked(see: Any) -> None:
 @needs_browser
 def test_spans_and_cursor_are_shared_by_all_drives(see: Any) -> None:
     seen = see()
-    chart = seen.tab.query_selector('.chart .u-over')
+    chart = seen.tab.query_selector('.curve .u-over')
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
     middle = box['y'] + box['height'] / 2
     seen.tab.mouse.move(box['x'] + 0.5 * box['width'], middle)
-    seen.tab.wait_for_function('''[...document.querySelectorAll('.chart p')].every(
-        (title) => / s: .* N as given, .* N now/.test(title.textContent))''')
-    seen.tab.evaluate('window.first = [...document.querySelectorAll("canvas")].map('
+    seen.tab.wait_for_function('''[...document.querySelectorAll('.curve h3 span')].every(
+        (reading) => / s: .* → .* N/.test(reading.textContent))''')
+    seen.tab.evaluate('window.first = [...document.querySelectorAll(".curve canvas")].map('
                       '(canvas) => canvas.toDataURL())')
     seen.tab.mouse.down()
     seen.tab.mouse.move(box['x'] + 0.8 * box['width'], middle, steps=4)
     seen.tab.mouse.up()
-    seen.tab.wait_for_function('''[...document.querySelectorAll('canvas')].every(
+    seen.tab.wait_for_function('''[...document.querySelectorAll('.curve canvas')].every(
         (canvas, k) => canvas.toDataURL() !== window.first[k])''')
 
 
@@ -224,8 +227,8 @@ def test_the_part_fits_phones_and_the_file_stays_small(see: Any, file: Path, wid
         .map((node) => parseFloat(getComputedStyle(node).fontSize))'''
     assert min(seen.tab.evaluate(sizes)) >= 12
     assert seen.tab.evaluate('''[...document.querySelectorAll('#what-if input')].every(
-        (box) => box.labels.length === 1 && box.ariaLabel)''')
-    assert seen.tab.evaluate('''[...document.querySelectorAll('.uplot')].every(
+        (box) => box.labels.length === 1)''')
+    assert seen.tab.evaluate('''[...document.querySelectorAll('.over-time')].every(
         (chart) => chart.role === 'img' && chart.ariaLabel)''')
     assert file.stat().st_size <= MOST_BYTES
 

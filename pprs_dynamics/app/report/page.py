@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ BASIC = 'plotly-basic.min.js.gz'
 BASIC_TYPES = ('scatter', 'bar')
 # Of uPlot 1.6.32, for curves that change at once.
 CURVES, CURVES_STYLE = 'uplot.iife.min.js.gz', 'uplot.min.css'
+_IMPORT = re.compile(r'^import .*;\n', re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Page:
         self._figures = 0
         self._menus = 0
         self._types: set[str] = set()
-        self._has_curves = False
+        self._has_board = False
 
     def heading(self, text: str) -> None:
         """Start a section."""
@@ -185,7 +187,7 @@ class Page:
                           f'<div class="columns">{drawn}</div></section>')
 
     def interactive(self, elements: str, name: str, data: str, script: str,
-                    with_curves: bool = False) -> None:
+                    with_board: bool = False) -> None:
         """Add a part that a script of the package fills.
 
         Parameters
@@ -197,10 +199,10 @@ class Page:
         data : str
             JSON; it may hold text from files.
         script : str
-        with_curves : bool
-            It draws with uPlot, after `await library('uplot')`.
+        with_board : bool
+            It shows what the workbench does, with uPlot after `await library('uplot')`.
         """
-        self._has_curves |= with_curves
+        self._has_board |= with_board
         # Within a script an end tag would end it, wherever it stands.
         safe = data.replace('<', '\\u003c')
         self._body.append(f'{elements}<script type="application/json" id="{name}">{safe}</script>'
@@ -235,11 +237,12 @@ class Page:
         if self._figures:
             libraries['plotly'] = (_packed(BASIC) if self._types <= set(BASIC_TYPES)
                                    else _whole_plotly())
-        if self._has_curves:
+        if self._has_board:
             libraries['uplot'] = _packed(CURVES)
         library = ''.join(f'<script type="text/plain" id="{name}">{packed}</script>'
                           for name, packed in libraries.items())
-        style = asset('page.css') + (asset(CURVES_STYLE) if self._has_curves else '')
+        styles = ['board.css', 'page.css'] if self._has_board else ['page.css']
+        style = ''.join(map(asset, styles)) + (vendored(CURVES_STYLE) if self._has_board else '')
         return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta name="viewport" content="width=device-width, initial-scale=1">'
                 f'<title>{escape(self._title)}</title><style>{style}</style>'
@@ -288,6 +291,31 @@ def _whole_plotly() -> str:
 
 
 @cache
+def assets() -> frozenset[str]:
+    """Return the names of what `asset` has."""
+    return frozenset(one.name for one in files('pprs_dynamics.app').joinpath('browser').iterdir())
+
+
+@cache
 def asset(name: str) -> str:
-    """Return a text that is shipped beside this module."""
-    return files('pprs_dynamics.app.report').joinpath(name).read_text(encoding='utf-8')
+    """Return a style or a script of the package's pages."""
+    return files('pprs_dynamics.app').joinpath('browser', name).read_text(encoding='utf-8')
+
+
+@cache
+def vendored(name: str) -> str:
+    """Return a library's style or script."""
+    content = files('pprs_dynamics.app.report').joinpath(name).read_bytes()
+    return (gzip.decompress(content) if name.endswith('.gz') else content).decode()
+
+
+def one_script(names: Iterable[str]) -> str:
+    """Return modules as one script, for a page that no server stands behind.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Each after those that it imports; the last has a function `prepare`.
+    """
+    text = ''.join(_IMPORT.sub('', asset(name)).replace('\nexport ', '\n') for name in names)
+    return f"(() => {{'use strict';\n{text}\nprepare();\n}})();"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.report.comparison_figures import shown_samples
-from pprs_dynamics.app.report.page import Page, asset
+from pprs_dynamics.app.report.page import Page, one_script
 from pprs_dynamics.inference.diagnosis.what_if import OptionalForces, OptionalPlacement, WhatIf
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
@@ -21,24 +21,21 @@ from pprs_dynamics.measurement.residuals.residuals import Residuals
 POINTS = 400  # pairs of extremes that are shown of a drive: a third of a screen is no wider
 LARGEST = 32767  # of 16 bits; the least stands for a sample that was not measured
 GAP = -LARGEST - 1
-_HEADINGS = ''.join(f'<th scope="col">{name}</th>' for name in ('', 'as given', 'now', 'noise', ''))
-_ELEMENTS = f'''
+MODULES = ('dom.mjs', 'format.mjs', 'errors.mjs', 'effects.mjs', 'curves.mjs', 'ridge.mjs',
+           'what_if.mjs')
+_ELEMENTS = '''
 <div id="what-if">
-<p class="note">Tick an effect, or the drives it is to be on, and see what would be left. All that
-is ticked is fitted together, beside the model's own numbers within their tolerances, at the noise
-of this diagnosis. It is a what-if, not a finding: shapes stay as they are, and evidence at this
-noise is larger than with the noise fitted anew, as it is where sets are compared. ≈: the effect
-changes how others show; with it added or taken away, the figures are only nearly right.</p>
-<div class="sides"><div>
-<p><button type="button">As found</button></p>
-<div class="effects"><table><thead><tr><th scope="col">effect</th>
-<th scope="col">evidence at this noise</th></tr></thead><tbody></tbody></table></div></div>
-<div><p role="status"></p>
-<div class="scroll"><table class="errors"><caption><span>Error, rms [UNIT], as given (grey) and with
-the effects ticked (blue); dotted: the noise.</span></caption><thead><tr>{_HEADINGS}</tr></thead>
-<tbody></tbody></table></div>
-<p class="note">Error over time [s, UNIT]; dotted: two standard deviations of the noise. Drag to
-zoom, on all drives at once; double-click to return.</p><div class="charts"></div></div></div></div>
+<p class="note">Tick an effect, choose the drives it is to be on, and see what would be left. All
+that is ticked is fitted together, beside the model's own numbers within their tolerances, at the
+noise of this diagnosis. It is a what-if, not a finding: shapes stay as they are, and evidence at
+this noise is larger than with the noise fitted anew, as it is where sets are compared. ≈: the
+effect changes how others show; with it added or taken away, the figures are only nearly right.</p>
+<p><button type="button">As found</button> <span role="status"></span></p>
+<div class="error-tiles"></div>
+<div class="sides"><ul class="effect-list"></ul>
+<div><p class="note">Error over time, as given (grey) and now (blue); dotted: two standard
+deviations of the noise. Drag to zoom, on all drives at once; double-click to return.</p>
+<div class="curves"></div></div></div></div>
 '''
 
 
@@ -53,16 +50,19 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
         Of the model as given.
     """
     with page.fold('What if: tick effects, and see what would be left'):
-        page.interactive(_ELEMENTS.replace('UNIT', residuals.unit), 'what-if-data', json.dumps({
+        page.interactive(_ELEMENTS, 'what-if-data', json.dumps({
             'effects': [{'name': one.name, 'isApproximate': one.is_approximate, 'placements': [
                 _placement(placement) for placement in one.placements]} for one in system.effects],
             'always': system.always, 'limited': system.limited,
             'gram': _letters(system.gram, 'f8'), 'side': _letters(system.side, 'f8'),
             'namePrice': system.name_price, 'wrongSignPrice': system.wrong_sign_price,
             'drivePrices': system.drive_prices,
-            'gap': GAP, 'deviations': DEVIATIONS, 'steepness': BEYOND_TOLERANCE,
+            'units': {one.name: {'effort': residuals.units_of(one.name).effort}
+                      for one in system.drives},
+            'unit': residuals.unit, 'gap': GAP,
+            'deviations': DEVIATIONS, 'steepness': BEYOND_TOLERANCE,
             'drives': [_drive(one, residuals) for one in system.drives],
-        }, allow_nan=False, separators=(',', ':')), asset('what_if.js'), with_curves=True)
+        }, allow_nan=False, separators=(',', ':')), one_script(MODULES), with_board=True)
 
 
 def _placement(one: OptionalPlacement) -> dict[str, Any]:

@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from threading import Event, Thread
 from typing import Any, Generic, TypeVar
 
 from pprs_dynamics.errors import PprsError
 
 Result = TypeVar('Result')
+NUMBERS = count(1)  # each job has one of its own
 
 
 class Cancelled(Exception):
@@ -35,6 +37,7 @@ class Job(Generic[Result]):
     def __init__(self, kind: str, what: str, work: Callable[[Callable[[float], None]], Result],
                  changed: Callable[[Job[Any]], None] | None = None) -> None:
         self.kind, self.what, self.share = kind, what, 0.0
+        self.number = next(NUMBERS)
         self.error: BaseException | None = None
         self._result: Result | None = None
         self._work, self._changed = work, changed or (lambda job: None)
@@ -81,8 +84,9 @@ class Job(Generic[Result]):
     def to_dict(self) -> dict[str, Any]:
         """Return how it stands."""
         error = self.error
-        return {'kind': self.kind, 'what': self.what, 'share': round(self.share, 3),
-                'is_running': self.is_running, 'is_cancelled': self.is_cancelled,
+        return {'number': self.number, 'kind': self.kind, 'what': self.what,
+                'share': round(self.share, 3), 'is_running': self.is_running,
+                'is_cancelled': self.is_cancelled,
                 'error': str(error) if isinstance(error, PprsError) else
                 '' if error is None or isinstance(error, Cancelled) else
                 f'{type(error).__name__}: {error}'}

@@ -6,12 +6,9 @@
 from __future__ import annotations
 
 import asyncio
-import gzip
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,6 +21,8 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
+from pprs_dynamics.app.report.page import asset as packaged
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
@@ -34,6 +33,7 @@ from pprs_dynamics.app.workbench.server.request_fields import (
     BadRequestError,
     body_of,
     drives_of,
+    index_of,
     number_of,
     range_of,
     revision_of,
@@ -47,11 +47,8 @@ UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
 MOST_POINTS = 20_000  # of a scatter
 HEARTBEAT = 15.0  # [s] between signs of life
-STATIC = {'workbench.js': 'text/javascript', 'curves.js': 'text/javascript',
-          'robot.js': 'text/javascript', 'scatter.js': 'text/javascript',
-          'workbench.css': 'text/css'}
-VENDORED = {'uplot.js': ('uplot.iife.min.js.gz', 'text/javascript'),
-            'uplot.css': ('uplot.min.css', 'text/css')}
+VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
+TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
 
 
 def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -> Any:
@@ -104,27 +101,17 @@ def with_body(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[
 
 async def page(request: Request) -> Response:
     """Answer the page."""
-    return Response(_file('workbench.html'), media_type='text/html')
+    return Response(packaged('workbench.html'), media_type='text/html')
 
 
 async def asset(request: Request) -> Response:
-    """Answer a file of the page; only those that are listed are files."""
+    """Answer a file of the page; only those that are shipped are files."""
     name = request.path_params['name']
-    if name in STATIC:
-        return Response(_file(name), media_type=STATIC[name])
-    if name in VENDORED:
-        return Response(_vendored(VENDORED[name][0]), media_type=VENDORED[name][1])
-    raise HTTPException(404)
-
-
-def _file(name: str) -> bytes:
-    return (files('pprs_dynamics.app.workbench.server') / 'static' / name).read_bytes()
-
-
-@cache
-def _vendored(name: str) -> bytes:
-    content = (files('pprs_dynamics.app.report') / name).read_bytes()
-    return gzip.decompress(content) if name.endswith('.gz') else content
+    kind = TYPES.get(Path(name).suffix)
+    if kind is None or name not in {*assets(), *VENDORED}:
+        raise HTTPException(404)
+    content = vendored(VENDORED[name]) if name in VENDORED else packaged(name)
+    return Response(content, media_type=kind)
 
 
 class Api:
@@ -140,16 +127,21 @@ class Api:
         self.hub, self.keys = hub, keys
 
     def screen(self, query: Any) -> Response:
-        """Answer all that one screen shows, and the errors now."""
+        """Answer what of the screen changed since a version, the errors now where they did."""
         hub = self.hub
-        common = {'count': hub.count, 'generation': hub.generation, 'failure': hub.failure,
-                  'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
-                  'has_folders': bool(hub.folders.roots or hub.surveys.recordings)}
-        session = hub.session
-        if session is None:
-            return binary({**common, **units_to_dict(hub.model), 'is_empty': True}, {})
-        with session.steady():
-            return binary({**common, **session.to_dict()}, {'now': session.now.T})
+        with hub.steady():
+            session, count = hub.session, hub.count
+            state = {'generation': hub.generation, 'failure': hub.failure,
+                     'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
+                     'has_folders': bool(hub.folders.roots or hub.surveys.recordings),
+                     'is_empty': session is None,
+                     **(session.to_dict() if session else units_to_dict(hub.model))}
+            state['drawn'] = [state.get(key) for key in ('generation', 'revision', 'stage')]
+            hub.log.update(state)
+            known = index_of(str((query or {}).get('since', '')), hub.log.version + 1)
+            changes = hub.log.since(-1 if known is None else known)
+            return binary({**changes, 'count': count, 'version': hub.log.version},
+                          {'now': session.now.T} if session and 'drawn' in changes else {})
 
     def curves(self, query: Any) -> Response:
         """Answer times and the error before."""
@@ -286,7 +278,7 @@ class Api:
         except (PprsError, TooLongError, ClientDisconnect, OSError):
             path.unlink(missing_ok=True)
             raise
-        return await run_in_threadpool(self.screen, None)
+        return await run_in_threadpool(self.screen, request.query_params)
 
     def invite(self, body: Any) -> Response:
         """Answer an address for one more browser."""

@@ -9,14 +9,15 @@ import asyncio
 import logging
 import re
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Lock, Thread
 from typing import Any, Protocol
 
 from pprs_dynamics.app.workbench.errors import SessionError
+from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 from pprs_dynamics.app.workbench.server.folders import ENDINGS, Folders
 from pprs_dynamics.app.workbench.server.surveys import PREFIX, Surveys
 from pprs_dynamics.app.workbench.session import Session
@@ -73,7 +74,8 @@ class Hub:
         self.generation = self.count = 0
         self._begin, self._is_unjudged = begin, False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
-        self._count, self._lock, self._opening = 0, Lock(), Lock()
+        self.log = ChangeLog()
+        self._count, self._lock, self._opening, self._steady = 0, Lock(), Lock(), Lock()
         self._work = Event()
         self._ends = False
         self._waiting: set[asyncio.Queue[None]] = set()
@@ -100,6 +102,12 @@ class Hub:
             self.live.close()
         self._worker.join(10)
         self._uploads.cleanup()
+
+    @contextmanager
+    def steady(self) -> Iterator[None]:
+        """Keep the state as it is while the block lasts, for one who looks at it."""
+        with self._steady, self.session.steady() if self.session else nullcontext():
+            yield
 
     # Those who listen
 

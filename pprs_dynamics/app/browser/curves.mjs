@@ -1,52 +1,53 @@
 /* Linked curves over time, one of each drive: what is left before and now. */
-'use strict';
 
-const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+import {css, make, whenDark} from './dom.mjs';
+import {signed} from './format.mjs';
 
 /* Gaps are null to uPlot; typed arrays stay typed where there are none. */
-const withGaps = (values) => {
+export const withGaps = (values) => {
   for (let k = 0; k < values.length; k++) {
     if (Number.isNaN(values[k])) return Array.from(values, (v) => (Number.isNaN(v) ? null : v));
   }
   return values;
 };
 
-class Curves {
-  constructor(root, marked) {
+/* Let no line go from one recording or segment to the next. */
+export const cut = (row, segment) => {
+  let gapped = withGaps(row);
+  for (let k = 1; k < (segment?.length ?? 0); k++) {
+    if (segment[k] !== segment[k - 1]) {
+      if (gapped === row) gapped = Array.from(row);
+      gapped[k] = null;
+    }
+  }
+  return gapped;
+};
+
+export class Curves {
+  /* `marked` is called with {time: [from, to], drive}, `unitOf` with a drive. */
+  constructor(root, marked, unitOf) {
     this.root = root;
-    this.marked = marked; // called with {time: [from, to], drive}
+    this.marked = marked;
+    this.unitOf = unitOf;
     this.plots = [];
     this.drives = [];
-    this.time = new Float64Array(0);
     this.source = null;
     this.window = null; // what is seen; null is all
     new ResizeObserver(() => this.resize()).observe(root);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.build());
+    whenDark(() => this.build());
     root.addEventListener('keydown', (event) => this.key(event));
   }
 
-  /* Take times and the error before; the error now follows. */
-  use(drives, time, segment, before) {
+  /* Take every drive's times and error before, and its noise to be drawn; the error now follows. */
+  use(drives, times, segment, before, noise = null) {
     this.drives = drives;
-    this.time = time;
-    this.before = before.map((row) => this.cut(row, segment));
+    this.times = times;
+    this.noise = noise;
+    this.before = before.map((row) => cut(row, segment));
     this.segment = segment;
     this.now = this.before;
     this.window = null;
     this.build();
-  }
-
-  /* Let no line go from one recording or segment to the next. */
-  cut(row, segment) {
-    const cut = withGaps(row);
-    let gapped = cut;
-    for (let k = 1; k < segment.length; k++) {
-      if (segment[k] !== segment[k - 1]) {
-        if (gapped === row) gapped = Array.from(row);
-        gapped[k] = null;
-      }
-    }
-    return gapped;
   }
 
   build() {
@@ -57,15 +58,11 @@ class Curves {
   }
 
   plot(drive, d) {
-    const box = document.createElement('div');
-    box.className = 'curve';
-    const head = document.createElement('h3');
-    head.textContent = drive;
-    const reading = document.createElement('span');
+    const box = make('div', '', 'curve');
+    const head = make('h3', drive);
+    const reading = make('span');
     head.append(reading);
-    const place = document.createElement('div');
-    place.className = 'plot';
-    place.tabIndex = 0;
+    const place = make('div', '', 'over-time', {tabIndex: 0});
     place.setAttribute('role', 'img');
     place.setAttribute('aria-label', `error of ${drive} over time, before and now`);
     box.append(head, place);
@@ -82,17 +79,17 @@ class Curves {
       axes: [{...axis, size: is_last ? 30 : 6,
               values: is_last ? (u, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`)
                 : (u, ticks) => ticks.map(() => '')},
-             {...axis, size: 62, values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} ${unitOf(drive)}`),
-              space: 22}],
+             {...axis, size: 62, values: (u, ticks) => ticks.map(
+               (t) => `${+t.toPrecision(3)} ${this.unitOf(drive)}`), space: 22}],
       series: [{},
                {stroke: css('--before'), width: 1, points: {show: false}},
                {stroke: css('--now'), width: 1, points: {show: false}}],
       hooks: {
         setSelect: [(u) => this.select(u, d)],
         setCursor: [(u) => this.read(u, reading, drive)],
-        draw: [(u) => this.bands(u)],
+        draw: [(u) => this.bands(u), (u) => this.levels(u, d)],
       },
-    }, [this.time, this.before[d], this.now[d] || this.before[d]], place);
+    }, [this.times[d], this.before[d], this.now[d] || this.before[d]], place);
     plot.over.addEventListener('mousedown', () => { this.source = plot; });
     plot.over.addEventListener('dblclick', () => this.all());
     plot.over.addEventListener('wheel', (event) => {
@@ -113,16 +110,17 @@ class Curves {
 
   /* Show what is left now; rows are those of the drives. */
   setNow(rows) {
-    this.now = rows.map((row) => this.cut(row, this.segment));
+    this.now = rows.map((row) => cut(row, this.segment));
     this.plots.forEach((plot, d) => {
-      plot.setData([this.time, this.before[d], this.now[d]], false);
+      plot.setData([this.times[d], this.before[d], this.now[d]], false);
       const [min, max] = this.range();
       plot.setScale('x', {min, max});
     });
   }
 
   range() {
-    return this.window || [this.time[0], this.time[this.time.length - 1]];
+    return this.window || [Math.min(...this.times.map((time) => time[0])),
+                           Math.max(...this.times.map((time) => time[time.length - 1]))];
   }
 
   zoom(range) {
@@ -184,23 +182,36 @@ class Curves {
     u.ctx.restore();
   }
 
+  /* Two standard deviations of the noise. */
+  levels(u, d) {
+    if (!this.noise) return;
+    u.ctx.save();
+    u.ctx.strokeStyle = css('--noise');
+    u.ctx.setLineDash([2, 4]);
+    for (const level of [-2 * this.noise[d], 2 * this.noise[d]]) {
+      u.ctx.beginPath();
+      u.ctx.moveTo(u.bbox.left, u.valToPos(level, 'y', true));
+      u.ctx.lineTo(u.bbox.left + u.bbox.width, u.valToPos(level, 'y', true));
+      u.ctx.stroke();
+    }
+    u.ctx.restore();
+  }
+
   read(u, reading, drive) {
     const k = u.cursor.idx;
     if (k === null || k === undefined || u.cursor.left < 0) {
       reading.textContent = '';
       return;
     }
-    const say = (v) => (v === null || v === undefined ? '–' : (v >= 0 ? '+' : '−')
-      + Math.abs(v).toFixed(3));
-    reading.textContent = `${u.data[0][k].toFixed(2)} s: ${say(u.data[1][k])} → `
-      + `${say(u.data[2][k])} ${unitOf(drive)}`;
+    reading.textContent = `${u.data[0][k].toFixed(2)} s: ${signed(u.data[1][k])} → `
+      + `${signed(u.data[2][k])} ${this.unitOf(drive)}`;
   }
 
   key(event) {
     const steps = {ArrowLeft: [-0.1, -0.1], ArrowRight: [0.1, 0.1], '+': [0.1, -0.1],
                    '-': [-0.125, 0.125]};
     const step = steps[event.key];
-    if (!step || !event.target.classList.contains('plot')) return;
+    if (!step || !event.target.classList.contains('over-time')) return;
     event.preventDefault();
     const [a, b] = this.range();
     this.zoom([a + step[0] * (b - a), b + step[1] * (b - a)]);

@@ -1,17 +1,18 @@
 /* Anything over anything: a scatter in which a region can be marked. */
-'use strict';
+
+import {css, fineContext, whenDark} from './dom.mjs';
 
 const UNITS = {time: 's', rod_angle: 'rad', platform_x: 'm', platform_y: 'm', platform_z: 'm',
                platform_tilt: 'rad', platform_turn: 'rad', direction: ''};
 /* A variable with its unit, which may be that of a drive. */
-const titled = (name, drive) => {
+export const titled = (name, drive, unitOf) => {
   const unit = UNITS[name] ?? unitOf(drive, ['position', 'velocity', 'acceleration'].includes(name)
     ? name : 'effort');
   return `${name.replaceAll('_', ' ')}${unit ? ` [${unit}]` : ''}`;
 };
 
 /* Round numbers for an axis. */
-const ticksOf = (low, high, most) => {
+export const ticksOf = (low, high, most) => {
   const raw = (high - low) / most || 1;
   const size = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((m) => m * size).find((s) => s >= raw);
@@ -20,15 +21,17 @@ const ticksOf = (low, high, most) => {
   return found;
 };
 
-class Scatter {
-  constructor(canvas, marked) {
+export class Scatter {
+  /* `marked` is called with {x_range, y_range}, `unitOf` with a drive and a quantity. */
+  constructor(canvas, marked, unitOf) {
     this.canvas = canvas;
-    this.marked = marked; // called with {x_range, y_range}
+    this.marked = marked;
+    this.unitOf = unitOf;
     this.x = this.y = new Float32Array(0);
     this.names = ['', ''];
     this.region = null;
     new ResizeObserver(() => this.draw()).observe(canvas);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
+    whenDark(() => this.draw());
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
       this.start = [event.offsetX, event.offsetY];
@@ -85,11 +88,7 @@ class Scatter {
   draw() {
     const {canvas} = this;
     if (!this.limits || !canvas.clientWidth) return;
-    const scale = devicePixelRatio || 1;
-    canvas.width = canvas.clientWidth * scale;
-    canvas.height = canvas.clientHeight * scale;
-    const context = canvas.getContext('2d');
-    context.scale(scale, scale);
+    const context = fineContext(canvas);
     const {left, top, right, bottom} = this.box;
     const [[x0, x1], [y0, y1]] = this.limits;
     const px = (x) => left + (right - left) * (x - x0) / (x1 - x0);
@@ -114,11 +113,11 @@ class Scatter {
       context.fillText(String(+t.toPrecision(4)), left - 5, py(t) + 4);
     }
     context.textAlign = 'center';
-    context.fillText(titled(this.names[0], this.drive), (left + right) / 2, bottom + 32);
+    context.fillText(titled(this.names[0], this.drive, this.unitOf), (left + right) / 2, bottom + 32);
     context.save();
     context.translate(12, (top + bottom) / 2);
     context.rotate(-Math.PI / 2);
-    context.fillText(titled(this.names[1], this.drive), 0, 0);
+    context.fillText(titled(this.names[1], this.drive, this.unitOf), 0, 0);
     context.restore();
     context.fillStyle = css('--now');
     context.globalAlpha = Math.max(0.12, Math.min(0.8, 1500 / this.x.length));

@@ -1,16 +1,17 @@
 /* The robot in three dimensions, moving, its drives coloured by their error. */
-'use strict';
+
+import {css, fineContext, whenDark} from './dom.mjs';
 
 /* Blue is little, red is much: told apart by colour-blind eyes, and on both grounds. */
 const HEAT = [[33, 102, 172], [103, 169, 207], [209, 190, 160], [239, 138, 98], [178, 24, 43]];
-const heat = (share) => {
+export const heat = (share) => {
   const at = Math.max(0, Math.min(share, 1)) * (HEAT.length - 1);
   const k = Math.min(Math.floor(at), HEAT.length - 2);
   const mix = HEAT[k].map((c, n) => Math.round(c + (HEAT[k + 1][n] - c) * (at - k)));
   return `rgb(${mix.join(',')})`;
 };
 
-class Robot {
+export class Robot {
   constructor(canvas, moved) {
     this.canvas = canvas;
     this.moved = moved; // called with the frame
@@ -19,7 +20,7 @@ class Robot {
     this.tilt = 0.35;
     this.what = 'now';
     new ResizeObserver(() => this.draw()).observe(canvas);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
+    whenDark(() => this.draw());
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
       this.held = [event.offsetX, event.offsetY];
@@ -98,11 +99,7 @@ class Robot {
   draw() {
     const {canvas} = this;
     if (!this.time || !canvas.clientWidth) return;
-    const scale = devicePixelRatio || 1;
-    canvas.width = canvas.clientWidth * scale;
-    canvas.height = canvas.clientHeight * scale;
-    const context = canvas.getContext('2d');
-    context.scale(scale, scale);
+    const context = fineContext(canvas);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     const zoom = 0.8 * Math.min(width, height) / this.size;
     const [c, s] = [Math.cos(this.turn), Math.sin(this.turn)];
@@ -162,7 +159,7 @@ class Robot {
   }
 }
 
-const drawScale = (canvas) => {
+export const drawScale = (canvas) => {
   const context = canvas.getContext('2d');
   for (let k = 0; k < canvas.width; k++) {
     context.fillStyle = heat(k / canvas.width);

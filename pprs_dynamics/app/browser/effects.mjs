@@ -1,0 +1,193 @@
+/* Effects to tick: on which drives, with which values, and what speaks for them. */
+
+import {button, make} from './dom.mjs';
+import {digits, plain, titleOf} from './format.mjs';
+
+const ABOUT = [['', 'equation'], ['Looks like: ', 'looks_like'], ['Caused by: ', 'causes'],
+               ['Confirm: ', 'confirm']];
+
+/* A slider is a factor of ten either way, or as much as matters where there is a sign. */
+export const fromSlider = (one, middle, at) => {
+  const value = one.is_relative ? middle * 10 ** (at / 100)
+    : middle + at / 100 * Math.max(Math.abs(middle), one.scale);
+  return Math.min(one.upper, Math.max(one.lower, value));
+};
+export const toSlider = (one, middle) => (one.value === null ? 0 : Math.round(100 * (
+  one.is_relative ? Math.log10(one.value / middle)
+    : (one.value - middle) / Math.max(Math.abs(middle), one.scale))));
+
+/* What is ticked first, then what the diagnosis names, then by evidence. */
+const score = (one) => (one.is_ticked ? 1e12 : 0) + (one.is_called_for ? 1e11 : 0)
+  + (one.evidence ?? -1e9);
+export const ordered = (effects) => [...effects].sort((a, b) => score(b) - score(a));
+
+class EffectRow {
+  constructor(effect, actions) {
+    this.name = effect.name;
+    this.actions = actions;
+    this.node = make('li', '', 'effect');
+    this.node.dataset.effect = effect.name;
+    this.box = make('input', '', '', {type: 'checkbox', id: `tick-${effect.name}`});
+    this.box.addEventListener('change', (event) => actions.tick(
+      this.name, this.box.checked ? undefined : [], event.timeStamp));
+    this.title = make('span');
+    this.evidence = make('span', '', 'evidence');
+    this.evidence.title = 'evidence: 0 is the threshold, 10 are odds of 150 to 1';
+    const label = make('label');
+    label.append(this.box, this.title, this.evidence);
+    const head = make('div', '', 'head');
+    head.append(label);
+    this.chips = make('div', '', 'chips');
+    this.parameters = make('div');
+    this.adopt = button('Adopt …', () => actions.adopt(this.name));
+    this.adopt.title = 'Judge it on data that it was not fitted to';
+    this.release = button('Best values', () => actions.release(this.name));
+    this.bar = make('div', '', 'bar');
+    this.bar.append(this.adopt, this.release);
+    this.node.append(head, this.chips, this.parameters);
+    if (actions.adopt) this.node.append(this.bar);
+    if (effect.equation) this.addAbout(head, effect);
+    this.fields = new Map();
+  }
+
+  addAbout(head, effect) {
+    const more = make('div', '', 'more', {hidden: true});
+    more.append(...ABOUT.map(([what, key]) => make('p', what + effect[key])));
+    const about = button('?', () => {
+      more.hidden = !more.hidden;
+      about.setAttribute('aria-expanded', String(!more.hidden));
+    }, 'about');
+    about.setAttribute('aria-label', `what is ${titleOf(effect.name)}?`);
+    about.setAttribute('aria-expanded', 'false');
+    head.append(about);
+    this.node.append(more);
+  }
+
+  show(effect, state) {
+    this.node.classList.toggle('ticked', effect.is_ticked);
+    this.box.checked = effect.is_ticked;
+    this.title.replaceChildren(titleOf(effect.name));
+    if (effect.bends_columns) {
+      this.title.append(make('abbr', ' ≈', '', {
+        title: 'bends how others show: approximate until it is evaluated'}));
+    }
+    if (effect.is_called_for) this.title.append(' ', make('span', 'called for', 'badge'));
+    this.evidence.textContent = plain(effect.evidence);
+    this.evidence.classList.toggle('pays', effect.evidence > 0);
+    this.evidence.classList.toggle('pending', effect.evidence_is_pending);
+    this.evidence.setAttribute('aria-label', `evidence ${this.evidence.textContent}${
+      effect.evidence_is_pending ? ', pending' : ''}`);
+    this.bar.hidden = this.chips.hidden = this.parameters.hidden = !effect.is_ticked;
+    if (!effect.is_ticked) return;
+    this.adopt.disabled = Boolean(state.jobs?.adopt?.is_running);
+    this.release.hidden = !effect.parameters.some((one) => one.is_chosen);
+    if (effect.is_on_drives) this.showDrives(effect.drives ?? [], effect.places ?? state.drives);
+    this.showParameters(effect.parameters);
+  }
+
+  showDrives(drives, places) {
+    this.drives = drives;
+    if (this.chips.children.length !== places.length) {
+      this.chips.replaceChildren(...places.map((drive) => button(drive, (event) => {
+        const on = new Set(this.drives);
+        if (!on.delete(drive)) on.add(drive);
+        this.actions.tick(this.name, [...on], event.timeStamp);
+      }, 'chip')));
+    }
+    for (const chip of this.chips.children) {
+      chip.setAttribute('aria-pressed', String(drives.includes(chip.textContent)));
+    }
+  }
+
+  showParameters(parameters) {
+    const keys = parameters.map((one) => one.key).join();
+    if (this.keys !== keys) {
+      this.keys = keys;
+      this.fields.clear();
+      this.parameters.replaceChildren(...parameters.map((one) => this.field(one)));
+    }
+    for (const one of parameters) {
+      const {line, input, range, after} = this.fields.get(one.key);
+      line.classList.toggle('chosen', one.is_chosen);
+      if (document.activeElement !== input) {
+        input.value = one.value === null ? '' : digits(one.value, one.std && 2 * one.std);
+      }
+      after.textContent = `${one.is_chosen ? '' : one.std === null ? '± … '
+        : `± ${(2 * one.std).toPrecision(2)} `}${one.unit === '1' ? '' : one.unit}`;
+      if (range && document.activeElement !== range) {
+        if (!one.is_chosen) range.dataset.middle = one.value;
+        range.value = toSlider(one, Number(range.dataset.middle ?? one.value));
+      }
+    }
+  }
+
+  field(one) {
+    const line = make('div', '', 'parameter');
+    const input = make('input', '', '', {type: 'number', step: 'any', id: `${this.name}-${one.key}`});
+    const label = make('label', one.key, '', {htmlFor: input.id,
+                                              title: `${one.symbol}: ${one.description}`});
+    const after = make('span', '', 'quiet');
+    line.append(label, input, after);
+    input.addEventListener('change', (event) => {
+      if (input.value !== '') {
+        this.actions.choose(this.name, one.key, Number(input.value), event.timeStamp);
+      }
+    });
+    let range;
+    if (one.is_shape) {
+      range = make('input', '', '', {type: 'range', min: -100, max: 100, step: 1});
+      range.setAttribute('aria-label', `${titleOf(this.name)}, ${one.key}: drag its shape`);
+      range.addEventListener('input', (event) => this.drag(one.key, fromSlider(
+        one, Number(range.dataset.middle), Number(range.value)), event.timeStamp));
+      line.append(range);
+    }
+    this.fields.set(one.key, {line, input, range, after});
+    return line;
+  }
+
+  /* Only the last place of a drag goes out. */
+  async drag(...wanted) {
+    this.wanted = wanted;
+    if (this.isDragging) return;
+    this.isDragging = true;
+    while (this.wanted) {
+      const last = this.wanted;
+      this.wanted = null;
+      await this.actions.choose(this.name, ...last);
+    }
+    this.isDragging = false;
+  }
+}
+
+/* The list. `actions` are tick(name, drives, began), where undefined drives are where it pays
+   best and none at all unticks; and adopt, release and choose where there are values. */
+export class EffectList {
+  constructor(root, actions) {
+    Object.assign(this, {root, actions, rows: new Map(), order: '', text: ''});
+  }
+
+  show(state) {
+    for (const effect of state.effects) {
+      if (!this.rows.has(effect.name)) {
+        this.rows.set(effect.name, new EffectRow(effect, this.actions));
+      }
+      this.rows.get(effect.name).show(effect, state);
+    }
+    // Rows stay where they are under a hand.
+    const isBusy = this.root.matches(':hover') || this.root.contains(document.activeElement);
+    const names = ordered(state.effects).map((one) => one.name);
+    if (this.root.children.length !== names.length
+        || (!isBusy && state.is_settled && names.join() !== this.order)) {
+      this.order = names.join();
+      this.root.replaceChildren(...names.map((name) => this.rows.get(name).node));
+    }
+    this.filter(this.text);
+  }
+
+  filter(text) {
+    this.text = text.trim().toLowerCase().replaceAll(' ', '_');
+    for (const row of this.rows.values()) {
+      row.node.hidden = Boolean(this.text) && !row.name.includes(this.text) && !row.box.checked;
+    }
+  }
+}

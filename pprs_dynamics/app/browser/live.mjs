@@ -1,0 +1,88 @@
+/* Joint states of a running robot, and what the model makes of them. */
+
+import {$, css, make} from './dom.mjs';
+import {amount, titleOf, unitOf} from './format.mjs';
+
+const PERIOD = 400; // [ms] between looks
+const LATE = 2; // [s] without a message, from which nothing comes in any more
+
+export const rms = (values) => {
+  const known = (values ?? []).filter((v) => v !== null);
+  return known.length ? Math.sqrt(known.reduce((a, v) => a + v * v, 0) / known.length) : null;
+};
+
+export const sentence = (found, unit) => {
+  if (found.age === null || found.age >= LATE) {
+    return `Nothing comes in on joint_states${found.received ? ' any more' : ''}. ${found.trouble}`;
+  }
+  return [
+    `error of the last 2 s ${amount(rms(found.error))} ${unit} with ${
+      found.effects.map(titleOf).join(', ') || 'no added effect'}`,
+    found.monitor_error && `the monitor says ${amount(rms(found.monitor_error))} ${unit}`,
+    `${found.kept.toFixed(0)} s kept`, found.trouble].filter(Boolean).join(' · ');
+};
+
+export class Live {
+  constructor(server, isSeen) {
+    Object.assign(this, {server, isSeen, plots: []});
+    setInterval(() => this.show(), PERIOD);
+    $('live-set').addEventListener('click', () => this.set());
+    $('live-take').addEventListener('click', () => server.run(
+      'live/take', {}, 'What came in last is a recording of this session now.'));
+  }
+
+  async set() {
+    try {
+      const {nodes} = await this.server.ask('live/set', {});
+      $('live-nodes').replaceChildren(...Object.entries(nodes).map(([name, said]) =>
+        make('li', `${name}: ${said || 'took the effects'}`)));
+      this.server.tell('');
+    } catch (error) {
+      this.server.tell(error.message);
+    }
+  }
+
+  async show() {
+    const {state} = this.server;
+    if (!this.isSeen() || !state?.has_live) return;
+    let found;
+    try {
+      found = await this.server.ask('live');
+    } catch (error) {
+      $('live-state').textContent = error.message;
+      return;
+    }
+    this.found = found;
+    $('live-state').textContent = sentence(found, unitOf(state));
+    $('live-take').disabled = !found.kept;
+    if (!found.residual.length) return;
+    const time = found.time.map((t) => t - found.time[found.time.length - 1]);
+    if (this.plots.length !== found.drives.length) this.build(found.drives, time, found.residual);
+    this.plots.forEach(({plot, reading}, d) => {
+      plot.setData([time, found.residual[d]]);
+      reading.textContent = `${amount(found.error[d])} ${unitOf(state, found.drives[d])}`;
+    });
+  }
+
+  build(drives, time, residual) {
+    const root = $('live-curves');
+    root.replaceChildren();
+    const axis = {stroke: css('--quiet'), grid: {stroke: css('--line'), width: 1},
+                  font: '12px system-ui'};
+    this.plots = drives.map((drive, d) => {
+      const box = make('div', '', 'curve'), head = make('h3', drive), reading = make('span');
+      head.append(reading);
+      box.append(head);
+      root.append(box);
+      const unit = unitOf(this.server.state, drive);
+      return {reading, plot: new uPlot({
+        width: Math.max(root.clientWidth, 100), height: 84, legend: {show: false},
+        padding: [8, 6, 0, 0], cursor: {show: false}, scales: {x: {time: false}},
+        axes: [{...axis, size: 20, values: (u, ticks) => ticks.map((t) => `${t} s`)},
+               {...axis, size: 62, space: 22,
+                values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} ${unit}`)}],
+        series: [{}, {stroke: css('--now'), width: 1, points: {show: false}}],
+      }, [time, residual[d]], box)};
+    });
+  }
+}

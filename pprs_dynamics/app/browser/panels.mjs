@@ -1,0 +1,119 @@
+/* What stands around the views: the verdict, the ledger, recordings, the next experiment. */
+
+import {$, button, make} from './dom.mjs';
+import {amount, plain, titleOf} from './format.mjs';
+
+const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing',
+                  ambiguous: 'several effects explain it alike',
+                  unknown: 'something no effect explains'};
+
+const fall = (before, now, state) => `${amount(before)} → ${amount(now)} ${state.unit}`;
+
+export const showVerdict = (state, cancel) => {
+  const {before, now, noise} = state.overall;
+  const line = make('span');
+  line.append('error ', make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
+    state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
+  if (state.verdict) line.append(` · diagnosis: ${VERDICTS[state.verdict]}`);
+  const nodes = [line];
+  for (const job of Object.values(state.jobs).filter((one) => one.is_running)) {
+    const what = {diagnose: 'diagnosing', adopt: `judging ${titleOf(job.what)}`,
+                  experiment: 'designing'}[job.kind];
+    const bar = make('progress', '', '', {max: 1, value: job.share});
+    bar.setAttribute('aria-label', what);
+    nodes.push(` · ${what} `, bar, ' ', button('Cancel', () => cancel(job.kind)));
+  }
+  $('verdict').replaceChildren(...nodes);
+};
+
+/* What an adoption came to, once: [sentence, whether it is good]. */
+export const adoptionSaid = (last, state) => {
+  const job = state.jobs?.adopt;
+  if (!job || job.is_running || job.number === last?.jobs?.adopt?.number
+      && !last.jobs.adopt.is_running) return null;
+  if (job.error) return [job.error, false];
+  if (job.is_cancelled) return [`${titleOf(job.what)} was called off: nothing changed.`, false];
+  const {effect, adopted, reason} = state.adoption;
+  return [`${titleOf(effect)} is ${adopted ? 'adopted' : 'refused'}: ${reason}`, adopted];
+};
+
+export const showStage = (state) => {
+  const words = {linear: 'noise and shapes are being fitted …',
+                 fitted: state.is_settled ? '' : 'shapes are being fitted …',
+                 refined: 'the model is being evaluated …', exact: ''}[state.stage];
+  $('stage').replaceChildren(state.is_approximate ? `≈ approximate: ${words}` : words);
+  if (state.departure > 0.005) {
+    $('stage').append(make('span', ` Values of yours cost ${state.departure.toFixed(
+      state.departure < 10 ? 1 : 0)} against the best (10 are odds of 150 to 1).`, 'departure'));
+  }
+  if (state.notice) $('stage').append(` ${state.notice}`);
+  $('export-ticked').hidden = !state.effects.some((one) => one.is_ticked);
+};
+
+export const showLedger = (state) => {
+  const start = make('li');
+  const first = state.steps[0];
+  start.append(make('b', 'model'),
+               make('div', first ? `${amount(first.error_before)} ${state.unit}` : ''));
+  $('ledger').replaceChildren(start, ...state.steps.map((step) => {
+    const item = make('li');
+    item.append(make('b', titleOf(step.effect)), step.drives ? ` on ${step.drives.join(', ')}` : '',
+                make('div', fall(step.error_before, step.error_after, state)),
+                make('div', `held out ${fall(step.held_out_before, step.held_out_after, state)}`,
+                     'quiet'));
+    item.title = `${step.date}, held out on ${step.held_out_on}${step.forced ? ', forced' : ''}`;
+    return item;
+  }));
+  $('undo').disabled = state.steps.length === 0;
+};
+
+export const showRecordings = (state, see) => {
+  $('strip').replaceChildren(...state.recordings.map((one) => {
+    const item = make('li');
+    const place = button('', () => see([one.start, one.end]));
+    place.append(make('b', one.name), make('div', fall(one.before, one.now, state)),
+                 make('div', `${(one.end - one.start).toFixed(1)} s`, 'quiet'));
+    item.append(place);
+    return item;
+  }));
+  $('held-out').textContent = state.held_out.length
+    ? `Adoptions are judged on ${state.held_out.join(', ')}.`
+    : 'Adoptions are judged on blocks of the same recordings: weak evidence. Add one of another '
+      + 'motion to judge them on.';
+  const findings = state.recordings.flatMap((one) => one.findings.map(
+    (text) => make('li', `${one.name}: ${text}`)));
+  $('findings').replaceChildren(...(findings.length ? findings : [make('li', 'none', 'quiet')]));
+};
+
+export const showExperiment = (state) => {
+  const found = state.experiment;
+  const job = state.jobs.experiment;
+  $('experiment-file').hidden = !found;
+  $('design').disabled = Boolean(job?.is_running);
+  $('experiment-text').textContent = job?.is_running ? `designing … ${
+    (100 * job.share).toFixed(0)} %` : job?.error || found?.text || '';
+  $('experiment-table').hidden = !found?.contests.length;
+  $('experiment-table').tBodies[0].replaceChildren(...(found?.contests ?? []).map((one) => {
+    const row = make('tr');
+    row.append(...[titleOf(one.truth), titleOf(one.rival), plain(one.evidence_now),
+                   plain(one.expected_evidence)].map((text) => make('td', text)));
+    return row;
+  }));
+};
+
+export const showFiles = async (server) => {
+  if (!server.state?.has_folders) return;
+  $('folders').hidden = false;
+  const {files, surveyed} = await server.ask('files');
+  const offered = [
+    ...surveyed.map((one) => [one.name, `robot ${one.robot} · ${one.recording} · ${one.time} · ${
+      one.verdict}`]),
+    ...files.map((name) => [name, name.slice(name.indexOf('/') + 1)])];
+  $('files').replaceChildren(...offered.map(([name, label]) => {
+    const item = make('li', '', 'bar');
+    const judge = button('Judge on it', () => server.run('open', {name, is_held_out: true}));
+    judge.disabled = Boolean(server.state.is_empty);
+    item.append(make('span', label), button('Open', () => server.run('open', {name})), judge);
+    return item;
+  }));
+};

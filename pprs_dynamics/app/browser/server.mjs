@@ -1,0 +1,122 @@
+/* Asking the workbench's server, and what is known of its state. */
+
+/* A header and named arrays, as `packing.py` writes them. */
+export const unpack = (buffer) => {
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  const arrays = {};
+  for (const {name, shape} of header.arrays) {
+    const size = shape.reduce((a, b) => a * b, 1);
+    arrays[name] = {values: new Float32Array(buffer, at, size), shape};
+    at += 4 * size;
+  }
+  return {header, arrays};
+};
+
+export const rowsOf = ({values, shape}) => Array.from({length: shape[0]}, (_, k) =>
+  values.subarray(k * shape[1], (k + 1) * shape[1]));
+
+/* A state with what has changed of it since; effects change one by one. */
+export const merged = (state, changes) => {
+  const effects = new Map([...(state?.effects ?? []), ...(changes.effects ?? [])].map(
+    (one) => [one.name, one]));
+  const next = {...state, ...changes};
+  next.effects = (next.effect_names ?? []).map((name) => effects.get(name));
+  return next;
+};
+
+const request = async (path, options) => {
+  const response = await fetch(`/api/${path}`, options);
+  if (!response.ok) {
+    const text = await response.text();
+    let sentence = text || `${response.status}`;
+    try {
+      sentence = JSON.parse(text).error;
+    } catch { /* it is the sentence itself */ }
+    throw Object.assign(new Error(sentence), {status: response.status});
+  }
+  return response.headers.get('content-type').includes('octet-stream')
+    ? unpack(await response.arrayBuffer()) : response.json();
+};
+
+export class Server {
+  /* `show` is called with the state before, the state now and arrays that changed; `tell` with
+     what goes wrong. */
+  constructor(show, tell) {
+    Object.assign(this, {show, tell, state: null, heard: 0, underway: 0, isRefreshing: false});
+    this.chain = Promise.resolve(); // changes go out one after the other
+  }
+
+  ask(path, body) {
+    return request(path, body === undefined ? {} : {
+      method: 'POST', headers: {'Content-Type': 'application/json'},
+      body: JSON.stringify({...body, since: this.state?.version ?? -1})});
+  }
+
+  upload(file, query) {
+    return request(`upload?${new URLSearchParams({...query, since: this.state?.version ?? -1})}`,
+                   {method: 'POST', body: file});
+  }
+
+  take({header, arrays}) {
+    const last = this.state;
+    // An answer that was overtaken by a later one holds nothing new.
+    if (last && header.version < last.version) return;
+    this.state = merged(last, header);
+    this.show(last, this.state, arrays);
+  }
+
+  /* Ask for what is no change of the model, and show what follows. */
+  async run(path, body = {}, said = '') {
+    try {
+      const found = await this.ask(path, body);
+      this.tell(said, true); // what follows may say more
+      this.take(found);
+    } catch (error) {
+      this.tell(error.message);
+    }
+  }
+
+  /* Each change has the revision that the one before led to. */
+  change(path, body, answered = () => {}) {
+    this.underway += 1;
+    this.chain = this.chain.then(async () => {
+      try {
+        const found = await this.ask(path, {...body, revision: this.state.revision});
+        this.tell('');
+        answered();
+        this.take(found);
+      } catch (error) {
+        this.tell(error.message);
+        this.heard = Infinity;
+      }
+      this.underway -= 1;
+      this.refresh();
+    });
+    return this.chain;
+  }
+
+  /* The server told how many changes there were; an answer to one of ours has them as well. */
+  hear(count) {
+    this.heard = Math.max(this.heard, count);
+    return this.refresh();
+  }
+
+  async refresh() {
+    if (this.isRefreshing) return;
+    this.isRefreshing = true;
+    while (!this.underway && (!this.state || this.heard > this.state.count)) {
+      try {
+        const found = await this.ask(`screen?since=${this.state?.version ?? -1}`);
+        if (this.heard === Infinity) this.heard = found.header.count;
+        this.take(found);
+      } catch (error) {
+        this.tell(error.status ? error.message
+          : 'The workbench does not answer: was it stopped?');
+        break;
+      }
+    }
+    this.isRefreshing = false;
+  }
+}

@@ -1,0 +1,293 @@
+/* The workbench's page: asks, shows what is answered, and says when it has been painted. */
+
+import {Curves} from './curves.mjs';
+import {$, afterPaint, make, whenDark} from './dom.mjs';
+import {EffectList} from './effects.mjs';
+import {showErrors} from './errors.mjs';
+import {amount, titleOf, unitOf} from './format.mjs';
+import {Live} from './live.mjs';
+import {adoptionSaid, showExperiment, showFiles, showLedger, showRecordings, showStage,
+        showVerdict} from './panels.mjs';
+import {drawScale, Robot} from './robot.mjs';
+import {Scatter} from './scatter.mjs';
+import {rowsOf, Server} from './server.mjs';
+import {showShares} from './shares.mjs';
+
+/* Measured by tests and benchmarks: from an action to the paint that shows its answer [ms]. */
+const bench = {latencies: [], settled: [], shares: [], curves: null,
+               get state() { return server.state; }, get live() { return live.found; }};
+window.bench = bench;
+const noted = (list, began) => afterPaint(() => list.push(performance.now() - began));
+
+let view = 'curves';
+let mark = null; // what somebody asks about
+let latest = []; // what is left now, by drive
+let pending; // when the tick was made whose fit is awaited
+
+const unit = (drive, quantity) => unitOf(server.state, drive, quantity);
+const tabs = [...document.querySelectorAll('[role=tab]')];
+const seenTabs = () => tabs.filter((tab) => !tab.hidden);
+
+/* -- showing ------------------------------------------------------------------------------ */
+
+const tell = (text, isGood = false) => {
+  $('message').hidden = !text;
+  $('message').textContent = text;
+  $('message').classList.toggle('good', isGood);
+};
+
+const show = (last, state, arrays) => {
+  if (state.failure) tell(state.failure);
+  $('live-tab').hidden = !state.has_live;
+  if (state.is_empty) {
+    $('verdict').textContent = state.is_beginning ? 'Reading and measuring …'
+      : 'No recording is open: add one.';
+    if (!state.is_beginning && last?.is_beginning !== false) open('recordings');
+    return;
+  }
+  if (arrays.now) latest = rowsOf(arrays.now);
+  if (state.generation !== last?.generation || last.is_empty) begin(state.generation);
+  else if (arrays.now && curves.before) curves.setNow(latest);
+  showVerdict(state, (kind) => server.run('cancel', {kind}));
+  showErrors($('errors'), state);
+  effects.show(state);
+  showStage(state);
+  showLedger(state);
+  showExperiment(state);
+  showRecordings(state, (span) => {
+    open('curves');
+    curves.zoom(span);
+  });
+  const said = adoptionSaid(last, state);
+  if (said) tell(...said);
+  if (last?.revision !== state.revision || (state.is_settled && !last?.is_settled)) {
+    if (mark) where(mark);
+    if (view === 'scatter') loadScatter();
+    if (view === 'robot') loadRobot();
+  }
+  if (pending !== undefined && state.stage !== 'linear') {
+    noted(bench.settled, pending);
+    pending = undefined;
+  }
+};
+
+/* Take the times and the error before, which a change of model or recordings makes others. */
+const begin = async (generation) => {
+  curves.before = null;
+  const {header, arrays} = await server.ask('curves');
+  if (generation !== server.state.generation) return; // overtaken
+  const {seconds, rest} = arrays;
+  const time = Float64Array.from(seconds.values, (s, k) => s + rest.values[k]);
+  curves.use(header.drives, header.drives.map(() => time), arrays.segment.values,
+             rowsOf(arrays.before));
+  if (latest[0].length === time.length) curves.setNow(latest);
+  bench.curves = curves;
+  const options = (names) => names.map((name) => make('option', titleOf(name), '', {value: name}));
+  $('brush-drive').replaceChildren(make('option', 'all drives', '', {value: ''}),
+                                   ...options(header.drives));
+  $('scatter-drive').replaceChildren(...options(header.drives));
+  for (const [id, start] of [['scatter-x', 'velocity'], ['scatter-y', 'error now']]) {
+    $(id).replaceChildren(...options(header.quantities));
+    $(id).value = start;
+  }
+  const [worst] = Object.entries(server.state.errors).sort((a, b) => b[1].before - a[1].before);
+  if (worst) $('scatter-drive').value = worst[0];
+  [$('from').value, $('to').value] = [time[0].toFixed(2), time[time.length - 1].toFixed(2)];
+  setMark(null);
+  afterPaint(() => { bench.first = performance.now(); });
+};
+
+/* -- marks -------------------------------------------------------------------------------- */
+
+const setMark = (asked) => {
+  mark = asked;
+  curves.setSpans(null);
+  curves.mark(asked?.time ?? null, asked?.drive);
+  if (asked?.time) {
+    [$('from').value, $('to').value] = asked.time.map((t) => t.toFixed(3));
+    $('brush-drive').value = asked.drive || '';
+  }
+  if (!asked) {
+    scatter.region = null;
+    scatter.draw();
+    showShares(null);
+  }
+};
+
+const where = async (asked, began) => {
+  let found;
+  try {
+    found = await server.ask('shares', asked);
+  } catch (error) {
+    tell(error.message);
+    return;
+  }
+  if (asked !== mark) return; // forgotten, or another one
+  showShares(asked, found, (effect, at) => tick(effect, undefined, at), (spans) => {
+    open('curves');
+    const [a, b] = spans[0];
+    const margin = Math.max(0.5, b - a);
+    curves.setSpans(spans);
+    curves.zoom([a - margin, b + margin]);
+  });
+  if (began !== undefined) noted(bench.shares, began);
+};
+
+const askAbout = (asked, began = performance.now()) => {
+  setMark(asked);
+  where(asked, began);
+};
+
+/* -- views -------------------------------------------------------------------------------- */
+
+const open = (name) => {
+  view = name;
+  for (const tab of tabs) {
+    const chosen = tab.dataset.view === name;
+    tab.setAttribute('aria-selected', String(chosen));
+    tab.tabIndex = chosen ? 0 : -1;
+    $(`view-${tab.dataset.view}`).hidden = !chosen;
+  }
+  robot.pause();
+  $('play').setAttribute('aria-pressed', 'false');
+  ({scatter: loadScatter, robot: loadRobot, recordings: () => showFiles(server),
+    live: () => live.show(), curves: () => curves.resize()}[name] ?? (() => {}))();
+};
+
+const loadScatter = async () => {
+  const [x, y, drive] = ['scatter-x', 'scatter-y', 'scatter-drive'].map((id) => $(id).value);
+  if (!drive) return;
+  const {arrays} = await server.ask(`scatter?${new URLSearchParams({x, y, drive})}`);
+  const {region} = scatter;
+  const same = scatter.names[0] === x && scatter.names[1] === y;
+  scatter.use([x, y], arrays.x.values, arrays.y.values, drive);
+  if (same && mark && !mark.time) {
+    scatter.region = region;
+    scatter.draw();
+  }
+};
+
+const loadRobot = async () => {
+  if (!server.state || server.state.is_empty) return;
+  try {
+    const {header, arrays} = await server.ask('robot');
+    $('robot-time').max = arrays.time.values.length - 1;
+    robot.use(arrays.time.values, arrays.joints.values, arrays.before.values, arrays.now.values,
+              header.angles);
+    $('robot-most').textContent = `0 to ${amount(robot.most)} ${unit()}`;
+    robot.moved(robot.frame);
+  } catch (error) {
+    tell(error.message);
+  }
+};
+
+/* -- what there is ------------------------------------------------------------------------ */
+
+const server = new Server(show, tell);
+const ticked = (began) => () => {
+  if (began === undefined) return;
+  noted(bench.latencies, began);
+  pending = began;
+};
+const tick = (effect, drives, began) => server.change('tick', drives === undefined ? {effect}
+  : drives.length ? {effect, drives} : {effect, is_ticked: false}, ticked(began));
+const effects = new EffectList($('effect-list'), {
+  tick, adopt: (effect) => server.change('adopt', {effect}),
+  release: (effect) => server.change('release', {effect}),
+  choose: (effect, key, value, began) => server.change('choose', {effect, key, value},
+                                                       ticked(began))});
+const curves = new Curves($('curves'), askAbout, unit);
+const scatter = new Scatter($('scatter'), (region) => {
+  mark = {x: $('scatter-x').value, y: $('scatter-y').value, drive: $('scatter-drive').value,
+          ...region};
+  curves.mark(null);
+  where(mark, performance.now());
+}, unit);
+const robot = new Robot($('robot'), (frame) => {
+  $('robot-time').value = frame;
+  $('robot-clock').textContent = `${robot.time[frame].toFixed(2)} s`;
+});
+const live = new Live(server, () => view === 'live');
+Object.assign(bench, {scatter, robot});
+
+/* -- hands -------------------------------------------------------------------------------- */
+
+const on = (id, event, work) => $(id).addEventListener(event, work);
+const span = () => [Number($('from').value), Number($('to').value)];
+
+for (const tab of tabs) {
+  tab.setAttribute('aria-controls', `view-${tab.dataset.view}`);
+  tab.addEventListener('click', () => open(tab.dataset.view));
+  tab.addEventListener('keydown', (event) => {
+    const step = {ArrowLeft: -1, ArrowRight: 1}[event.key];
+    if (!step) return;
+    const seen = seenTabs();
+    const next = seen[(seen.indexOf(tab) + step + seen.length) % seen.length];
+    open(next.dataset.view);
+    next.focus();
+  });
+}
+on('filter', 'input', () => effects.filter($('filter').value));
+on('brush', 'submit', (event) => {
+  event.preventDefault();
+  askAbout({time: span(), drive: $('brush-drive').value || null}, event.timeStamp);
+});
+on('zoom', 'click', () => curves.zoom(span()));
+on('all', 'click', () => curves.all());
+for (const id of ['scatter-x', 'scatter-y', 'scatter-drive']) {
+  on(id, 'change', () => {
+    setMark(null);
+    loadScatter();
+  });
+}
+on('play', 'click', () => {
+  const plays = !robot.playing;
+  $('play').setAttribute('aria-pressed', String(plays));
+  if (plays) robot.play();
+  else robot.pause();
+});
+on('robot-time', 'input', () => {
+  robot.pause();
+  robot.go(Number($('robot-time').value));
+});
+on('robot-error', 'change', () => {
+  robot.what = $('robot-error').value;
+  robot.draw();
+});
+on('undo', 'click', () => server.change('undo', {}));
+on('design', 'click', () => server.run('experiment', {
+  duration: Number($('experiment-duration').value)}));
+on('invite', 'click', async () => tell(
+  `For one more browser, good once: ${(await server.ask('invite', {})).address}`, true));
+on('upload', 'change', async () => {
+  const [file] = $('upload').files;
+  if (!file) return;
+  try {
+    server.take(await server.upload(file, {
+      name: file.name, held_out: $('upload-held-out').checked ? '1' : '0'}));
+    tell('');
+  } catch (error) {
+    tell(error.message);
+  }
+  $('upload').value = '';
+});
+on('help', 'click', () => $('keys').showModal());
+on('close-keys', 'click', () => $('keys').close());
+document.addEventListener('keydown', (event) => {
+  if (event.target.matches('input:not([type=checkbox]), select') || event.ctrlKey
+      || event.metaKey || event.altKey) return;
+  const tab = seenTabs()[Number(event.key) - 1];
+  if (event.key === '/') {
+    event.preventDefault();
+    $('filter').focus();
+  } else if (event.key === 'Escape') setMark(null);
+  else if (event.key === 'z' && mark?.time) curves.zoom(mark.time);
+  else if (event.key === 'a') curves.all();
+  else if (tab) open(tab.dataset.view);
+});
+whenDark(() => { if (server.state?.errors) showErrors($('errors'), server.state); });
+drawScale($('robot-scale'));
+const events = new EventSource('/api/events');
+events.onmessage = (event) => server.hear(Number(event.data));
+events.onerror = () => tell('The workbench does not answer: was it stopped?');
+events.onopen = () => tell('');

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What of a state changed since a browser last heard of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+EFFECTS = 'effects'  # a list of objects with names, that change one by one
+
+
+class ChangeLog:
+    """Parts of a state, each with the version at which it became what it is.
+
+    Attributes
+    ----------
+    version : int
+        Counts states that differ.
+    """
+
+    def __init__(self) -> None:
+        self.version = 0
+        self._parts: dict[tuple[str, str], Any] = {}
+        self._changed: dict[tuple[str, str], int] = {}
+
+    def update(self, state: Mapping[str, Any]) -> None:
+        """Take a state, later than all before."""
+        effects = {(EFFECTS, one['name']): one for one in state.get(EFFECTS, ())}
+        parts = {(key, ''): value for key, value in state.items() if key != EFFECTS} | effects
+        parts['effect_names', ''] = [name for _, name in effects]
+        changed = [key for key, part in parts.items()
+                   if key not in self._parts or self._parts[key] != part]
+        self.version += bool(changed)
+        self._parts |= parts
+        self._changed |= dict.fromkeys(changed, self.version)
+
+    def since(self, version: int) -> dict[str, Any]:
+        """Return the parts that changed after a version, all of them after -1."""
+        late = {key: self._parts[key] for key, at in self._changed.items() if at > version}
+        names = self._parts['effect_names', '']
+        return {key: part for (key, name), part in late.items() if not name} | {
+            EFFECTS: [part for (_, name), part in late.items() if name in names]}

@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+// SPDX-License-Identifier: Apache-2.0
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+
+import {merged, rowsOf, Server, unpack} from '../../pprs_dynamics/app/browser/server.mjs';
+
+const packed = (header, values = []) => {
+  const text = new TextEncoder().encode(JSON.stringify(header).padEnd(
+    Math.ceil(JSON.stringify(header).length / 4) * 4));
+  const buffer = new ArrayBuffer(4 + text.length + 4 * values.length);
+  new DataView(buffer).setUint32(0, text.length, true);
+  new Uint8Array(buffer).set(text, 4);
+  new Float32Array(buffer, 4 + text.length).set(values);
+  return buffer;
+};
+
+test('arrays are cut into rows', () => {
+  const {header, arrays} = unpack(packed(
+    {a: 1, arrays: [{name: 'x', shape: [1]}, {name: 'now', shape: [2, 3]}]}, [9, 1, 2, 3, 4, 5, 6]));
+  assert.equal(header.a, 1);
+  assert.deepEqual(rowsOf(arrays.now).map((row) => [...row]), [[1, 2, 3], [4, 5, 6]]);
+});
+
+test('what changed takes the place of what was, effect by effect', () => {
+  const first = merged(null, {
+    revision: 1, effects: [{name: 'a', v: 1}, {name: 'b', v: 1}], effect_names: ['a', 'b']});
+  const second = merged(first, {revision: 2, effects: [{name: 'b', v: 2}]});
+  assert.deepEqual(second.effects, [{name: 'a', v: 1}, {name: 'b', v: 2}]);
+  assert.equal(second.revision, 2);
+  assert.deepEqual(first.effects[1], {name: 'b', v: 1});
+  const third = merged(second, {effect_names: ['b'], effects: []});
+  assert.deepEqual(third.effects, [{name: 'b', v: 2}]);
+  assert.deepEqual(merged(null, {is_empty: true}).effects, []);
+});
+
+const serve = (answers) => {
+  const asked = [];
+  globalThis.fetch = async (path, options) => {
+    asked.push([path, options.body && JSON.parse(options.body)]);
+    const {status = 200, header, text} = await answers.shift()();
+    return {
+      ok: status < 400, status, headers: new Map([['content-type', 'application/octet-stream']]),
+      text: async () => text, arrayBuffer: async () => packed({arrays: [], ...header})};
+  };
+  return asked;
+};
+
+test('changes go out one after the other, each with the revision before it', async () => {
+  const told = [];
+  const server = new Server(() => {}, (text) => told.push(text));
+  server.state = {revision: 1, version: 1, count: 0};
+  const asked = serve([
+    () => ({header: {revision: 2, version: 2, count: 1}}),
+    () => ({header: {revision: 3, version: 3, count: 2}})]);
+  server.change('tick', {effect: 'a'});
+  await server.change('tick', {effect: 'b'});
+  assert.deepEqual(asked.map(([, body]) => [body.effect, body.revision, body.since]),
+                   [['a', 1, 1], ['b', 2, 2]]);
+  assert.equal(server.state.revision, 3);
+  assert.deepEqual(told, ['', '']);
+});
+
+test('an answer that was overtaken is not shown', () => {
+  const shown = [];
+  const server = new Server((last, state) => shown.push(state.version), () => {});
+  server.take({header: {version: 3, count: 3}, arrays: {}});
+  server.take({header: {version: 2, count: 2}, arrays: {}});
+  assert.deepEqual(shown, [3]);
+});
+
+test('a refusal is told, and the screen asked for', async () => {
+  const told = [];
+  const server = new Server(() => {}, (text) => told.push(text));
+  server.state = {revision: 1, version: 1, count: 4};
+  const asked = serve([
+    () => ({status: 409, text: '{"error": "something was changed elsewhere"}'}),
+    () => ({header: {revision: 5, version: 2, count: 9}})]);
+  await server.change('tick', {effect: 'a'});
+  await new Promise((done) => { setTimeout(done, 10); });
+  assert.deepEqual(told, ['something was changed elsewhere']);
+  assert.equal(asked[1][0], '/api/screen?since=1');
+  assert.equal(server.state.revision, 5);
+});
+
+test('a change that the answer to one of ours has already is not asked for', async () => {
+  const server = new Server(() => {}, () => {});
+  server.state = {revision: 1, version: 1, count: 4};
+  const asked = serve([]);
+  await server.hear(4);
+  assert.deepEqual(asked, []);
+});
