@@ -1,11 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
+import importlib.util
+import subprocess
+import sys
 from glob import glob
 
 from setuptools import find_packages, setup
+from setuptools.command.install import install
 
 package_name = 'pprs_dynamics'
+
+
+class InstallCompiled(install):
+    """Installs, and leaves the equations compiled beside them where Numba is.
+
+    As `colcon build` does it. pip runs this in a folder that it packs into a wheel, where nothing
+    can be left: the nodes compile at their first start then, while they answer already.
+    """
+
+    def run(self):
+        super().run()
+        if self.root is None and importlib.util.find_spec('numba') is not None:
+            # An installation that cannot compile is one without compiled kernels, no failure.
+            subprocess.run([sys.executable, '-m', 'pprs_dynamics.physics.model.preparation'],
+                           cwd=self.install_lib, check=False, stderr=subprocess.DEVNULL)
+
 
 setup(
     name=package_name,
@@ -48,6 +68,7 @@ setup(
                  'setuptools<80'],
     },
     zip_safe=False,
+    cmdclass={'install': InstallCompiled},
     entry_points={
         'console_scripts': [
             'feedforward = pprs_dynamics.ros.executables:feedforward',

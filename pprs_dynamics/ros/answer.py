@@ -21,6 +21,8 @@ from pprs_dynamics.ros.model_parameters import NodeModel
 from pprs_dynamics.ros.rejection import Rejection
 from pprs_dynamics.ros.trajectory_request import SPLINE, Motion, TrajectoryRequest
 
+REVERSAL_VELOCITY = 'friction.reversal_velocity'
+
 
 class Answer(NamedTuple):
     """What goes out for a request.
@@ -64,7 +66,7 @@ class Feedforward:
         # The model that remembered last, and what.
         self._before: tuple[NodeModel, ModelState] | None = None
         self._epoch: int | None = None
-        self._last: TrajectoryRequest | None = None
+        self._last: Answer | None = None
         self.use(model, own)
 
     def use(self, model: NodeModel, own: Mapping[str, Any]) -> None:
@@ -112,7 +114,7 @@ class Feedforward:
                 ahead = memory.copy()
                 self._model.drive_forces(motion[:1], ahead)
             self._memory = ahead
-        self._last = request
+        self._last = answer
         return answer
 
     def _made_memory(self) -> ModelState:
@@ -120,6 +122,25 @@ class Feedforward:
                                  else self._model.initial_state())
         self._remembers = memory.has_memory
         return memory
+
+    def has_come_to_rest(self, within: float) -> bool:
+        """Return whether the last accepted trajectory ended there, and did not merely break off.
+
+        At rest is what moves less than the speed in which friction turns over. Several points
+        have a last one; a single one of a stream may be a reversal, and must stay at rest.
+
+        Parameters
+        ----------
+        within : float
+            For how long after a single point [s].
+        """
+        if self._last is None:
+            return False
+        _, velocity, acceleration = self._last.forces.drive_motion
+        speed = abs(velocity[-1])
+        if len(velocity) == 1:
+            speed = speed + abs(acceleration[-1]) * within
+        return bool((speed <= self._model.values[REVERSAL_VELOCITY]).all())
 
     def hold(self, gravity: bool) -> Answer:
         """Return what goes out to hold the last accepted pose at rest, or zeros.
@@ -134,13 +155,13 @@ class Feedforward:
         if self._last is None:
             raise Rejection('EMPTY', 'no trajectory has been accepted')
         # The forces at rest, not those of the way there: no memory of it.
-        motion = self._last.motion.held()
+        motion = self._last.request.motion.held()
         forces = self._model.sound_at(motion).drive_forces(motion)
         effort = self._limits.clamped(self._scale * forces.total) if gravity else (
             np.zeros_like(forces.total))
         if not np.all(np.isfinite(effort)):
             raise Rejection('OUTPUT', 'the model gave an effort that is not finite')
-        return Answer(self._last, forces, effort)
+        return Answer(self._last.request, forces, effort)
 
     def _checked(self, request: TrajectoryRequest, forces: Forces) -> Answer:
         effort = self._scale * forces.total if self._scales else forces.total

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Entry points of the nodes; they tell in one sentence where ROS 2 itself is missing."""
+"""Entry points of the nodes: usage, and one sentence where ROS 2 itself is missing."""
 
 from __future__ import annotations
 
+import argparse
 import gc
 import importlib
 import signal
@@ -34,6 +35,7 @@ def simulated_robot() -> int:
 
 
 def _run(module: str, node: str) -> int:
+    _check_arguments(module, sys.argv[1:])
     use_one_thread()
     # Libraries make objects that stay, which looking for garbage among them only delays.
     gc.disable()
@@ -48,3 +50,31 @@ def _run(module: str, node: str) -> int:
     from pprs_dynamics.ros.run import run_node
 
     return run_node(getattr(importlib.import_module(f'pprs_dynamics.ros.{module}'), node))
+
+
+def _check_arguments(name: str, arguments: list[str]) -> None:
+    """Exit with usage where something is asked for, or given, that is not ROS 2's to take.
+
+    ROS 2 passes over what stands outside of --ros-args: a model given there would not be used.
+    """
+    parser = argparse.ArgumentParser(
+        name, f'{name} [--ros-args [--params-file FILE] [-p NAME:=VALUE] [-r FROM:=TO] ...]',
+        add_help=False, allow_abbrev=False,
+        description='A ROS 2 node. Files, parameters and remappings stand after --ros-args.',
+        epilog=f'README.md lists the parameters, and so does `ros2 param describe /{name} '
+               'PARAMETER` while the node runs.')
+    parser.add_argument('-h', '--help', action='help', help='show this and exit')
+    _, stray = parser.parse_known_args(_outside_ros_args(arguments))
+    if stray:
+        parser.error(f'{stray[0]} stands outside of --ros-args, where it has no effect')
+
+
+def _outside_ros_args(arguments: list[str]) -> list[str]:
+    """Return the arguments outside of --ros-args ... --."""
+    outside, inside = [], False
+    for argument in arguments:
+        if argument == ('--' if inside else '--ros-args'):
+            inside = not inside
+        elif not inside:
+            outside.append(argument)
+    return outside

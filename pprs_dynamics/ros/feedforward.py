@@ -18,7 +18,6 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
-from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros.answer import Answer, Feedforward
 from pprs_dynamics.ros.answer_cdr import AnswerBytes
 from pprs_dynamics.ros.conversions import NANOSECONDS
@@ -26,7 +25,8 @@ from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, paramet
 from pprs_dynamics.ros.managed_node import ManagedNode
 from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.parameters import declare_own, drive_count
-from pprs_dynamics.ros.provenance import files_given
+from pprs_dynamics.ros.preparation import prepare_beside
+from pprs_dynamics.ros.provenance import files_given, hardware_of
 from pprs_dynamics.ros.qos import UNANSWERED, publisher, subscription
 from pprs_dynamics.ros.rejection import CODES, Rejection
 from pprs_dynamics.ros.request_reader import reader_for
@@ -58,10 +58,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         parameters = parameters_for(drive_count(self))
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use_settings)
-        # Compiling or loading takes a second or more, for which no message should have to wait.
-        self.get_logger().info('loading the equations; the first time they are compiled, which '
-                               'may take some 15 s')
-        prepare(self._settings.model)
+        self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         self._reader = reader_for(self._settings.model)
         self._bytes = AnswerBytes(self._settings.model.drives)
@@ -74,7 +71,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._files = files_given(options.get('cli_args') or sys.argv)
         self._status = StatusReporter(
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
-            self._refresh)
+            hardware_of(self._settings.model), self._refresh)
         self._refresh()
         self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
         if own['autostart']:
@@ -191,7 +188,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._compute_time.add(time.perf_counter() - began)
         self._counters['accepted'] += 1
         self._counters['clamped'] += answer.clamped
-        self._watchdog.feed(request.end - now)
+        # Without a clock nothing can be said of a stamp, and a wait for it would not end.
+        self._watchdog.feed(request.end - (now or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
             self._lag.add(max(0.0, (time.time_ns() - info['received_timestamp']) / NANOSECONDS
@@ -249,9 +247,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     # --- stale commands -------------------------------------------------------------------------
 
     def _on_stale(self) -> None:
+        own, done = self._settings.own, self._do_timeout_action()
+        if self._feedforward.has_come_to_rest(own['command_timeout']):
+            self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
+            return
         self._counters['stale'] += 1
-        done = self._do_timeout_action()
-        text = f'no valid trajectory for {self._settings.own["command_timeout"]:g} s: {done}'
+        text = f'no valid trajectory for {own["command_timeout"]:g} s: {done}'
         self._status.report('STALE', 'STALE', text)
         self.get_logger().warning(text, throttle_duration_sec=1.0)
 
@@ -297,6 +298,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         threshold = self._settings.own['lag_warning']
         self._status.facts.update(
             state=self.state,
+            preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
             lagging=bool(threshold and accepted > before and self._lag.median > threshold),

@@ -22,7 +22,9 @@ from pprs_dynamics.ros.parameters import (
     current_values,
     declare_arm,
     declare_model,
+    in_declared_type,
     overrides,
+    with_hint,
 )
 
 NodeModel = DriveModel | ArmModel
@@ -42,8 +44,13 @@ class ExplainsRefusals(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all parameters or none."""
-        result = self._settings.check(parameter_list)
-        return super().set_parameters_atomically(parameter_list) if result.successful else result
+        settings = getattr(self, '_settings', None)
+        if settings is not None:  # else they are being declared
+            parameter_list = [in_declared_type(self, each) for each in parameter_list]
+            result = settings.check(parameter_list)
+            if not result.successful:
+                return result
+        return super().set_parameters_atomically(parameter_list)
 
 
 class ModelParameters:
@@ -113,7 +120,7 @@ class ModelParameters:
         try:
             self._checked = self._validated(changes)
         except PprsError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            return SetParametersResult(successful=False, reason=with_hint(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, changes: list[Parameter]) -> None:

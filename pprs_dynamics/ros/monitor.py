@@ -22,11 +22,13 @@ from pprs_dynamics.measurement.residuals.live import (
 )
 from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.keys import is_arm
-from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.clocks import steady_timer
 from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.parameters import NodeParameter, declare_own, overrides
-from pprs_dynamics.ros.qos import EVERY_MESSAGE
+from pprs_dynamics.ros.preparation import prepare_beside
+from pprs_dynamics.ros.provenance import hardware_of
+from pprs_dynamics.ros.qos import publisher, subscription
 from pprs_dynamics.ros.rejection import CODES, Rejection
 from pprs_dynamics.ros.status import StatusReporter
 
@@ -51,19 +53,19 @@ class MonitorNode(ExplainsRefusals):
             parameters = (replace(PARAMETERS[0], default=ARM_WINDOW), *PARAMETERS[1:])
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use)
-        prepare(self._settings.model)
+        prepare_beside(self, self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])
         self._begins_anew = self._cannot_begin = False
         self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}
         self._origin: int | None = None
-        self._status = StatusReporter(self, {}, self._counters)
-        self._model_effort = self.create_publisher(JointState, '~/model_effort', EVERY_MESSAGE)
-        self._residual = self.create_publisher(JointState, '~/residual', EVERY_MESSAGE)
-        self._error = self.create_publisher(Float64MultiArray, '~/error', EVERY_MESSAGE)
-        self.create_subscription(JointState, 'joint_states', self._on_state, EVERY_MESSAGE,
-                                 raw=True)
-        self.create_timer(1.0 / own['update_rate'], self._judge)
+        self._status = StatusReporter(
+            self, {}, self._counters, hardware_of(self._settings.model))
+        self._model_effort = publisher(self, JointState, '~/model_effort')
+        self._residual = publisher(self, JointState, '~/residual')
+        self._error = publisher(self, Float64MultiArray, '~/error')
+        subscription(self, JointState, 'joint_states', self._on_state, raw=True)
+        steady_timer(self, 1.0 / own['update_rate'], self._judge)
         self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
 
     def _use(self) -> None:
@@ -109,12 +111,12 @@ class MonitorNode(ExplainsRefusals):
         self._status.report('OK', 'OK', f'largest running error {worst:.4g} {unit}')
 
     def _publish(self, compared: Compared) -> None:
-        for publisher, efforts in ((self._model_effort, compared.model),
+        for topic, efforts in ((self._model_effort, compared.model),
                                    (self._residual, compared.residual)):
-            if publisher.get_subscription_count():
+            if topic.get_subscription_count():
                 for time, effort in zip(compared.time, efforts, strict=True):
                     stamp = self._origin + round(time * conversions.NANOSECONDS)
-                    publisher.publish(conversions.joint_state(
+                    topic.publish(conversions.joint_state(
                         stamp, effort, drives=self._settings.model.drives))
 
     def _reject(self, rejection: Rejection) -> None:

@@ -19,6 +19,7 @@ from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
+    ADDED,
     ARM_JOINTS,
     ARM_URDF,
     KEYS,
@@ -38,6 +39,8 @@ from pprs_dynamics.ros.provenance import folder_of, names_given
 from pprs_dynamics.ros.rclpy_internals import parameter_overrides
 
 ACTIVE = 'effects.active'
+HISTORY = 'history.'
+LISTS = (Parameter.Type.DOUBLE_ARRAY, Parameter.Type.STRING_ARRAY)
 LARGEST_INTEGER = 2**63 - 1
 
 
@@ -111,6 +114,14 @@ class NodeParameter:
         return _descriptor(self.description, self.rule, type(self.default), self.lower, self.upper)
 
     @property
+    def type_(self) -> Parameter.Type:
+        """Of the values."""
+        if self.size:
+            return Parameter.Type.DOUBLE_ARRAY
+        return {bool: Parameter.Type.BOOL, int: Parameter.Type.INTEGER, str: Parameter.Type.STRING,
+                float: Parameter.Type.DOUBLE, list: Parameter.Type.STRING_ARRAY}[type(self.default)]
+
+    @property
     def _list(self) -> Key:
         return Key(self.name, self.description, size=self.size, positive=True)
 
@@ -125,12 +136,9 @@ def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, An
     """
     values, given = {}, overrides(node)
     for parameter in parameters:
-        if parameter.name in given:
-            # Before ROS 2 looks at the range, whose sentence says less.
-            parameter.check(given[parameter.name])
-        default = None if parameter.size else parameter.default
-        node.declare_parameter(parameter.name, default, parameter.descriptor)
-        values[parameter.name] = parameter.check(node.get_parameter(parameter.name).value)
+        value = parameter.check(given.get(parameter.name, parameter.default))
+        _declare(node, parameter.name, parameter.type_, as_list(value), parameter.descriptor)
+        values[parameter.name] = value
     return values
 
 
@@ -149,32 +157,11 @@ def declare_arm(node: Node) -> None:
     ModelError
         For a key that is missing or breaks its rule.
     """
-    given = {name: _plain(value) for name, value in overrides(node).items()}
-    keys = keys_of(given)
-    for name, key in keys.items():
-        value = given.get(name)
-        if value is None and name in given and key.may_be_empty:
-            value = []
-        if value is not None:
-            key.check(value)
-        elif key.default is None:
-            raise ModelError(name, MISSING, key.rule)
-        else:
-            value = as_list(key.default)
-        if name == ARM_URDF:
-            value = str(folder_of(name) / value)
-        # An override would bring the relative path back.
-        node.declare_parameter(name, value, _of_key(key), ignore_override=True)
-    _declare_added(node, given)
-
-
-def _declare_added(node: Node, given: Mapping[str, Any]) -> None:
-    """Declare what was given beside the keys of a model, as of effects."""
-    for name, value in given.items():
-        if not node.has_parameter(name) and value is not None:
-            node.declare_parameter(name, value, added_descriptor(name))
-    if not node.has_parameter(ACTIVE):
-        node.declare_parameter(ACTIVE, [], added_descriptor(ACTIVE))
+    given = overrides(node)
+    urdf = given.get(ARM_URDF)
+    if isinstance(urdf, str):
+        given[ARM_URDF] = str(folder_of(ARM_URDF) / urdf)
+    _declare_keys(node, keys_of(given), given, {})
 
 
 def declare_model(node: Node) -> list[str]:
@@ -192,17 +179,76 @@ def declare_model(node: Node) -> list[str]:
     if any(name.startswith('geometry.') for name in given):
         # Somebody's own robot: what is missing must not become the paper's in silence.
         defaults = {}
-        for name, key in KEYS.items():
-            if name not in given and key.default is None:
-                raise ModelError(name, MISSING, key.rule)
-    for name, key in KEYS.items():
-        if name in given:
-            key.check(_plain(given[name]))
-        default = defaults.get(name, key.default)
-        node.declare_parameter(
-            name, list(default) if isinstance(default, tuple) else default, _of_key(key))
-    _declare_added(node, given)
-    return [name for name, key in KEYS.items() if name not in given and name in defaults]
+    _declare_keys(node, KEYS, given, defaults)
+    return [name for name in KEYS if name not in given and name in defaults]
+
+
+def _declare_keys(
+    node: Node, keys: Mapping[str, Key], given: Mapping[str, Any], defaults: Mapping[str, Any],
+) -> None:
+    """Declare a model's keys, and what was given beside them, as of effects."""
+    for name, key in keys.items():
+        value = given.get(name, defaults.get(name, key.default))
+        if value is None and name in given and key.may_be_empty:
+            value = ()
+        elif value is None and name not in given:
+            raise ModelError(name, MISSING, key.rule)
+        _declare(node, name, _type_of(key), as_list(key.check(value)), _of_key(key))
+    for name, value in {ACTIVE: [], **given}.items():
+        # The ledger is for `pprs history`: a page of numbers that no node reads.
+        if not node.has_parameter(name) and not name.startswith(HISTORY):
+            kind = _added_type(name, value)
+            if kind != Parameter.Type.NOT_SET:
+                _declare(node, name, kind, _decimal(kind, value), added_descriptor(name))
+
+
+def _declare(
+    node: Node, name: str, kind: Parameter.Type, value: Any, descriptor: ParameterDescriptor,
+) -> None:
+    """Declare a parameter with a value of a type, which an empty list does not tell."""
+    # An override would bring back a whole number, or a relative path.
+    if isinstance(value, list) and not value:
+        node.declare_parameter(name, kind, descriptor, ignore_override=True)
+        node.set_parameters([Parameter(name, kind, value)])
+    else:
+        node.declare_parameter(name, value, descriptor, ignore_override=True)
+
+
+def in_declared_type(node: Node, change: Parameter) -> Parameter:
+    """Return a change with decimal numbers where whole ones, or nothing, stand for them."""
+    kind = (node.get_parameter(change.name).type_ if node.has_parameter(change.name)
+            else _added_type(change.name, change.value))
+    value = _plain(change.value)
+    decimal = _decimal(kind, value)
+    return change if decimal is value and value != [] else Parameter(change.name, kind, decimal)
+
+
+def _decimal(kind: Parameter.Type, value: Any) -> Any:
+    if kind == Parameter.Type.DOUBLE and type(value) is int:
+        return float(value)
+    if kind in LISTS and (value is None or value == []):
+        return []
+    if kind == Parameter.Type.DOUBLE_ARRAY and isinstance(value, list) and all(
+            type(element) is int for element in value):
+        return [float(element) for element in value]
+    return value
+
+
+def _added_type(name: str, value: Any) -> Parameter.Type:
+    """Return the type of a parameter that is not in the table of keys: numbers are decimal."""
+    if name == ACTIVE:
+        return Parameter.Type.STRING_ARRAY
+    kind = Parameter.Type.from_parameter_value(value)
+    if name.startswith(ADDED):
+        kind = {Parameter.Type.INTEGER: Parameter.Type.DOUBLE,
+                Parameter.Type.INTEGER_ARRAY: Parameter.Type.DOUBLE_ARRAY}.get(kind, kind)
+    return kind
+
+
+def _type_of(key: Key) -> Parameter.Type:
+    if key.size is None:
+        return Parameter.Type.DOUBLE if key.is_number else Parameter.Type.STRING
+    return Parameter.Type.DOUBLE_ARRAY if key.is_number else Parameter.Type.STRING_ARRAY
 
 
 def refuse_unknown(node: Node) -> None:
@@ -214,7 +260,8 @@ def refuse_unknown(node: Node) -> None:
 
 def overrides(node: Node) -> dict[str, Any]:
     """Return what was given in files and on the command line, None for an empty list."""
-    return parameter_overrides(node, lambda: {*NAMES, *NODE_KEYS, *names_given()})
+    given = parameter_overrides(node, lambda: {*NAMES, *NODE_KEYS, *names_given()})
+    return {name: _plain(value) for name, value in given.items()}
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:
@@ -235,10 +282,12 @@ def added_descriptor(name: str) -> ParameterDescriptor:
         for parameter in CATALOGUE[effect].parameters:
             if place.rpartition('.')[2] == parameter.name:
                 unit = f' [{parameter.unit}]' if parameter.unit else ''
-                return _descriptor(
+                descriptor = _descriptor(
                     f'{effect}: {parameter.description}{unit}',
                     f'lie in [{parameter.lower:g}, {parameter.upper:g}]{unit}',
                     float, parameter.lower, parameter.upper)
+                descriptor.dynamic_typing = True  # it may be taken away again
+                return descriptor
     return ParameterDescriptor(dynamic_typing=True)
 
 
@@ -254,9 +303,7 @@ def _descriptor(
     description: str, rule: str, kind: type, lower: float = -math.inf, upper: float = math.inf,
 ) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(
-        description=description, additional_constraints=f'must {rule}',
-        # `0` for `0.0` is right in a file and must not be a type error here.
-        dynamic_typing=True)
+        description=description, additional_constraints=f'must {rule}')
     if kind is float and (math.isfinite(lower) or math.isfinite(upper)):
         descriptor.floating_point_range = [FloatingPointRange(
             # Message fields of that type turn whole numbers into nonsense without a word.
@@ -266,6 +313,17 @@ def _descriptor(
             from_value=round(max(lower, -LARGEST_INTEGER)),
             to_value=round(min(upper, LARGEST_INTEGER)), step=0)]
     return descriptor
+
+
+def with_hint(error: Exception) -> str:
+    """Return an error's sentence, and what to write where a list mixes whole and decimal numbers.
+
+    ROS 2 takes such a list for a word, or refuses the file that it stands in.
+    """
+    value = error.value if isinstance(error, ModelError) else None
+    if 'same type' in str(error) or (isinstance(value, str) and value.startswith('[')):
+        return f'{error}; a list must not mix whole and decimal numbers: write 0.0, not 0'
+    return str(error)
 
 
 def _plain(value: Any) -> Any:

@@ -17,10 +17,13 @@ from pprs_dynamics.measurement.files.pose_files import read_poses
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.parameters import NodeParameter, declare_own, refuse_unknown
-from pprs_dynamics.ros.qos import EVERY_MESSAGE
+from pprs_dynamics.ros.qos import publisher
 from pprs_dynamics.ros.run import Finished
 
+# Fast DDS asks listeners every 3 s what they have got, which none tells by itself.
+ACKNOWLEDGED = Duration(seconds=4.0)
 SOURCES = ('helix', 'excitation', 'csv')
 
 PARAMETERS = (
@@ -50,21 +53,21 @@ class PlayTrajectoryNode(Node):
         refuse_unknown(self)
         self._motion = _path(values)
         self._next, self._round = 0, 1
-        self._publisher = self.create_publisher(
-            MultiDOFJointTrajectory, 'feedforward/trajectory', EVERY_MESSAGE)
+        self._publisher = publisher(self, MultiDOFJointTrajectory, 'feedforward/trajectory')
         self.get_logger().info(
             f'{values["source"]}, {len(self._motion)} messages at {self._rate:g} Hz; waiting for '
             f'a listener on {self._publisher.topic_name}')
         self.create_timer(1.0 / self._rate, self._tick)
+        steady_timer(self, 1.0, self._look_at_clock)
 
     def _tick(self) -> None:
         if self._next == 0 and not self._publisher.get_subscription_count():
             return
         if self._next == len(self._motion):
             if self._round == self._repeat:
-                # Leave only when the last message has arrived.
-                # A listener that is stuck must not keep this node from ending.
-                if not self._publisher.wait_for_all_acked(Duration(seconds=1.0)):
+                # Leave only when the last message has arrived; but a listener that is stuck must
+                # not keep this node from ending.
+                if not self._publisher.wait_for_all_acked(ACKNOWLEDGED):
                     self.get_logger().warning('a listener did not take the last messages')
                 self.get_logger().info(f'played {self._round * len(self._motion)} messages')
                 raise Finished
@@ -74,6 +77,10 @@ class PlayTrajectoryNode(Node):
         self._publisher.publish(conversions.write_trajectory(
             part, conversions.time(self._stamp()), offsets))
         self._next += 1
+
+    def _look_at_clock(self) -> None:
+        if clock_is_missing(self):
+            self.get_logger().warning(MISSING_CLOCK, throttle_duration_sec=5.0)
 
     def _stamp(self) -> int:
         """Return the moment that the next pose belongs to [ns], evenly spaced."""

@@ -12,6 +12,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.keys import ARM_URDF, is_arm
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.system.bounded_yaml import parse, read_text
 from pprs_dynamics.system.plain_text import displayed
@@ -28,6 +30,12 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
     paths = _paths(arguments) or [find_file(DEFAULT_MODEL)]
     return [{'file': displayed(path.resolve()), 'sha256': _digest(path.read_bytes())}
             for path in paths if path.is_file()]
+
+
+def hardware_of(model: ForceModel) -> str:
+    """Return which robot a model is of: an arm by its URDF."""
+    name = model.title.partition(' ')[2]
+    return f'{name} {Path(model.values[ARM_URDF]).stem}' if is_arm(model.values) else name
 
 
 def check_files(arguments: Sequence[str]) -> None:

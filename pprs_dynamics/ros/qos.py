@@ -9,6 +9,7 @@ import copy
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile
@@ -39,9 +40,10 @@ def publisher(node: Node, kind: type, topic: str, profile: QoSProfile = EVERY_ME
     ModelError
         For an override that is none.
     """
+    warn = PublisherEventCallbacks(incompatible_qos=_warning(node, topic, 'a listener asks for'))
     return _overridable(node, topic, lambda options: node.create_publisher(
         # rclpy writes the overrides into the profile.
-        kind, topic, copy.copy(profile), qos_overriding_options=options))
+        kind, topic, copy.copy(profile), qos_overriding_options=options, event_callbacks=warn))
 
 
 def subscription(
@@ -49,8 +51,24 @@ def subscription(
     profile: QoSProfile = EVERY_MESSAGE,
 ) -> Any:
     """Create a subscription whose QoS qos_overrides.<topic>.subscription.* change."""
+    warn = SubscriptionEventCallbacks(
+        incompatible_qos=_warning(node, topic, 'a publisher offers'))
     return _overridable(node, topic, lambda options: node.create_subscription(
-        kind, topic, callback, copy.copy(profile), qos_overriding_options=options, raw=raw))
+        kind, topic, callback, copy.copy(profile), qos_overriding_options=options, raw=raw,
+        event_callbacks=warn))
+
+
+def _warning(node: Node, topic: str, who: str) -> Callable[[Any], None]:
+    """Return what tells of QoS that does not fit; rclpy's own names the topic before remapping."""
+    resolved = node.resolve_topic_name(topic)
+
+    def warn(event: Any) -> None:
+        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
+        node.get_logger().warning(
+            f'{resolved}: {who} another {policy}, so that no messages pass between the two; '
+            f'qos_overrides.{resolved}.* change it here')
+
+    return warn
 
 
 def _overridable(node: Node, topic: str, create: Callable[[QoSOverridingOptions], Any]) -> Any:

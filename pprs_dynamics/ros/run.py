@@ -16,6 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.ros.executor import PromptExecutor, StopSignals
+from pprs_dynamics.ros.parameters import with_hint
 from pprs_dynamics.ros.provenance import check_files
 
 
@@ -39,10 +40,10 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
         check_files(sys.argv if args is None else args)
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except PprsError as error:
-        return _complain(str(error))
+        return _complain(with_hint(error))
     except RuntimeError as error:  # the public base of rclpy's own
         # An unreadable parameter file, or arguments that are none.
-        return _complain(' '.join(str(error).split()))
+        return _complain(' '.join(with_hint(error).split()))
     node = None
     # Two threads answered 44 of 5 000 messages at 1 kHz; one answers all.
     executor = PromptExecutor()
@@ -56,7 +57,7 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
         gc.enable()
         executor.spin()
     except PprsError as error:
-        return _complain(str(error))
+        return _complain(with_hint(error))
     except (KeyboardInterrupt, ExternalShutdownException, Finished):
         pass
     finally:

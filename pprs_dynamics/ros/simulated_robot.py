@@ -15,13 +15,15 @@ from std_msgs.msg import Float64MultiArray
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.clocks import steady_timer
 from pprs_dynamics.ros.parameters import (
     NodeParameter,
     current_values,
     declare_model,
     declare_own,
 )
-from pprs_dynamics.ros.qos import EVERY_MESSAGE
+from pprs_dynamics.ros.provenance import hardware_of
+from pprs_dynamics.ros.qos import publisher, subscription
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.ros.status import StatusReporter
 from pprs_dynamics.ros.whole import message_in
@@ -75,11 +77,12 @@ class SimulatedRobotNode(Node):
         self._late_before, self._cycles_before = 0, 0
         hidden = [effect.name for effect in self._robot.effects]
         # What is hidden is told to nobody who only listens: the log is the robot's own.
-        self._status = StatusReporter(self, {}, self._counters)
-        self._states = self.create_publisher(JointState, 'joint_states', EVERY_MESSAGE)
+        self._status = StatusReporter(
+            self, {}, self._counters, f'simulated {hardware_of(self._model)}')
+        self._states = publisher(self, JointState, 'joint_states')
         for kind, topic, callback in ((JointState, '~/joint_command', self._on_setpoint),
                                       (Float64MultiArray, '~/commands', self._on_efforts)):
-            self.create_subscription(kind, topic, callback, EVERY_MESSAGE, raw=True)
+            subscription(self, kind, topic, callback, raw=True)
         self.get_logger().info(
             f'{own["rate"]:g} Hz, PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m, '
             f'hidden effects: {", ".join(hidden) or "none"}; holding at home')
@@ -88,8 +91,8 @@ class SimulatedRobotNode(Node):
         # How far the simulation has fallen behind the clock for good, where it could not keep up.
         self._lag = 0.0
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
-        self.create_timer(self._period / conversions.NANOSECONDS, self._on_timer)
-        self.create_timer(1.0, self._judge_timing)
+        steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
+        steady_timer(self, 1.0, self._judge_timing)
 
     def _on_timer(self) -> None:
         behind = self._now() - self._lag - self._robot.time

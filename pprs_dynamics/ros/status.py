@@ -12,6 +12,7 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from pprs_dynamics.ros.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.qos import LATCHED, publisher
 
 try:
@@ -32,22 +33,24 @@ class StatusReporter:
         Constant entries of the JSON, e.g. the model's file.
     counters : dict of int
         Shared with the node, which counts up in place.
+    hardware : str
+        Which robot `/diagnostics` tells of.
     refresh : callable, optional
         Called once a second before the status goes out, to bring `facts` up to date.
     """
 
     def __init__(
         self, node: Node, facts: dict[str, Any], counters: dict[str, int],
-        refresh: Callable[[], None] | None = None,
+        hardware: str, refresh: Callable[[], None] | None = None,
     ) -> None:
         self._node, self.facts, self._counters = node, facts, counters
-        self._refresh = refresh
+        self._hardware, self._refresh = hardware, refresh
         self._publisher = publisher(node, String, '~/status', LATCHED)
         self._diagnostics = None
         if DiagnosticArray is not None:
-            self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+            self._diagnostics = publisher(node, DiagnosticArray, '/diagnostics')
         self._current = ('OK', 'OK', 'waiting for the first message')
-        node.create_timer(1.0, self._tick)
+        steady_timer(node, 1.0, self._tick)
         self._publish()
 
     @property
@@ -69,13 +72,15 @@ class StatusReporter:
 
     def _publish(self) -> None:
         level, code, message = self._current
+        if level == 'OK' and clock_is_missing(self._node):
+            level, code, message = 'WARN', 'CLOCK', MISSING_CLOCK
         content = {'level': level, 'code': code, 'message': message,
                    'counters': self._counters, **self.facts}
         self._publisher.publish(String(data=json.dumps(content)))
         if self._diagnostics is not None:
             status = DiagnosticStatus(
                 level=bytes([LEVELS.index(level)]), name=self._node.get_fully_qualified_name(),
-                message=f'{code}: {message}',
+                message=f'{code}: {message}', hardware_id=self._hardware,
                 values=[KeyValue(key=key, value=str(value))
                         for key, value in {**self._counters, **self.facts}.items()
                         if isinstance(value, (int, float, str))])

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
+from pprs_dynamics.ros.clocks import steady_clock
 from pprs_dynamics.ros.conversions import NANOSECONDS
 
 IDLE = 3600.0  # [s] period of a timer that is cancelled
@@ -19,7 +18,8 @@ IDLE = 3600.0  # [s] period of a timer that is cancelled
 class CommandWatchdog:
     """Calls back once when nothing has been commanded for a while after the last trajectory.
 
-    Runs on a clock that nobody sets back, or on the simulation's where that is used.
+    Runs on the steady clock: a simulation that stands still, or whose clock never comes, must not
+    keep a command in force.
 
     Parameters
     ----------
@@ -34,8 +34,7 @@ class CommandWatchdog:
         self, node: Node, timeout: Callable[[], float], stale: Callable[[], None],
     ) -> None:
         self._node, self._timeout, self._stale = node, timeout, stale
-        simulated = node.get_parameter('use_sim_time').value
-        self._clock = node.get_clock() if simulated else Clock(clock_type=ClockType.STEADY_TIME)
+        self._clock = steady_clock()
         self._end: int | None = None
         self._end_looked_at = 0
         self._timer = node.create_timer(IDLE, self._look, clock=self._clock)

@@ -6,25 +6,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
-from rcl_interfaces.msg import SetParametersResult
+from node_bench import bench
+from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
+    GetParameters,
     ListParameters,
     SetParameters,
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.ros.feedforward import FeedforwardNode
+from pprs_dynamics.ros.monitor import MonitorNode
+from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
+from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes
 
@@ -158,6 +167,57 @@ def test_every_parameter_says_what_it_is_and_numbers_say_their_range(caller: Cal
     assert ranges['effects.effort_offset.lift_1.force'][0].to_value > 0
 
 
+def types(caller: Caller, *names: str) -> list[int]:
+    described = caller.call(DescribeParameters, 'describe_parameters', names=names).descriptors
+    return [each.type for each in described]
+
+
+def test_whole_numbers_and_empty_lists_keep_the_declared_type(caller: Caller) -> None:
+    assert caller.set('effects.effort_offset.lift_1.force', 1).successful
+    names = ('masses.payload', 'gravity', 'effort_limits', 'effects.active', 'command_timeout',
+             'effects.effort_offset.lift_1.force')
+    double, doubles = ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_DOUBLE_ARRAY
+    strings = ParameterType.PARAMETER_STRING_ARRAY
+    wanted = [double, doubles, doubles, strings, double, double]
+    assert types(caller, *names) == wanted
+    for name, value in (('masses.payload', 2), ('gravity', [0, 0, -10]), ('command_timeout', 1),
+                        ('effort_limits', [20] * 6), ('effects.effort_offset.lift_1.force', 2)):
+        result = caller.set(name, value)
+        assert result.successful, result.reason
+    values = caller.call(GetParameters, 'get_parameters', names=names).values
+    assert [value.type for value in values] == wanted
+    assert values[0].double_value == 2.0
+    assert list(values[1].double_array_value) == [0.0, 0.0, -10.0]
+    # As `ros2 param set` says an empty list, whose elements have no type.
+    empty = caller.set('effort_limits', [])
+    assert empty.successful, empty.reason
+    assert types(caller, *names) == wanted
+
+
+def test_whole_numbers_at_the_start_are_decimal_ones() -> None:
+    given = {'masses__payload': 2, 'effort_limits': [20] * 6, 'feedforward_scale': 1,
+             'effects__effort_offset__lift_1__force': 1}
+    with feedforward_bench(**given) as node:
+        for name in given:
+            kind = node.node.get_parameter(name.replace('__', '.')).type_
+            assert kind in (Parameter.Type.DOUBLE, Parameter.Type.DOUBLE_ARRAY), name
+
+
+def test_a_list_of_whole_and_decimal_numbers_gets_the_hint(caller: Caller) -> None:
+    # `ros2 param set` sends such a list as the word that it was typed as.
+    for name, word in (('gravity', '[0, 0.0, -9.81]'), ('effort_limits', '[1, 2.0]')):
+        result = caller.set(name, word)
+        assert not result.successful
+        assert 'write 0.0, not 0' in result.reason
+
+
+def test_the_ledger_of_a_model_is_no_parameter() -> None:
+    with feedforward_bench(history__step_01__effect='coulomb_friction',
+                           history__step_01__error_before=1.0) as node:
+        assert not node.node.get_parameters_by_prefix('history')
+        assert node.answer(MESSAGE)
+
+
 def test_topics_have_the_qos_that_is_asked_for() -> None:
     overrides = {'qos_overrides./feedforward/commands.publisher.reliability': 'best_effort',
                  'qos_overrides./feedforward/trajectory.subscription.depth': 7}
@@ -175,3 +235,36 @@ def test_a_qos_that_is_none_is_one_sentence() -> None:
     override = {'qos_overrides./feedforward/commands.publisher.reliability': 'hopeful'}
     with pytest.raises(ModelError, match='hopeful'), feedforward_bench(**override):
         pass
+
+
+@pytest.mark.parametrize(('factory', 'topic', 'entity'), [
+    (MonitorNode, '/monitor/error', 'publisher'),
+    (MonitorNode, '/joint_states', 'subscription'),
+    (SimulatedRobotNode, '/joint_states', 'publisher'),
+    (SimulatedRobotNode, '/simulated_robot/commands', 'subscription'),
+    (PlayTrajectoryNode, '/feedforward/trajectory', 'publisher'),
+    (FeedforwardNode, '/diagnostics', 'publisher'),
+], ids=lambda value: getattr(value, '__name__', value))
+def test_every_topic_of_every_node_has_the_qos_that_is_asked_for(
+    factory: Any, topic: str, entity: str,
+) -> None:
+    with bench() as running:
+        running.add(factory, parameter_overrides=[
+            Parameter(f'qos_overrides.{topic}.{entity}.reliability', value='best_effort')])
+        look = getattr(running.probe, f'get_{entity}s_info_by_topic')
+        assert running.spin_until(lambda: look(topic))
+        info, = look(topic)
+        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(
+    ros_domain: int, tmp_path: Path,
+) -> None:
+    log = tmp_path / 'log'
+    command = [executable('feedforward'), '--ros-args', '-r', '~/commands:=/effort/commands',
+               '-p', 'qos_overrides./effort/commands.publisher.reliability:=best_effort']
+    with bench() as running, node_process(command, ros_domain, log):
+        running.listen(Float64MultiArray, '/effort/commands')  # reliable
+        assert running.spin_until(lambda: 'reliability' in log.read_text(), 20), log.read_text()
+    assert '/effort/commands: a listener asks for another reliability' in log.read_text()
+    assert '~/' not in log.read_text()

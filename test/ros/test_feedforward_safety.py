@@ -267,4 +267,5 @@ def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
             lambda: told and told[-1].status[0].message.startswith('EMPTY'))
         status = told[-1].status[0]
         assert (status.name, status.level) == ('/feedforward', b'\x02')
+        assert status.hardware_id == '3-PPRS'
         assert {value.key: value.value for value in status.values}['EMPTY'] == '1'

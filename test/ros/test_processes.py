@@ -136,7 +136,53 @@ def test_a_parameter_file_that_ros_cannot_read_is_one_sentence(
                           env=environment(ros_domain), capture_output=True, text=True, timeout=20)
     assert done.returncode == 2
     assert str(file) in done.stderr
+    assert 'write 0.0, not 0' in done.stderr
     assert 'Traceback' not in done.stderr
+
+
+NODES = ('feedforward', 'monitor', 'play_trajectory', 'simulated_robot')
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_help_is_answered_and_starts_nothing(ros_domain: int, name: str) -> None:
+    done = subprocess.run([executable(name), '--help'], env=environment(ros_domain),
+                          capture_output=True, text=True, timeout=20)
+    assert done.returncode == 0
+    assert done.stdout.startswith(f'usage: {name} [--ros-args [--params-file FILE]')
+    assert not done.stderr
+
+
+@pytest.mark.parametrize('name', NODES)
+@pytest.mark.parametrize('arguments', [
+    ('--params-file', str(PAPER)), ('robot.yaml',),
+    ('--ros-args', '-p', 'rate:=50.0', '--', '--params-file', str(PAPER))])
+def test_what_ros_would_pass_over_is_refused_with_usage(
+    ros_domain: int, name: str, arguments: tuple[str, ...],
+) -> None:
+    done = subprocess.run([executable(name), *arguments], env=environment(ros_domain),
+                          capture_output=True, text=True, timeout=20)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f'usage: {name} [--ros-args')
+    assert f'{arguments[-2:][0]} stands outside of --ros-args' in done.stderr
+
+
+def test_a_mixed_list_on_the_command_line_gets_the_hint(ros_domain: int) -> None:
+    done = subprocess.run([executable('feedforward'), '--ros-args', '-p', 'gravity:=[0,0.0,-9.81]'],
+                          env=environment(ros_domain), capture_output=True, text=True, timeout=20)
+    assert done.returncode == 2
+    assert 'write 0.0, not 0' in done.stderr
+
+
+def test_a_listener_that_took_everything_is_not_complained_about(
+    running: Bench, ros_domain: int, tmp_path: Path,
+) -> None:
+    with node_process([executable('feedforward')], ros_domain, tmp_path / 'log'):
+        assert running.spin_until(
+            lambda: running.probe.count_subscribers('/feedforward/trajectory'), 20)
+        done = play(ros_domain, 'source:=excitation', 'duration:=0.5')
+    assert done.returncode == 0
+    assert 'played 51 messages' in done.stderr
+    assert 'did not take' not in done.stderr
 
 
 def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None:

@@ -13,7 +13,9 @@ and faster than NumPy's; or, of many samples, a slice, so that the same lines wo
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,7 @@ FEW = 8  # samples, up to which floats are faster than arrays
 _loops: dict[Kernel, Callable[..., int]] = {}
 _compile: Callable[[Kernel, tuple[Any, ...]], Callable[..., int]] | None = None
 _decided = False
+_compiling: set[int] = set()  # threads that compile while others must not wait
 
 
 def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:
@@ -44,12 +47,27 @@ def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) 
         C-contiguous; the first is (N, k), N samples.
     """
     loop = _loops.get(kernel)
-    if loop is None:
-        if not is_compiled():
-            return evaluate_plainly(kernel, parameters, *tables)
-        assert _compile is not None
-        loop = _loops[kernel] = _compile(kernel, parameters.named)
-    return loop(parameters.row, *tables)
+    if loop is not None:
+        return loop(parameters.row, *tables)
+    # Who compiles in the background wants answers meanwhile.
+    elsewhere = _compiling and threading.get_ident() not in _compiling
+    if elsewhere or not is_compiled():
+        return evaluate_plainly(kernel, parameters, *tables)
+    assert _compile is not None
+    loop = _compile(kernel, parameters.named)
+    first = loop(parameters.row, *tables)
+    _loops[kernel] = loop  # only now: another thread would wait for the compiler
+    return first
+
+
+@contextmanager
+def compiling_here() -> Iterator[None]:
+    """While the block lasts other threads evaluate plainly what is not compiled yet."""
+    _compiling.add(threading.get_ident())
+    try:
+        yield
+    finally:
+        _compiling.discard(threading.get_ident())
 
 
 def evaluate_if_ready(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:

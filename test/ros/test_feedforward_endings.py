@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""How a trajectory ends: done at rest, or broken off; and a simulation whose clock never comes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
+from rosgraph_msgs.msg import Clock
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.ros import conversions
+
+pytestmark = pytest.mark.nodes
+
+TIMEOUT = 0.15  # [s]
+POSE = PlatformMotion.at_rest([[0.02, 0.0, 0.5]], [[0.0, 0.0, 0.0, 1.0]])
+ZERO = np.zeros((1, 3))
+
+
+def held(motion: PlatformMotion) -> np.ndarray:
+    """Return the forces at rest in the last pose."""
+    return DriveModel.load().drive_forces(motion.held()).total[0]
+
+
+def test_a_single_pose_by_hand_is_done_and_not_stale() -> None:
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.answer(message_of(POSE))
+        status = node.wait_for_status(code='DONE')
+        assert status['level'] == 'OK'
+        assert 'held at rest' in status['message']
+        assert node.counters['stale'] == 0
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)
+        np.testing.assert_allclose(node.commands[-1].data, held(POSE), rtol=0, atol=EQUAL)
+        node.bench.spin_for(3 * TIMEOUT)
+        assert len(node.commands) == 2
+
+
+@pytest.mark.parametrize('action', ['zero', 'silent'])
+def test_the_end_of_a_path_does_the_timeouts_action(action: str) -> None:
+    path = HelicalPath()
+    motion = path.motion(np.linspace(path.duration - 0.1, path.duration, 11))
+    with feedforward_bench(command_timeout=TIMEOUT, timeout_action=action) as node:
+        node.answer(message_of(motion))
+        assert node.wait_for_status(code='DONE')['level'] == 'OK'
+        assert node.bench.spin_until(lambda: len(node.commands) == (1 if action == 'silent' else 2))
+        if action == 'zero':
+            assert list(node.commands[-1].data) == [0.0] * 6
+        # A stream that follows and breaks off is another matter.
+        node.answer(message_of(random_motion(np.random.default_rng(1), 1)))
+        assert node.wait_for_status(code='STALE')['level'] == 'STALE'
+
+
+def test_a_stream_that_breaks_off_where_it_turns_round_is_stale() -> None:
+    turning = PlatformMotion([[0.02, 0.0, 0.5]], [[0, 0, 0, 1.0]], ZERO, ZERO,
+                             np.array([[1.0, 0.0, 0.0]]), ZERO)
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.answer(message_of(turning))
+        assert node.wait_for_status(code='STALE')['level'] == 'STALE'
+
+
+@pytest.mark.parametrize('stamped', [False, True], ids=['no stamp', 'stamp of this day'])
+def test_without_the_clock_of_a_simulation_commands_go_stale_and_the_status_warns(
+    stamped: bool,
+) -> None:
+    moving = random_motion(np.random.default_rng(4), 3)
+    stamp = conversions.time(1_800_000_000_000_000_000) if stamped else None
+    with feedforward_bench(command_timeout=TIMEOUT, use_sim_time=True) as node:
+        warned = node.wait_for_status(code='CLOCK')
+        assert warned['level'] == 'WARN'
+        assert '/clock' in warned['message']
+        node.answer(message_of(moving, stamp))
+        assert node.wait_for_status(code='STALE')['counters']['stale'] == 1
+        assert node.bench.spin_until(lambda: len(node.commands) == 2)
+        np.testing.assert_allclose(node.commands[-1].data, held(moving), rtol=0, atol=EQUAL)
+
+
+def test_the_warning_goes_when_the_clock_comes() -> None:
+    with feedforward_bench(use_sim_time=True) as node:
+        node.wait_for_status(code='CLOCK')
+        clock = node.bench.probe.create_publisher(Clock, '/clock', 10)
+        timer = node.bench.probe.create_timer(
+            0.05, lambda: clock.publish(Clock(clock=conversions.time(5_000_000_000))))
+        assert node.wait_for_status(code='WAITING')['level'] == 'OK'
+        timer.cancel()
