@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.system.input_files import require_file
 
 LARGEST = 300_000  # bytes: sixty times the paper's robot, or a ledger of dozens of steps
 DEEPEST = 20  # /** and ros__parameters included, a model file has 7
@@ -36,6 +37,7 @@ def read_text(path: str | PathLike[str]) -> str:
     UnreadableFileError
         Where it cannot be read, is not text or YAML, or is out of bounds.
     """
+    require_file(path)
     try:
         with Path(path).open('rb') as file:
             content = file.read(LARGEST + 1)

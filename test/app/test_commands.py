@@ -15,9 +15,9 @@ import pytest
 import yaml
 from ros_processes import executable
 
-from pprs_dynamics.app.commands.output import write_text
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.physics.model.parameter_file import default_parameters
+from pprs_dynamics.system.output_files import write_text
 
 
 def pprs(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

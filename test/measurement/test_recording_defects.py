@@ -29,8 +29,9 @@ from made_up_recordings import (
 )
 
 from pprs_dynamics.errors import MotionError
+from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
-from pprs_dynamics.measurement.files.samples import POLICY
+from pprs_dynamics.measurement.files.samples import POLICY, Samples
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 
@@ -264,6 +265,51 @@ def test_efforts_that_are_not_finite_count_as_not_measured() -> None:
     assert np.isinf(arrays['effort']).sum() == 26, 'the caller keeps his own array'
 
 
+@pytest.mark.parametrize('size', [1e308, -1e200, 1e13])
+def test_numbers_that_nothing_can_have_measured_are_no_measurements(size: float) -> None:
+    arrays = measured()
+    arrays['effort'][10:20, 2], arrays['velocity'][30, 1], arrays['position'][40, 0] = (
+        size, size, size)
+    recording = judged(arrays)
+    assert the_one(recording, 'impossible_effort').drives == ('slide_3',)
+    assert the_one(recording, 'impossible_effort').count == 10
+    assert the_one(recording, 'impossible_velocity').count == 1
+    dropped = the_one(recording, 'impossible_position')
+    assert 'which none can be, at 0.08 s; those samples are dropped' in dropped.text
+    assert np.isnan(recording.effort).sum() == 10
+    assert len(recording.time) == len(arrays['time']) - 1
+    assert np.nanmax(np.abs(recording.effort)) < 1e3
+
+
+def test_a_recording_without_any_effort_says_what_that_means() -> None:
+    recording = judged({**measured(), 'effort': None})
+    assert 'compare, diagnose, fit and adopt need them' in the_one(recording, 'no_effort').text
+    assert 'effort_not_measured' not in kinds(recording)
+
+
+def test_efforts_at_the_limit_of_a_drive_are_left_out() -> None:
+    arrays = measured()
+    limit = 0.5 * float(np.abs(arrays['effort'][:, 1]).max())
+    beyond = np.abs(arrays['effort'][:, 1]) > limit
+    clipped = np.clip(arrays['effort'], -limit, limit)
+    noise = np.random.default_rng(0).normal(0.0, 1e-3 * limit, clipped.shape)
+    samples = Samples(DRIVES, arrays['time'], arrays['position'], arrays['velocity'],
+                      np.where(np.arange(6) == 1, clipped + noise, arrays['effort']),
+                      effort_limits=(np.inf, limit, *[np.inf] * 4))
+    judgement = Judgement(samples)
+    assert the_one(judgement, 'saturated_effort').drives == ('slide_2',)
+    assert np.isnan(judgement.samples.effort[beyond, 1]).all()
+    assert np.isfinite(judgement.samples.effort[:, [0, 2, 3, 4, 5]]).all()
+
+
+def test_a_drive_that_goes_beyond_a_limit_is_not_held_by_it() -> None:
+    arrays = measured()
+    limit = 0.9 * float(np.abs(arrays['effort'][:, 1]).max())
+    judgement = Judgement(Samples(DRIVES, arrays['time'], arrays['position'], None,
+                                  arrays['effort'].copy(), effort_limits=(limit,) * 6))
+    assert np.isfinite(judgement.samples.effort[:, 1]).all()
+
+
 def test_missing_velocities_are_told_per_drive() -> None:
     arrays = measured()
     arrays['velocity'][:, 1] = np.nan
@@ -310,7 +356,7 @@ def test_a_robot_at_rest_without_efforts_is_not_called_frozen() -> None:
     arrays = {**measured(), 'effort': None, 'velocity': None}
     arrays['position'][300:500] = arrays['position'][300]
     arrays['position'][500:] += arrays['position'][499] - arrays['position'][500]
-    assert kinds(judged(arrays)) == {'effort_not_measured', 'missing_velocity'}
+    assert kinds(judged(arrays)) == {'no_effort', 'missing_velocity'}
 
 
 def test_segments_too_short_to_filter_are_not_used() -> None:

@@ -93,7 +93,8 @@ def test_efforts_that_were_not_measured_and_absent_velocities_survive_a_round_tr
     recording = read_recording(path)
     assert_same(recording, arrays)
     assert kinds(recording) == {'effort_not_measured', 'missing_velocity'}
-    again = by_own_writer(suffix)(tmp_path / 'again' if suffix == '' else tmp_path, arrays)
+    (tmp_path / 'again').mkdir()
+    again = by_own_writer(suffix)(tmp_path / 'again', arrays)
     assert_same(read_recording(again), arrays)
 
 

@@ -30,7 +30,7 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
-from pprs_dynamics.system.atomic_file import write_text
+from pprs_dynamics.system.output_files import write_text
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 # Numbers whose shortest text is a trap: whole, tiny, huge, not representable, negative zero.
@@ -188,7 +188,7 @@ def test_the_model_itself_is_never_the_output(tmp_path: Path, link: str) -> None
 
 def write_in_process(file: Path, before: str, setup: Any = None) -> int:
     """Write a file in a process of its own in which something goes wrong."""
-    code = (f'{before}\nfrom pprs_dynamics.system.atomic_file import write_text\n'
+    code = (f'{before}\nfrom pprs_dynamics.system.output_files import write_text\n'
             f'write_text({str(file)!r}, "new " * 100_000)')
     return subprocess.run([sys.executable, '-c', code], capture_output=True,
                           preexec_fn=setup).returncode
@@ -230,5 +230,5 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableFileError, match='cannot be written: No such file'):
+    with pytest.raises(UnreadableFileError, match='cannot be written: its folder does not exist'):
         write_text(tmp_path / 'nowhere' / 'new.yaml', 'text')

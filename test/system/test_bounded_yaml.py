@@ -75,9 +75,13 @@ def test_numbers_within_bounds_that_are_none_are_one_sentence(
     assert len(done.stderr) < 400
 
 
-def test_a_file_without_end_is_not_read_to_its_end() -> None:
-    with pytest.raises(UnreadableFileError, match='larger than'):
+def test_a_file_without_end_is_not_read_to_its_end(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableFileError, match='it is a device, must be a file'):
         DriveModel.load('/dev/zero')
+    with (tmp_path / 'model.yaml').open('wb') as file:
+        file.truncate(1 << 40)
+    with pytest.raises(UnreadableFileError, match='larger than'):
+        DriveModel.load(tmp_path / 'model.yaml')
 
 
 def test_text_with_the_tag_of_a_string_is_what_ros_reads(tmp_path: Path) -> None:

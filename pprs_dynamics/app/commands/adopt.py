@@ -23,11 +23,12 @@ from pprs_dynamics.app.report.adoption_tables import adoption_view
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, check_output
+from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.physics.model.parameter_file import find_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    base = check_output(options.output, options.model)
+    base = find_file(options.model)
     model = load_model(base)
     request = EffectRequest.of(options.effect, model.drives)
     request.require_place(model)

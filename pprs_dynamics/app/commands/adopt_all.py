@@ -15,12 +15,13 @@ from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.report.adoption_tables import adoption_view, headline
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import shown
-from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, check_output
+from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
 from pprs_dynamics.inference.adoption.loop import REFUSED, adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.physics.model.parameter_file import find_file
 
 
 def adopt_what_was_found(
@@ -32,7 +33,7 @@ def adopt_what_was_found(
     With nothing to adopt the file is written as it was; with a refusal, what was adopted before
     it, if anything.
     """
-    base = check_output(options.output, options.model)
+    base = find_file(options.model)
     book = LedgerBook.of(dict(zip(options.recordings, recordings, strict=True)),
                          dict(zip(options.validate, validate, strict=True)))
     with staged_bar(screen) as advance:

@@ -7,14 +7,23 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.system.numbers import parse_number, parse_whole
+from pprs_dynamics.system.output_files import writable_file
+from pprs_dynamics.system.plain_text import displayed
 
 JSON, PAGE, MODEL, POSES = ('.json',), ('.html',), ('.yaml', '.yml'), ('.csv',)
 RECORDING = ('.csv', '.mcap', '.db3', '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
-MOST_DIGITS = 30  # of a whole number; Python refuses to read those of thousands
-
+MOST_SHOWN = 30  # characters of what is no number
+# Options that name files, by what is done with them.
+OUTPUTS = ('output', 'json', 'report')
+INPUTS = ('model', 'recordings', 'validate', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
 
@@ -32,22 +41,30 @@ def number(lower: float, upper: float, unit: str = '', above: bool = False,
 
     def read(text: str) -> float:
         try:
-            value = float(text)
+            value = parse_number(text)
         except ValueError:
             value = math.nan
         if not lower <= value <= upper or (above and value == lower):
-            raise argparse.ArgumentTypeError(f'{text[:MOST_DIGITS]!r} {rule}')
+            raise argparse.ArgumentTypeError(f'{text[:MOST_SHOWN]!r} {rule}')
         return value
     return read
 
 
-def seed(text: str) -> int:
-    """Read the seed of random numbers."""
-    if not (text.isascii() and text.isdecimal() and len(text) <= MOST_DIGITS
-            and int(text) <= LARGEST_SEED):
-        raise argparse.ArgumentTypeError(
-            f'{text[:MOST_DIGITS]!r} must be a whole number from 0 to {LARGEST_SEED}')
-    return int(text)
+def whole(lower: int, upper: int) -> Callable[[str], int]:
+    """Return a reader of whole numbers from `lower` to `upper`."""
+    def read(text: str) -> int:
+        try:
+            value = parse_whole(text)
+        except ValueError:
+            value = -1
+        if not lower <= value <= upper:
+            raise argparse.ArgumentTypeError(
+                f'{text[:MOST_SHOWN]!r} must be a whole number from {lower} to {upper}')
+        return value
+    return read
+
+
+seed = whole(0, LARGEST_SEED)
 
 
 def output_file(*endings: str) -> Callable[[str], str]:
@@ -63,14 +80,77 @@ def output_file(*endings: str) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         path = Path(text)
-        if path.suffix not in endings and not path.is_dir():
-            raise argparse.ArgumentTypeError(f'{text!r} must end in {known}')
-        if path.is_dir() or (not path.suffix and path.exists()):
-            raise argparse.ArgumentTypeError(f'{text}: cannot be written: ' + (
-                'it exists already, and bags are never overwritten' if '' in endings
-                else 'it is a folder'))
-        if not path.absolute().parent.is_dir():
-            raise argparse.ArgumentTypeError(
-                f'{text}: cannot be written: its folder does not exist')
+        if path.suffix not in endings:
+            raise argparse.ArgumentTypeError(f'{displayed(text)!r} must end in {known}')
+        try:
+            if not path.suffix and os.path.lexists(path):
+                raise UnreadableFileError(
+                    path, 'it exists already, and bags are never overwritten')
+            writable_file(path)
+        except UnreadableFileError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
         return text
     return read
+
+
+def output_folder(text: str) -> str:
+    """Read the name of a folder to write to, which may exist; not its address elsewhere."""
+    path = Path(text)
+    if '://' not in text and os.path.lexists(path) and not path.is_dir():
+        raise argparse.ArgumentTypeError(f'{displayed(text)}: is no folder, must be one')
+    return text
+
+
+def check_files(options: argparse.Namespace) -> None:
+    """Refuse outputs that are an input, or each other, through links too, before anything runs.
+
+    Raises
+    ------
+    UnreadableFileError
+    """
+    inputs = {(option, name) for option, value in vars(options).items() if option in INPUTS
+              for name in _names(value)}
+    seen: list[tuple[str, Path | int]] = [('what the command prints', number)
+                                          for number in (1, 2)]
+    seen += [(_said(option), file) for option, name in inputs for file in _files(option, name)]
+    for option in OUTPUTS:
+        for name in _names(getattr(options, option, None)):
+            same = next((other for other, file in seen if _is_same(Path(name), file)), None)
+            if same is not None:
+                raise UnreadableFileError(
+                    name, f'it is --{option} and {same} at once, must be another file')
+            seen.append((f'--{option}', Path(name)))
+
+
+def _said(option: str) -> str:
+    return {'recordings': 'a recording', 'validate': 'a recording of --validate',
+            'file': 'the model', 'model': 'the model', 'store': 'the store'
+            }.get(option, f'--{option}')
+
+
+def _names(value: object) -> list[str]:
+    return [value] if isinstance(value, str) and value else list(value) if isinstance(
+        value, list) else []
+
+
+def _files(option: str, name: str) -> list[Path]:
+    """Return the files that an input is made of."""
+    path = Path(name)
+    if option in ('model', 'file'):
+        # Here, as --help needs no model.
+        from pprs_dynamics.physics.model.parameter_file import find_file
+
+        with suppress(UnreadableFileError):
+            path = find_file(name)
+    with suppress(OSError, ValueError):
+        if path.is_dir():
+            return [path, *(file for file in path.iterdir() if file.is_file())]
+    return [path] if os.path.lexists(path) else []
+
+
+def _is_same(output: Path, other: Path | int) -> bool:
+    """Return whether both are one file, existing or not; other may be an open one's number."""
+    try:
+        return os.path.samestat(os.stat(output), os.stat(other))
+    except (OSError, ValueError):
+        return isinstance(other, Path) and os.path.realpath(output) == os.path.realpath(other)

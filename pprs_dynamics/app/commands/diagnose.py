@@ -27,7 +27,6 @@ from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.adoption.ledger_entry import check_output
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 from pprs_dynamics.inference.diagnosis.rivals import rival_effects
@@ -88,5 +87,3 @@ def _check(options: argparse.Namespace) -> None:
     if options.output and not options.adopt_all:
         raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '
                            'it then; --json and --report write the answer')
-    if options.adopt_all:
-        check_output(options.output, options.model)

@@ -21,7 +21,6 @@ from pprs_dynamics.app.report.fit_page import fit_page
 from pprs_dynamics.app.report.fit_tables import fit_table, numbers_table
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.inference.adoption.ledger_entry import check_output
 from pprs_dynamics.inference.fit.base_fit import fit_base
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
@@ -41,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
-    check_output(options.output, options.model)
     screen = console()
     model = load_model(options.model)
     recordings = read_recordings(options, screen, model)

@@ -16,11 +16,11 @@ from pprs_dynamics.app.report.history_page import history_page
 from pprs_dynamics.app.report.history_tables import history_view
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.adoption.ledger_entry import check_output
 from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.physics.model.parameter_file import find_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     if options.undo != bool(options.output):
         raise ModelError('--output', options.output, 'be given with --undo, and only then')
     screen = console()
-    base = check_output(options.output, options.file) if options.undo else options.file
+    base = find_file(options.file)
     model = load_model(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
     if options.undo and not steps:

@@ -14,13 +14,12 @@ from rich.markup import escape
 
 from pprs_dynamics.app.commands.arguments import PAGE, POSES, number, output_file, seed
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, read_recordings, refuse_inputs
+from pprs_dynamics.app.commands.recordings import add_recordings, read_recordings
 from pprs_dynamics.app.report.experiment_page import experiment_page
 from pprs_dynamics.app.report.experiment_tables import experiment_view
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.inference.adoption.ledger_entry import check_output
 from pprs_dynamics.inference.experiments.arm_excitation import excite_arm
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
@@ -35,10 +34,11 @@ from pprs_dynamics.measurement.files.motion_files import write_motion
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_arm
-from pprs_dynamics.physics.model.parameter_file import read_parameters
+from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 
 RATE = 100.0  # [Hz], the default of play_trajectory
 FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
+LEAST_NOISE = 1e-6  # [N]; what is finer no sensor of forces resolves
 LIMITS = MotionLimits()
 PLAYED = 'positions, velocities and accelerations of its joints'
 
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--margin', type=number(0.0, 0.9), default=LIMITS.margin,
                         help='share of every limit, those of the model file included, that stays '
                         f'unused (default {LIMITS.margin:g})')
-    parser.add_argument('--noise', type=number(0.0, 1e3, 'N', above=True), default=0.05,
+    parser.add_argument('--noise', type=number(LEAST_NOISE, 1e3, 'N'), default=0.05,
                         help='of the efforts over 0.01 s, for --purpose commission without '
                         'recordings [N] (default 0.05)')
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     check_purpose(options.purpose, options.recordings)
-    base = check_output(options.output, options.model)
+    base = find_file(options.model)
     model: DriveModel | ArmModel
     limits: MotionLimits | ArmLimits
     if is_arm(read_parameters(base)):
@@ -93,7 +93,6 @@ def run(options: argparse.Namespace) -> int:
         model = DriveModel.load(base)
         limits = MotionLimits(options.velocity or LIMITS.velocity, options.acceleration,
                               options.tilt, options.condition, options.margin)
-    refuse_inputs(options.output, options.recordings)
     if isinstance(limits, ArmLimits) and options.purpose == 'commission':
         assert isinstance(model, ArmModel)
         return _excite_arm(options, model, limits, screen)

@@ -11,14 +11,20 @@ from __future__ import annotations
 import argparse
 import ast
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, output_file
+from pprs_dynamics.app.commands.arguments import (
+    DEFAULT_MODEL,
+    JSON,
+    check_files,
+    output_file,
+)
 from pprs_dynamics.app.commands.streams import lasting_output
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.plain_text import displayed
@@ -33,36 +39,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
     use_one_thread()
     given = sys.argv[1:] if arguments is None else list(arguments)
-    with lasting_output() as output:
-        try:
-            options = _parser(given).parse_args(given)
-        except KeyboardInterrupt:
-            # Importing a command takes long enough to be interrupted.
-            print('pprs: interrupted', file=sys.stderr)
-            return 130
-        status = _run(options)
+    with lasting_output() as output, warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        status = _ended(given)
     if output.error is None or isinstance(output.error, BrokenPipeError):
         # A reader of our output that went away, e.g. `head`, had enough of it.
         return status
-    print(f'pprs {options.command}: output: {output.error.strerror}', file=sys.stderr)
+    _say(f'output: {output.error.strerror or output.error}', given)
     return 2
 
 
-def _run(options: argparse.Namespace) -> int:
+def _ended(given: Sequence[str]) -> int:
+    """Run the command; what ends it early is one sentence."""
     try:
+        # Importing a command takes long enough to be interrupted.
+        options = _parser(given).parse_args(given)
+        check_files(options)
         status: int = _module(options.command).run(options)
     except PprsError as error:
-        print(f'pprs {options.command}: {error}', file=sys.stderr)
+        _say(str(error), given)
         return 2
     except KeyboardInterrupt:
-        print(f'pprs {options.command}: interrupted', file=sys.stderr)
+        _say('interrupted', given)
         return 130
+    except MemoryError:
+        _say('there is not enough memory for this', given)
+        return 2
     except OSError as error:
         # A full disk, a folder without permission: the name and the system's own reason.
-        print(f'pprs {options.command}: {displayed(error.filename or "output")}: '
-              f'{error.strerror}', file=sys.stderr)
+        name = f'{displayed(error.filename)}: ' if error.filename else ''
+        _say(f'{name}{error.strerror or str(error) or type(error).__name__}', given)
         return 2
     return status
+
+
+def _say(sentence: str, given: Sequence[str]) -> None:
+    command = next((f' {word}' for word in given if word in COMMANDS), '')
+    print(f'pprs{command}: {sentence}', file=sys.stderr)
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """Say a library's warning in one line, without the place in our code where it arose."""
+    print(f'pprs: warning: {" ".join(str(message).split())}', file=sys.stderr)
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -71,6 +89,12 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
         self.exit(2, f'{self.prog}: {message}\n')
+
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        """Return the value of an argument; of `--model=--` argparse itself makes an empty list."""
+        if action.option_strings and arg_strings == ['--']:
+            raise argparse.ArgumentError(action, 'expected one argument')
+        return super()._get_values(action, arg_strings)
 
 
 def _module(command: str) -> ModuleType:

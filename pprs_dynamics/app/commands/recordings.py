@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.app.report.progress import progress_bar
@@ -79,14 +78,6 @@ def read_each(paths: Sequence[str], options: argparse.Namespace, screen: Any, mo
             mistakes = find_mistakes(model, recording)
             recordings.append(replace(recording, findings=(*mistakes, *recording.findings)))
     return recordings
-
-
-def refuse_inputs(output: str, inputs: Sequence[str]) -> None:
-    """Raise UnreadableFileError where a file would be written over one that is read."""
-    for path in map(Path, inputs):
-        if path.exists() and Path(output).exists() and path.samefile(output):
-            raise UnreadableFileError(output, 'it is read, too, but what is written must be '
-                                      'another file')
 
 
 def _show_findings(paths: Sequence[str], recordings: Sequence[Recording], screen: Any,

@@ -13,13 +13,13 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-
+from pprs_dynamics.app.commands.arguments import output_folder
 from pprs_dynamics.app.commands.output import make_folder, write_json
 from pprs_dynamics.app.report.figures import draw_figure_8, draw_figure_9
 from pprs_dynamics.app.report.tables import claims_table
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.measurement.files.csv_tables import write_table
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.reproduction import Reproduction, reproduce
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
@@ -27,7 +27,7 @@ from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    parser.add_argument('--output', metavar='DIR', required=True,
+    parser.add_argument('--output', metavar='DIR', required=True, type=output_folder,
                         help='folder for figures, curves and claims')
 
 
@@ -59,6 +59,5 @@ def _write_curves(path: Path, result: Reproduction) -> Path:
                **result.passive}
     header = ['time'] + [f'{drive}/{name}' for name in columns if name != 'time'
                          for drive in DRIVES]
-    np.savetxt(path, np.column_stack(list(columns.values())), fmt='%.9g', delimiter=',',
-               header=','.join(header), comments='')
+    write_table(path, header, list(columns.values()))
     return path

@@ -16,7 +16,6 @@ import numpy as np
 
 from pprs_dynamics.app.commands.arguments import PAGE, RECORDING, number, output_file, seed
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import refuse_inputs
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.robot_view import write_robot_page
 from pprs_dynamics.app.report.terminal import console, shown
@@ -72,7 +71,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    refuse_inputs(options.output, (options.path,))
     if is_arm(read_parameters(find_file(options.model))):
         return _run_arm(options, screen)
     model = DriveModel.load(options.model)

@@ -8,13 +8,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import PAGE, output_file
+from pprs_dynamics.app.commands.arguments import PAGE, output_file, output_folder, whole
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
-from pprs_dynamics.app.fleet.manifest import entries, is_remote
+from pprs_dynamics.app.fleet.manifest import entries
 from pprs_dynamics.app.fleet.store import Store, arrow
 from pprs_dynamics.app.fleet.survey import AUTO, Job, requests_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
@@ -36,21 +35,13 @@ class SurveyError(PprsError, ValueError):
     """Arguments that do not go together."""
 
 
-def _workers(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) < 6
-            and 1 <= int(text) <= MOST_WORKERS):
-        raise argparse.ArgumentTypeError(
-            f'{text[:30]!r} must be a whole number from 1 to {MOST_WORKERS}')
-    return int(text)
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
                         help='recordings, folders of them, globs, or addresses such as s3://…')
     parser.add_argument('--manifest', metavar='FILE.csv', help='columns path, robot, time and '
                         'optionally model; further columns are conditions')
-    parser.add_argument('--output', metavar='STORE', required=True,
+    parser.add_argument('--output', metavar='STORE', required=True, type=output_folder,
                         help='folder of Parquet files; what is in it already is not done again')
     parser.add_argument('--effects', metavar='auto|NAME,…', default=AUTO,
                         help='auto: diagnose each recording; else these effects are fitted, many '
@@ -58,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
                         'holds several')
     where = parser.add_mutually_exclusive_group()
-    where.add_argument('--workers', metavar='N', type=_workers,
+    where.add_argument('--workers', metavar='N', type=whole(1, MOST_WORKERS),
                        help='processes on this machine (default: one for every core)')
     where.add_argument('--scheduler', metavar='tcp://HOST:PORT',
                        help='use a running Dask cluster')
@@ -123,9 +114,6 @@ def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[Job], total: i
 def _check(options: argparse.Namespace) -> None:
     if not options.recordings and not options.manifest:
         raise SurveyError('no recording is given, must be RECORDING… or --manifest')
-    path = Path(options.output)
-    if not is_remote(options.output) and path.exists() and not path.is_dir():
-        raise SurveyError(f'--output {options.output}: is a file, must be a folder')
 
 
 def _model(path: str) -> tuple[ForceModel, str]:

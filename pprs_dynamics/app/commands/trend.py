@@ -16,6 +16,7 @@ from pprs_dynamics.app.fleet.words import sentences, to_dict
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.numbers import parse_number
 
 
 class TrendError(PprsError, ValueError):
@@ -25,7 +26,7 @@ class TrendError(PprsError, ValueError):
 def _limit(text: str) -> tuple[str, float]:
     name, _, number = text.partition('=')
     try:
-        value = float(number)
+        value = parse_number(number)
     except ValueError:
         value = math.nan
     if not name or not math.isfinite(value):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import re
 
-from pprs_dynamics.app.commands.arguments import number
+from pprs_dynamics.app.commands.arguments import whole
 from pprs_dynamics.app.workbench.reading import Files
 from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                             help=f'name of the node that --live speaks to (default {node})')
     parser.add_argument('--namespace', metavar='NAME', type=_ros_name, default='/',
                         help='in which --live looks for topic and nodes')
-    parser.add_argument('--port', type=number(0, 65535), default=0.0,
+    parser.add_argument('--port', type=whole(0, 65535), default=0,
                         help='to listen on (default: any that is free)')
     parser.add_argument('--host', type=_one_address, default=HOST,
                         help=f'to listen on (default {HOST}: nobody else on the network sees it)')
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     live = _live(options, files.model) if options.live else None
     hub = Hub(begin, files.model, options.model, Folders.of(options.recordings),
               Surveys.of(options.recordings), live)
-    serve(hub, options.host, int(options.port), not options.no_browser)
+    serve(hub, options.host, options.port, not options.no_browser)
     return 0
 
 

@@ -16,6 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.reproduction import Reproduction
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.system.output_files import new_file
 
 # Colours that stay apart in grey print and for colour-blind readers (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY = (
@@ -135,6 +136,7 @@ def finish(axis: Any) -> None:
 def save(pyplot: Any, figure: Any, path: str | PathLike[str]) -> Path:
     """Write a picture and close it."""
     file = Path(path)
-    figure.savefig(file, dpi=110)
+    with new_file(file) as content:
+        figure.savefig(content, dpi=110, format='png')
     pyplot.close(figure)
     return file

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
-from pprs_dynamics.system.atomic_file import write_text
+from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import PLAIN
 
 HEIGHT = 320  # [px], of figures that say none

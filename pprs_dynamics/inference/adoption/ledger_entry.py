@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from os import PathLike
-from pathlib import Path
 
 from pprs_dynamics import __version__
 from pprs_dynamics.inference.adoption.adopt import Adoption
@@ -20,8 +19,6 @@ from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step, with_step
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.model_writer import refuse_same_file
-from pprs_dynamics.physics.model.parameter_file import find_file
 
 
 @dataclass(frozen=True)
@@ -96,19 +93,6 @@ class LedgerBook:
             calibrated=tuple(one.label for one in adoption.calibrated), rivals=adoption.rivals,
             objections=adoption.objections, forced=adoption.forced,
             date=datetime.now(UTC).isoformat(timespec='seconds'), version=__version__)
-
-
-def check_output(output: str | PathLike[str], model: str | PathLike[str]) -> Path:
-    """Return the model file that an output is to be made from, before minutes are spent on it.
-
-    Raises
-    ------
-    ModelError
-        Where the output is the model itself.
-    """
-    base = find_file(model)
-    refuse_same_file(output, base)
-    return base
 
 
 def _rounded(value: float, digits: int = 6) -> float:

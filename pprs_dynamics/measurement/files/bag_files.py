@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
@@ -25,6 +24,8 @@ from pprs_dynamics.measurement.files.samples import (
     counted,
     whole_epoch,
 )
+from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.output_files import new_folder, scratch_folder, writable_file
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -41,6 +42,7 @@ BLOCK = 8192
 
 def storage_suffix(path: Path) -> str | None:
     """Return '.mcap' or '.db3' by a file's first bytes, None for anything else."""
+    require_file(path)
     with path.open('rb') as file:
         start = file.read(16)
     return next((suffix for magic, suffix in MAGIC.items() if start.startswith(magic)), None)
@@ -107,17 +109,14 @@ def write_bag(path: Path, samples: Samples, topic: str) -> None:
             path, f'cannot be written: ROS stamps run from 0 to {2**31} s, but the time is '
             f'{samples.epoch + samples.time.min():.6g} to '
             f'{samples.epoch + samples.time.max():.6g} s')
-    suffix = path.suffix if path.suffix in STORAGE else ''
-    try:
-        if not suffix:
-            _write_directory(path, samples, stamps, topic, '.mcap')
-            return
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix='.pprs_') as folder:
-            _write_directory(Path(folder) / 'bag', samples, stamps, topic, suffix)
-            (Path(folder) / 'bag' / f'bag{suffix}').replace(path)
-    except OSError as error:
-        raise UnreadableFileError(
-            path, f'cannot be written: {error.strerror or error}') from None
+    if path.suffix not in STORAGE:
+        with new_folder(path) as folder:
+            _write_directory(folder, samples, stamps, topic, '.mcap')
+        return
+    target = writable_file(path)
+    with scratch_folder(target) as scratch:
+        _write_directory(scratch / 'bag', samples, stamps, topic, path.suffix)
+        (scratch / 'bag' / f'bag{path.suffix}').replace(target)
 
 
 def _write_directory(
@@ -127,8 +126,6 @@ def _write_directory(
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
-    if path.exists():
-        raise UnreadableFileError(path, 'exists already, and bags are never overwritten')
     # A bag is read in the order of recording: it must not follow a clock that is set back.
     recorded = np.maximum.accumulate(stamps)
     with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
@@ -170,7 +167,10 @@ def _storage_of(path: Path) -> tuple[Path, list[Finding]]:
 
 def _check_lengths(path: Path, storage: Path) -> None:
     """Refuse databases shorter than they say: SQLite itself reads zeros where they end."""
-    for file in storage.glob('*.db3') if storage.is_dir() else [storage]:
+    for file in storage.iterdir() if storage.is_dir() else [storage]:
+        if file.is_dir():
+            continue
+        require_file(file)
         with file.open('rb') as data:
             head = data.read(32)
         if head.startswith(b'SQLite format 3') and len(head) == 32:

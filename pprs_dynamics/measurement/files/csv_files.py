@@ -11,7 +11,6 @@ pandas 1 s (a dependency), loadtxt 6 s, float() of each cell 12 s.
 
 from __future__ import annotations
 
-import csv
 import gzip
 import re
 import zlib
@@ -25,6 +24,13 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.files.csv_tables import (
+    LONGEST_LINE,
+    cells_of,
+    check_length,
+    read_lines,
+    write_table,
+)
 from pprs_dynamics.measurement.files.samples import (
     Finding,
     Progress,
@@ -32,16 +38,13 @@ from pprs_dynamics.measurement.files.samples import (
     counted,
     whole_epoch,
 )
+from pprs_dynamics.system.numbers import parse_number
 
 QUANTITIES = ('position', 'velocity', 'effort')
 CURRENT = 'current'
 # The second is what PlotJuggler writes.
 TIME_COLUMNS = ('time', '__time')
 SEPARATORS = (',', ';', '\t')
-# Characters read at a time.
-BLOCK = 4 << 20
-# A header longer than this is no header.
-LONGEST_HEADER = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -74,9 +77,10 @@ def read_csv(
         size = path.stat().st_size
         with (path.open('rb') as raw, _unpacked(path, raw) as content,
               TextIOWrapper(content, encoding='utf-8-sig') as file):
-            first = file.readline(LONGEST_HEADER)
+            first = file.readline(LONGEST_LINE + 1)
             if not first:
                 raise UnreadableFileError(path, 'the file is empty')
+            check_length(path, 1, first)
             table, prefix, columns = _columns(path, first, drives, topic)
             blocks = []
             for block in _blocks(path, file, table):
@@ -110,18 +114,7 @@ def write_csv(path: Path, samples: Samples) -> None:
         QUANTITIES, (samples.position, samples.velocity, samples.effort), strict=True)
         if values is not None]
     header = ['time', *(f'{drive}/{name}' for name, _ in quantities for drive in samples.drives)]
-    try:
-        with path.open('w', encoding='utf-8', newline='') as file:
-            csv.writer(file, lineterminator='\n').writerow(header)
-            for start in range(0, len(samples.time), 10_000):
-                part = slice(start, start + 10_000)
-                rows = np.column_stack(
-                    [samples.time[part], *(values[part] for _, values in quantities)]).tolist()
-                text = '\n'.join([','.join(map(repr, row)) for row in rows])
-                file.write(text.replace('nan', '') + '\n')
-    except OSError as error:
-        raise UnreadableFileError(
-            path, f'cannot be written: {error.strerror or error}') from None
+    write_table(path, header, [samples.time, *(values for _, values in quantities)])
 
 
 def _columns(
@@ -130,7 +123,8 @@ def _columns(
     """Return the table, the prefix, and the column of each (drive, quantity)."""
     if '\x00' in first:
         raise UnreadableFileError(path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8')
-    headers = {separator: [cell.strip() for cell in next(csv.reader([first], delimiter=separator))]
+    first = first.rstrip('\n')
+    headers = {separator: [cell.strip() for cell in cells_of(path, 1, first, separator)]
                for separator in SEPARATORS}
     separator = max(SEPARATORS, key=lambda s: len(headers[s]))
     header = headers[separator]
@@ -190,12 +184,8 @@ def _prefix(
 
 def _blocks(path: Path, file: TextIO, table: _Table) -> Iterator[Array]:
     """Yield the used columns of the rows below the header, (n, columns used)."""
-    line = 2
-    while lines := file.readlines(BLOCK):
-        numbered = list(enumerate(lines, start=line))
-        line += len(lines)
-        if any(not text.strip() for text in lines):
-            numbered = [(number, text) for number, text in numbered if text.strip()]
+    for start, lines in read_lines(path, file, start=2):
+        numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
         if numbered:
             _check_widths(path, numbered, table)
             yield _numbers(path, numbered, table)
@@ -203,26 +193,35 @@ def _blocks(path: Path, file: TextIO, table: _Table) -> Iterator[Array]:
 
 def _check_widths(path: Path, numbered: list[tuple[int, str]], table: _Table) -> None:
     width, separator = len(table.header), table.separator
-    for number, text in numbered:
-        if text.count(separator) != width - 1:
-            cells = _cells(text, separator)
-            if len(cells) != width:
-                raise UnreadableFileError(
-                    path, f'row {number} holds {counted(len(cells), "cell")}, but the header '
-                    f'{width}: it is truncated or not a table')
+    for number, line in numbered:
+        if line.count(separator) != width - 1:
+            _checked_cells(path, number, line, table)
 
 
 def _numbers(path: Path, numbered: list[tuple[int, str]], table: _Table) -> Array:
     separator = table.separator
-    text = _with_empty_cells_named('\n' + ''.join([line for _, line in numbered]), separator)
+    text = _with_empty_cells_named('\n' + '\n'.join([line for _, line in numbered]), separator)
     try:
-        return np.loadtxt(text[1:].splitlines(), delimiter=separator, usecols=table.used,
+        rows = np.loadtxt(text[1:].split('\n'), delimiter=separator, usecols=table.used,
                           comments=None, ndmin=2, quotechar='"')
+        if len(rows) == len(numbered):
+            return rows
     except ValueError:
-        # Slow, and seldom: to name the cell, or to read cells of blanks.
-        rows = [(number, _cells(line, separator)) for number, line in numbered]
-        return np.array([[_number(path, number, cells, column, table) for column in table.used]
-                         for number, cells in rows])
+        pass
+    # Slow, and seldom: to name the row or the cell, or to read cells of blanks.
+    return np.array([
+        [_number(path, number, cells, column, table) for column in table.used]
+        for number, line in numbered
+        for cells in [_checked_cells(path, number, line, table)]])
+
+
+def _checked_cells(path: Path, number: int, line: str, table: _Table) -> list[str]:
+    cells = cells_of(path, number, line, table.separator)
+    if len(cells) == len(table.header):
+        return cells
+    raise UnreadableFileError(
+        path, f'row {number} holds {counted(len(cells), "cell")}, but the header '
+        f'{len(table.header)}: it is truncated or not a table')
 
 
 def _with_empty_cells_named(text: str, separator: str) -> str:
@@ -231,7 +230,7 @@ def _with_empty_cells_named(text: str, separator: str) -> str:
     if '\n' + separator in text:
         text = text.replace('\n' + separator, '\nnan' + separator)
     if separator + '\n' in text or text.endswith(separator):
-        text = (text + '\n').replace(separator + '\n', separator + 'nan\n')
+        text = (text + '\n').replace(separator + '\n', separator + 'nan\n')[:-1]
     if separator * 2 in text:
         # Twice: of three separators in a row the first replacement sees only one pair.
         for _ in range(2):
@@ -244,16 +243,12 @@ def _number(
 ) -> float:
     cell = cells[column].strip()
     try:
-        return float(cell) if cell else float('nan')
+        return parse_number(cell) if cell else float('nan')
     except ValueError:
         comma = ' (a decimal comma is not read)' if re.fullmatch(r'[-+\d]+,\d+', cell) else ''
         raise UnreadableFileError(
             path, f'row {line}, column {table.header[column]} must hold a number, but holds '
             f'{cell[:40]!r}{comma}') from None
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return next(csv.reader([line], delimiter=separator))
 
 
 def _samples(

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from pprs_dynamics.measurement.files import signals, stamps
 from pprs_dynamics.measurement.files.samples import (
+    AT_LIMIT,
+    BEYOND_LIMIT,
+    LARGEST_MEASURED,
     MOST_SPANS,
     Finding,
     Indices,
@@ -52,6 +55,7 @@ class Judgement:
         self.findings = list(samples.findings)
         self.segments: tuple[slice, ...] = ()
         self._starts: Indices = np.zeros(1, dtype=np.int64)
+        self._mark_impossible()
         self._drop_non_finite()
         if not len(self.samples.time):
             return
@@ -84,6 +88,28 @@ class Judgement:
 
     def _split(self, firsts: Indices) -> None:
         self._starts = np.union1d(self._starts, firsts.astype(np.int64))
+
+    def _mark_impossible(self) -> None:
+        """Take numbers that nothing can have measured for such that were not."""
+        samples = self.samples
+        for quantity, unit, values in (('position', 'm', samples.position),
+                                       ('velocity', 'm/s', samples.velocity),
+                                       ('effort', 'N', samples.effort)):
+            if values is None:
+                continue
+            bad = np.isfinite(values) & (np.abs(values) > LARGEST_MEASURED)
+            if not np.any(bad):
+                continue
+            largest = float(np.abs(values[bad]).max())
+            drives = self._named(np.any(bad, axis=0))
+            values[bad] = np.nan
+            rows = np.any(bad, axis=1)
+            article = 'an' if quantity == 'effort' else 'a'
+            unit = samples.unit_of(int(np.argmax(np.any(bad, axis=0))), unit)
+            self._tell(f'impossible_{quantity}', int(rows.sum()),
+                       f'{counted(int(rows.sum()), "sample")} with {article} {quantity} of '
+                       f'{", ".join(drives)} up to {largest:.3g} {unit}, which none can be,',
+                       _places(rows & np.isfinite(samples.time)), drives)
 
     def _drop_non_finite(self) -> None:
         bad_time = ~np.isfinite(self.samples.time)
@@ -188,7 +214,11 @@ class Judgement:
         infinite = np.isinf(effort)
         if np.any(infinite):
             effort[infinite] = np.nan
-        self._tell_missing('effort_not_measured', effort, 'effort')
+        if np.isnan(effort).all():
+            self._tell('no_effort', len(effort), 'there is no effort of any drive')
+        else:
+            self._tell_missing('effort_not_measured', effort, 'effort')
+            self._leave_out_saturated()
         velocity = self.samples.velocity
         if velocity is None:
             self._tell('missing_velocity', len(effort), 'no velocities are recorded')
@@ -197,6 +227,22 @@ class Judgement:
         if np.any(infinite):
             velocity[infinite] = np.nan
         self._tell_missing('missing_velocity', velocity, 'velocity')
+
+    def _leave_out_saturated(self) -> None:
+        """Take out efforts at the limit of a drive, which say only that it is there."""
+        effort, samples = self.samples.effort, self.samples
+        for drive, limit in enumerate(samples.effort_limits):
+            size = np.abs(effort[:, drive])
+            at_limit = size >= AT_LIMIT * limit
+            if not np.any(at_limit) or np.nanmax(size) > BEYOND_LIMIT * limit:
+                continue
+            name, count = samples.drives[drive], int(at_limit.sum())
+            self._tell('saturated_effort', count,
+                       f'the effort of {name} is at its limit of {limit:.6g} '
+                       f'{samples.unit_of(drive, "N")} in {100 * count / len(size):.3g} % of the '
+                       'samples',
+                       _places(at_limit), [name])
+            effort[at_limit, drive] = np.nan
 
     def _tell_missing(self, kind: str, values: NDArray[np.float64], quantity: str) -> None:
         missing = np.isnan(values)

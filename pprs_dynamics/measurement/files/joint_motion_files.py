@@ -8,14 +8,12 @@ The columns are `<joint>/position`, `<joint>/velocity`, `<joint>/acceleration`.
 
 from __future__ import annotations
 
-import csv
-import io
 from os import PathLike
 
 import numpy as np
 
+from pprs_dynamics.measurement.files.csv_tables import write_table
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.system.atomic_file import write_text
 
 QUANTITIES = ('position', 'velocity', 'acceleration')
 
@@ -30,10 +28,6 @@ def write_joint_motion(path: str | PathLike[str], joints: tuple[str, ...], motio
         Where it cannot be written.
     """
     assert motion.time is not None
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(['time', *(f'{joint}/{name}' for joint in joints for name in QUANTITIES)])
+    header = ['time', *(f'{joint}/{name}' for joint in joints for name in QUANTITIES)]
     table = np.stack([getattr(motion, name) for name in QUANTITIES], axis=-1)
-    rows = np.column_stack((motion.time, table.reshape(len(motion), -1)))
-    writer.writerows([repr(value) for value in row] for row in rows.tolist())
-    write_text(path, text.getvalue())
+    write_table(path, header, [motion.time, table.reshape(len(motion), -1)])

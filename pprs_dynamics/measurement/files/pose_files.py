@@ -9,14 +9,14 @@ and angular acceleration of o in `base`. Without them a spline through the poses
 
 from __future__ import annotations
 
-import csv
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
 from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.measurement.files.csv_tables import read_rows, write_table
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.system.numbers import parse_number
 
 POSE_COLUMNS = ('time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 TWIST_COLUMNS = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz', 'ax', 'ay', 'az', 'alx', 'aly', 'alz')
@@ -39,26 +39,19 @@ def read_poses(path: str | PathLike[str], rate: float | None = None) -> Platform
     MotionError
         Where the poses are no motion: non-finite, off unit length, times not increasing.
     """
-    try:
-        with Path(path).open(encoding='utf-8-sig', newline='') as file:
-            rows = list(csv.reader(file))
-    except OSError as error:
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
-    except (UnicodeDecodeError, csv.Error):
-        raise UnreadableFileError(path, 'not a CSV text file') from None
-    rows = [row for row in rows if any(cell.strip() for cell in row)]
-    header = [cell.strip() for cell in rows[0]] if rows else []
+    rows = [(line, row) for line, row in read_rows(path) if any(cell.strip() for cell in row)]
+    header = [cell.strip() for cell in rows[0][1]] if rows else []
     columns = _columns(path, header)
+    if len(rows) == 1:
+        raise UnreadableFileError(path, 'no poses below the header')
     numbers = np.empty((len(rows) - 1, len(header)))
-    for line, row in enumerate(rows[1:], start=2):
+    for sample, (line, row) in enumerate(rows[1:]):
         try:
-            numbers[line - 2] = [float(cell) for cell in row]
+            numbers[sample] = [parse_number(cell) for cell in row]
         except ValueError:
             raise UnreadableFileError(
                 path, f'row {line} must hold {len(header)} numbers, but is {",".join(row)[:80]!r}',
             ) from None
-    if not len(numbers):
-        raise UnreadableFileError(path, 'no poses below the header')
 
     def take(*names: str) -> np.ndarray:
         return numbers[:, [header.index(name) for name in names]]
@@ -88,13 +81,7 @@ def write_poses(path: str | PathLike[str], motion: PlatformMotion) -> None:
     table = np.column_stack((
         motion.time, motion.position, motion.orientation, motion.linear_velocity,
         motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
-    try:
-        with Path(path).open('w', encoding='utf-8', newline='') as file:
-            writer = csv.writer(file)
-            writer.writerow(POSE_COLUMNS + TWIST_COLUMNS)
-            writer.writerows(table.tolist())
-    except OSError as error:
-        raise UnreadableFileError(path, f'cannot be written: {error.strerror}') from None
+    write_table(path, POSE_COLUMNS + TWIST_COLUMNS, [table])
 
 
 def _columns(path: object, header: list[str]) -> tuple[str, ...]:

@@ -188,6 +188,7 @@ def read_recording(
     path: str | PathLike[str], drives: tuple[str, ...] = DRIVES, topic: str | None = None,
     progress: Progress | None = None, gain: Sequence[float] | None = None,
     in_amperes: bool = False, units: tuple[DriveUnits, ...] = (),
+    effort_limits: Sequence[float] = (),
 ) -> Recording:
     """Read a rosbag2 directory, a bare .mcap or .db3 file, or a CSV: the content decides.
 
@@ -206,6 +207,8 @@ def read_recording(
         Whether efforts are currents, too; columns named `current` always are.
     units : tuple of DriveUnits, optional
         For what is found wrong; of drives that push by default.
+    effort_limits : (D,) sequence, optional
+        Largest absolute efforts that the drives can apply: what is there is left out.
 
     Raises
     ------
@@ -228,7 +231,8 @@ def read_recording(
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     samples, applied = _as_efforts(path, samples, gain, in_amperes)
-    recording = replace(_judged(displayed(path.name), replace(samples, units=units)), gain=applied)
+    recording = replace(_judged(displayed(path.name), replace(
+        samples, units=units, effort_limits=tuple(effort_limits))), gain=applied)
     if not len(recording.time):
         raise UnreadableFileError(
             path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '
@@ -240,7 +244,8 @@ def read_for(model: ForceModel, path: str | PathLike[str], topic: str | None = N
              progress: Progress | None = None) -> Recording:
     """Read a recording of a model's drives, efforts by its gains; see `read_recording`."""
     return read_recording(path, model.drives, topic, progress, model.gain,
-                          model.efforts_in_amperes, model.units)
+                          model.efforts_in_amperes, model.units,
+                          model.effort_limits.tolist())
 
 
 def _as_efforts(path: Path, samples: Samples, gain: Sequence[float] | None, in_amperes: bool,

@@ -22,6 +22,12 @@ Progress = Callable[[int, int], None]
 EPOCH_STAMP = 1e6
 # A finding names at most this many places; its count is always complete.
 MOST_SPANS = 100
+# Beyond this, in SI units, nothing that a drive does or applies can lie: a mistake of a sensor or
+# a file. Squares and sums of what is left are finite.
+LARGEST_MEASURED = 1e12
+# From this share of its limit on an effort is at the limit, noise of the sensor aside; a drive
+# that goes beyond it by this factor is not held by that limit.
+AT_LIMIT, BEYOND_LIMIT = 0.99, 1.05
 
 # Everything that can be found, and what is done about it. Nothing else is ever changed.
 POLICY = {
@@ -42,6 +48,11 @@ POLICY = {
     'lost_samples': 'they stay within one segment, to be interpolated',
     'irregular_steps': 'the stamps are taken as true',
     'slow_rate': 'the stamps are taken as seconds',
+    'impossible_position': 'those samples are dropped',
+    'impossible_velocity': 'they count as not measured',
+    'impossible_effort': 'they count as not measured',
+    'saturated_effort': 'they are left out of every comparison and fit',
+    'no_effort': 'compare, diagnose, fit and adopt need them and will refuse it',
     'effort_not_measured': 'the motion is kept and these efforts count as not measured',
     'missing_velocity': 'velocities must come from the positions',
     'constant_position': 'it is kept',
@@ -114,6 +125,8 @@ class Samples:
         Drives whose `effort` is a current [A]; () for none.
     units : tuple of D DriveUnits
         () where all drives push.
+    effort_limits : tuple of D float
+        Largest absolute efforts that the drives can apply; () where they are not known.
     """
 
     drives: tuple[str, ...]
@@ -126,6 +139,7 @@ class Samples:
     findings: tuple[Finding, ...] = field(default=())
     in_amperes: tuple[bool, ...] = ()
     units: tuple[DriveUnits, ...] = ()
+    effort_limits: tuple[float, ...] = ()
 
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""

@@ -39,6 +39,8 @@ OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record
 SLOPE_OCTAVES, CONTINUED_OCTAVES = 3, 2
 SLOW_SHARE = 0.1  # of the highest corner, below which noise counts as slow
 LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: from 0 none would return
+# [N^2], of a rounding of 1e-12 N, which nothing resolves: squares of it are no zeros yet.
+LEAST_POWER = 1e-24
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,9 @@ class NoiseShapes:
     def start(self, squares: Array, counts: Array) -> Array:
         """Return amplitudes to start from, (..., J + 1): a share of the mean square for each."""
         mean = squares[..., 1:].sum(axis=-1) / np.maximum(counts[..., 1:].sum(axis=-1), 1)
+        count = len(self.at_bands)
         amplitudes: Array = np.repeat(
-            np.maximum(mean, 1e-300)[..., None] / len(self.at_bands), len(self.at_bands), axis=-1)
+            np.maximum(mean, LEAST_POWER)[..., None] / count, count, axis=-1)
         return amplitudes
 
     def improved(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array,
@@ -109,7 +112,7 @@ class NoiseShapes:
         squares, free = squares[..., 1:], np.maximum(
             counts[..., 1:] - leverage[..., 1:], 0.02 * counts[..., 1:])
         least = LEAST_SHARE * squares.sum(axis=-1, keepdims=True) / np.maximum(
-            free.sum(axis=-1, keepdims=True), 1) + 1e-300
+            free.sum(axis=-1, keepdims=True), 1) + LEAST_POWER
         for _ in range(steps):
             power = amplitudes @ phi
             ratio = (squares / power ** 2) @ phi.T / np.maximum((free / power) @ phi.T, 1e-300)

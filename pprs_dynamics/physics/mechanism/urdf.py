@@ -16,6 +16,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, MissingLibraryError, ModelError, UnreadableFileError
+from pprs_dynamics.system.input_files import require_file
 
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
 TURNING, SLIDING = 'revolute', 'prismatic'
@@ -101,6 +102,7 @@ def read_arm(path: str, base: str, tool: str, joints: tuple[str, ...]) -> ArmTre
         Without Pinocchio.
     """
     file = Path(path)
+    require_file(file)
     try:
         if file.stat().st_size > LARGEST_FILE:
             raise UnreadableFileError(path, f'more than {LARGEST_FILE / 1e6:.0f} MB: no URDF')

@@ -105,6 +105,11 @@ class ArmModel(ForceModel):
         return ratios
 
     @property
+    def effort_limits(self) -> Array:
+        """Largest absolute effort of each joint by the URDF [N m, N], (D,); may be infinite."""
+        return self.limits.efforts
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return bool(self.values['arm.effort_unit'] == 'A')

@@ -123,6 +123,11 @@ class DriveModel(ForceModel):
     limits: Limits
     equations: str = 'corrected'
 
+    @property
+    def effort_limits(self) -> Array:
+        """Largest absolute effort that each drive can apply [N], (6,)."""
+        return self.limits.efforts
+
     @classmethod
     def load(cls, path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel:
         """Read a model file.

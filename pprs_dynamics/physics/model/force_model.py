@@ -161,6 +161,11 @@ class ForceModel(ABC):
         return (1.0,) * len(self.drives)
 
     @property
+    def effort_limits(self) -> Array:
+        """Largest absolute effort that each drive can apply [N, N m], (D,); may be infinite."""
+        return np.full(len(self.drives), np.inf)
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return False

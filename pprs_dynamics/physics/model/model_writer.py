@@ -36,7 +36,7 @@ from pprs_dynamics.physics.model.parameter_file import (
     read_parameters,
 )
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.system.atomic_file import write_text
+from pprs_dynamics.system.output_files import write_text
 
 WRITTEN = ('effects', 'history')  # blocks of commands; the rest is people's
 INDENT = '  '

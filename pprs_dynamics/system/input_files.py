@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What may be read: regular files. Opening a pipe waits for a writer, a device has no end."""
+
+from __future__ import annotations
+
+import os
+import stat
+from os import PathLike
+
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.system.output_files import kind_of
+
+
+def require_file(path: str | PathLike[str]) -> None:
+    """Raise UnreadableFileError where a path is nothing that can be read to its end."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError as error:
+        raise UnreadableFileError(path, error.strerror or str(error)) from None
+    if not stat.S_ISREG(mode):
+        raise UnreadableFileError(path, f'it is {kind_of(mode)}, must be a file')

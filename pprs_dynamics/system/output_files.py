@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The one writer of files and folders: a reader sees the old content or the new one, never half.
+
+Only regular files are replaced. Of a symbolic link the target is written, which must be of the
+same kind by its ending.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from os import PathLike
+from pathlib import Path
+from typing import IO, cast
+from uuid import uuid4
+
+from pprs_dynamics.errors import UnreadableFileError
+
+PERMISSIONS = 0o666  # less the umask, as of any new file
+# Of what is not finished. Short: with the target's own name it could be too long.
+PREFIX = '.pprs_'
+
+
+@contextmanager
+def new_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
+    """Give a binary file to write to, which takes the place of `path` where the block ends well.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be written; the old content is as it was, and nothing else is left.
+    """
+    target = writable_file(path)
+    with _told(path):
+        # A file without a name, of which even a kill in mid-write leaves nothing.
+        file = _nameless(target.parent)
+        if file is None:
+            with _named(target) as file:
+                yield file
+            return
+        with file:
+            yield file
+            _finish(file)
+            if not _give_name(file.fileno(), target):
+                file.seek(0)
+                with _named(target) as copy:
+                    shutil.copyfileobj(file, copy)
+
+
+@contextmanager
+def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
+    """Give a folder that does not exist yet, which takes the name `path` where the block ends well.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be written, or something has the name already.
+    """
+    target = Path(path)
+    if os.path.lexists(target):
+        raise UnreadableFileError(target, 'exists already, and folders are never overwritten')
+    with scratch_folder(target) as scratch:
+        folder = scratch / target.name
+        yield folder
+        folder.rename(target)
+
+
+@contextmanager
+def scratch_folder(path: Path) -> Iterator[Path]:
+    """Give a folder beside `path` that is taken away with all that is left in it at the end.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where anything that is done in the block cannot be written.
+    """
+    with _told(path):
+        folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=PREFIX))
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def write_text(path: str | PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8; see `new_file`."""
+    with new_file(path) as file:
+        file.write(text.encode('utf-8'))
+
+
+def writable_file(path: str | PathLike[str]) -> Path:
+    """Return the file that is written for a path, behind links.
+
+    Raises
+    ------
+    UnreadableFileError
+        For what is there and is no regular file, a link to a file of another kind, and a name
+        that the file system does not take.
+    """
+    path = Path(path)
+    with _told(path):
+        try:
+            mode = os.stat(path).st_mode
+        except FileNotFoundError:
+            mode = stat.S_IFREG
+        if not stat.S_ISREG(mode):
+            raise UnreadableFileError(
+                path, f'cannot be written: it is {kind_of(mode)}, must be a file')
+        target = Path(os.path.realpath(path))
+        if path.is_symlink() and target.suffix != path.suffix:
+            raise UnreadableFileError(
+                path, f'cannot be written: it is a link to {target}, must be one to a file that '
+                f'ends in {path.suffix or "nothing"}, too')
+        if not target.parent.is_dir():
+            raise UnreadableFileError(path, 'cannot be written: its folder does not exist')
+        return target
+
+
+def kind_of(mode: int) -> str:
+    """Return what a mode of `os.stat` is of, in words."""
+    kinds = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket',
+             stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device', stat.S_IFREG: 'a file'}
+    return kinds.get(stat.S_IFMT(mode), 'something else')
+
+
+@contextmanager
+def _told(path: str | PathLike[str]) -> Iterator[None]:
+    """Name the file and the reason where the system refuses."""
+    try:
+        yield
+    except UnreadableFileError:
+        raise
+    except OSError as error:
+        raise UnreadableFileError(
+            path, f'cannot be written: {error.strerror or error}') from None
+
+
+def _nameless(folder: Path) -> IO[bytes] | None:
+    """Return an open file without a name; None where the system or the file system has none."""
+    flag = getattr(os, 'O_TMPFILE', None)
+    if flag is None:
+        return None
+    try:
+        # What else is wrong the other way will tell.
+        handle = os.open(folder, flag | os.O_RDWR, PERMISSIONS)
+    except OSError:
+        return None
+    return cast('IO[bytes]', os.fdopen(handle, 'w+b'))
+
+
+def _give_name(handle: int, target: Path) -> bool:
+    """Put a file without a name in the place of another; False where it cannot have a name."""
+    name = f'{PREFIX}{uuid4().hex}'
+    folder = os.open(target.parent, os.O_RDONLY)
+    try:
+        try:
+            # With a folder given, Python follows the link in /proc to the file itself.
+            os.link(f'/proc/self/fd/{handle}', name, dst_dir_fd=folder, follow_symlinks=True)
+        except OSError:
+            return False
+        try:
+            os.replace(name, target.name, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            os.unlink(name, dir_fd=folder)
+            raise
+        with suppress(OSError):
+            os.fsync(folder)  # the new entry on the disk, too
+        return True
+    finally:
+        os.close(folder)
+
+
+@contextmanager
+def _named(target: Path) -> Iterator[IO[bytes]]:
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=PREFIX)
+    try:
+        with os.fdopen(handle, 'w+b') as file:
+            yield cast('IO[bytes]', file)
+            _finish(file)
+        # mkstemp makes files that only their owner may read.
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, PERMISSIONS & ~umask)
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _finish(file: IO[bytes]) -> None:
+    file.flush()
+    os.fsync(file.fileno())
