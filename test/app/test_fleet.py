@@ -28,6 +28,7 @@ from pprs_dynamics.app.fleet.store import DONE, FAILED, Store, key_of, schema
 from pprs_dynamics.app.fleet.survey import Job, examine, identify
 from pprs_dynamics.app.fleet.trend import FALSE_ALARMS, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 
@@ -152,6 +153,13 @@ def test_a_manifest_says_whose_and_when(tmp_path: Path) -> None:
     manifest.write_text('path,robot,time,temperature\nx.csv,7,1970-01-02T00:00:00,21.5\n')
     (entry,) = entries((), str(manifest))
     assert entry == Entry(str(tmp_path / 'x.csv'), '7', 86400.0, None, {'temperature': 21.5})
+
+
+def test_a_quote_in_a_manifest_loses_no_recording_in_silence(tmp_path: Path) -> None:
+    manifest = tmp_path / 'robots.csv'
+    manifest.write_text('path,robot,note\na.csv,1,ok\nb.csv,1,"5 inch\nc.csv,1,ok\n')
+    with pytest.raises(UnreadableFileError, match='row 3 has a quote'):
+        list(entries((), str(manifest)))
 
 
 @pytest.mark.parametrize(('text', 'rule'), [

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+import shlex
 from dataclasses import replace
 from typing import Any
 
@@ -25,13 +26,14 @@ from made_up_diagnosis import (
 )
 from rich.console import Console
 
+from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.error_steps import error_steps
 from pprs_dynamics.inference.diagnosis.found_effects import RankedSet
-from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
+from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.partial import partial_residual
 from pprs_dynamics.inference.diagnosis.quantities import (
     change,
@@ -344,6 +346,18 @@ def test_commands_hold_the_real_names_as_a_shell_takes_them() -> None:
         '--output with_coulomb_friction.yaml')
     assert word_diagnosis(ambiguous(), files).command == (
         "pprs next-experiment 'my run.mcap' b.csv --model robot.yaml --output next.csv")
+
+
+@pytest.mark.parametrize('verdict', ['effect', 'ambiguous', 'unknown', 'adequate'])
+def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
+    files = GivenFiles(('a.csv',), ('b.csv',), 'my robot.yaml', '/arm/joint_states')
+    diagnosis = {'effect': one_effect, 'ambiguous': ambiguous}.get(verdict, one_effect)()
+    if verdict in ('unknown', 'adequate'):
+        diagnosis = replace(diagnosis, effects=(), indistinguishable=(), verdict=verdict)
+    _, command = next_step(diagnosis, files)
+    assert "--model 'my robot.yaml' --topic /arm/joint_states" in command
+    words = shlex.split(command)[1:]
+    assert _parser(words).parse_args(words).topic == '/arm/joint_states'
 
 
 @pytest.mark.parametrize(('before', 'after', 'said'), [

@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import random
 import re
 import struct
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -591,3 +593,66 @@ def test_an_encapsulation_of_another_kind_has_no_layout() -> None:
     assert Layout.of(b'\x00\x07' + data[2:]) is None
     assert Layout.of(data[:-1]) is None
     assert Layout.of(data[:12] + struct.pack('<I', 2**31) + data[16:]) is None
+
+
+# ------------------------------------------------------------- rows that are no rows of a table
+
+
+def rows_with(tmp_path: Path, change: Callable[[list[str]], None]) -> Path:
+    """Write 4000 rows with a last column of words that nobody asked for, some changed."""
+    lines = table(measured(4000)).assign(note='ok').to_csv(index=False).split('\n')
+    change(lines)
+    (tmp_path / 'x.csv').write_text('\n'.join(lines))
+    return tmp_path / 'x.csv'
+
+
+@pytest.mark.parametrize('others', [(), (2500,), (2500, 3000)])
+def test_a_quote_without_its_pair_loses_no_row_in_silence(
+    others: tuple[int, ...], tmp_path: Path,
+) -> None:
+    def spoil(lines: list[str]) -> None:
+        for row in (2002, *others):
+            lines[row - 1] = lines[row - 1].replace('ok', '"5 inch pipe')
+
+    with pytest.raises(UnreadableFileError, match='row 2002 has a quote'):
+        read_recording(rows_with(tmp_path, spoil))
+
+
+@pytest.mark.parametrize('word', ['5" pipe', '"5"" pipe"', 'a\u2028b', '"a b"', "'", '\x0b'])
+def test_words_of_ignored_columns_take_no_row_away(word: str, tmp_path: Path) -> None:
+    def write(lines: list[str]) -> None:
+        lines[2001] = lines[2001].replace('ok', word)
+
+    assert len(read_recording(rows_with(tmp_path, write)).time) == 4000
+
+
+@pytest.mark.parametrize('number', ['1_0', '\uff11\uff12', '\u0663', '0x10'])
+def test_what_only_python_reads_as_a_number_is_none(number: str, tmp_path: Path) -> None:
+    def write(lines: list[str]) -> None:
+        cells = lines[2001].split(',')
+        lines[2001] = ','.join([cells[0], number, *cells[2:]])
+
+    with pytest.raises(UnreadableFileError, match='row 2002, column slide_1/position must hold'):
+        read_recording(rows_with(tmp_path, write))
+
+
+def test_a_first_line_of_any_length_is_one_sentence(tmp_path: Path) -> None:
+    for length in (131_073, 2_000_000):
+        (tmp_path / 'x.csv').write_text('a' * length + '\n1\n')
+        with pytest.raises(UnreadableFileError) as told:
+            read_recording(tmp_path / 'x.csv')
+        assert len(str(told.value)) < 300
+
+
+@pytest.mark.parametrize('header', [b'', b'time,axis/position,axis/effort\n0,1,2\n'])
+def test_a_packed_line_without_end_takes_no_memory(header: bytes, tmp_path: Path) -> None:
+    path = tmp_path / 'x.csv.gz'
+    with gzip.open(path, 'wb', compresslevel=1) as file:
+        file.write(header)
+        for _ in range(300):
+            file.write(b'1' * (1 << 20))
+    tracemalloc.start()
+    with pytest.raises(UnreadableFileError, match='is longer than 1048576 characters'):
+        read_recording(path, ('axis',))
+    assert tracemalloc.get_traced_memory()[1] < 60e6
+    tracemalloc.stop()

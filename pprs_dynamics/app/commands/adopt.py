@@ -15,6 +15,7 @@ from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import (
     add_recordings,
     add_validation,
+    given_files,
     read_recordings,
     read_validation,
 )
@@ -25,7 +26,6 @@ from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         write_json(options.json, answer.to_dict())
     if options.report:
-        files = GivenFiles(tuple(options.recordings), tuple(options.validate), options.output)
+        files = given_files(options, options.output)
         page = adoption_page(answer, recordings, validation,
                              files.command('diagnose', held_out=True))
         screen.print(f'page: {shown(page.write(options.report))}')

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, PAGE, add_details, output_file
+from pprs_dynamics.app.commands.arguments import PAGE, add_details, output_file
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, read_recordings
+from pprs_dynamics.app.commands.recordings import add_recordings, given_files, read_recordings
 from pprs_dynamics.app.report.comparison_page import comparison_page
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.tables import comparison_view
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.localisation import localise
-from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.model_file import load_model
 
@@ -39,9 +38,7 @@ def run(options: argparse.Namespace) -> int:
     with progress_bar(screen, 'where it fails') as progress:
         where = localise(residuals, progress=lambda share: progress(share, 1.0))
     comparison = compare(residuals, where)
-    files = GivenFiles(tuple(options.recordings), (),
-                       '' if options.model == DEFAULT_MODEL else str(options.model))
-    command = files.command('diagnose', '--report', 'why.html')
+    command = given_files(options).command('diagnose', '--report', 'why.html')
     screen.print(comparison_view(comparison, command, options.details))
     if options.json:
         write_json(options.json, {**comparison.to_dict(), 'verdict': comparison.verdict})

@@ -9,7 +9,6 @@ import argparse
 
 from pprs_dynamics.app.commands.adopt_all import adopt_what_was_found
 from pprs_dynamics.app.commands.arguments import (
-    DEFAULT_MODEL,
     MODEL,
     PAGE,
     add_details,
@@ -19,6 +18,7 @@ from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import (
     add_recordings,
     add_validation,
+    given_files,
     read_recordings,
     read_validation,
 )
@@ -28,7 +28,6 @@ from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 from pprs_dynamics.inference.diagnosis.rivals import rival_effects
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.diagnosis.what_if import what_if
@@ -63,9 +62,7 @@ def run(options: argparse.Namespace) -> int:
     with progress_bar(screen, 'diagnosing') as progress:
         diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
     rivals = rival_effects(diagnosis, validate)
-    words = word_diagnosis(diagnosis, GivenFiles(
-        tuple(options.recordings), tuple(options.validate),
-        '' if options.model == DEFAULT_MODEL else str(options.model)), rivals)
+    words = word_diagnosis(diagnosis, given_files(options), rivals)
     screen.print(diagnosis_view(diagnosis, words, options.details))
     if options.json:
         write_json(options.json, diagnosis.to_dict())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.output_files import write_text as write_text
+from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 

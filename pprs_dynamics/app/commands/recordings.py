@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import shown
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 from pprs_dynamics.measurement.files.recording import Recording, read_for
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.measurement.residuals.conventions import find_mistakes
@@ -78,6 +80,13 @@ def read_each(paths: Sequence[str], options: argparse.Namespace, screen: Any, mo
             mistakes = find_mistakes(model, recording)
             recordings.append(replace(recording, findings=(*mistakes, *recording.findings)))
     return recordings
+
+
+def given_files(options: argparse.Namespace, model: str | None = None) -> GivenFiles:
+    """Return what the next command is to be given: recordings, held-out ones, model and topic."""
+    model = options.model if model is None else model
+    return GivenFiles(tuple(options.recordings), tuple(getattr(options, 'validate', ())),
+                      '' if model == DEFAULT_MODEL else model, options.topic or '')
 
 
 def _show_findings(paths: Sequence[str], recordings: Sequence[Recording], screen: Any,

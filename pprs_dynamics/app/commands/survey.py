@@ -10,7 +10,13 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import PAGE, output_file, output_folder, whole
+from pprs_dynamics.app.commands.arguments import (
+    DEFAULT_MODEL,
+    PAGE,
+    output_file,
+    output_folder,
+    whole,
+)
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import entries
@@ -93,7 +99,10 @@ def run(options: argparse.Namespace) -> int:
         fleet = fleet_trends(store)
         for text in sentences(fleet):
             screen.print(shown(text))
-        screen.print(f'page: {shown(fleet_page(fleet).write(options.report))}')
+        given = [word for option, value in (('--model', options.model), ('--topic', options.topic))
+                 if value and value != DEFAULT_MODEL for word in (option, value)]
+        page = fleet_page(fleet, given=given)
+        screen.print(f'page: {shown(page.write(options.report))}')
     return 0
 
 

@@ -10,7 +10,6 @@ fsspec reaches, such as s3://bucket/name.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,6 +19,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.csv_tables import read_rows
+from pprs_dynamics.system.numbers import parse_number
 
 ENDINGS = ('.csv', '.mcap', '.db3')
 BAG = 'metadata.yaml'  # a folder that holds it is a rosbag2 recording
@@ -68,26 +69,19 @@ def read_manifest(path: str) -> Iterator[Entry]:
     ManifestError
         For a missing column or value, or a time that is none.
     """
-    try:
-        with open(path, newline='', encoding='utf-8-sig') as file:
-            rows = csv.DictReader(file)
-            missing = [name for name in KNOWN[:2] if name not in (rows.fieldnames or ())]
-            if missing:
-                raise ManifestError(path, 1, f'there is no column {missing[0]}',
-                                    'have the columns path and robot')
-            for row in rows:
-                yield _entry(path, rows.line_num, row)
-    except PprsError:
-        raise
-    except UnicodeDecodeError:
-        raise UnreadableFileError(path, 'is no text, must be CSV in UTF-8') from None
-    except (OSError, csv.Error) as error:
-        raise UnreadableFileError(path, getattr(error, 'strerror', None) or str(error)) from None
+    rows = read_rows(path)
+    _, header = next(rows, (1, []))
+    missing = [name for name in KNOWN[:2] if name not in header]
+    if missing:
+        raise ManifestError(path, 1, f'there is no column {missing[0]}',
+                            'have the columns path and robot')
+    for line, cells in rows:
+        yield _entry(path, line, dict(zip(header, cells, strict=False)))
 
 
-def _entry(path: str, line: int, row: dict[str | Any, str | Any]) -> Entry:
+def _entry(path: str, line: int, row: dict[str, str]) -> Entry:
     def given(name: str) -> str:
-        return str(row.get(name) or '').strip()
+        return row.get(name, '').strip()
 
     for name in KNOWN[:2]:
         if not given(name):
@@ -103,10 +97,10 @@ def _beside(manifest: str, path: str) -> str:
     return path if is_remote(path) else str(Path(manifest).parent / path)
 
 
-def _number(text: Any) -> float | None:
+def _number(text: str) -> float | None:
     try:
-        value = float(text)
-    except (TypeError, ValueError):
+        value = parse_number(text)
+    except ValueError:
         return None
     return value if math.isfinite(value) else None
 

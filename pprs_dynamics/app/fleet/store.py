@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 from urllib.parse import quote
-from uuid import uuid4
 
 from pprs_dynamics.app.fleet.manifest import filesystem, is_remote, reached
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.system.output_files import new_file
 
 DONE, FAILED = '.parquet', '.failed.parquet'
 KEY_LENGTH = 40  # hexadecimal digits of the key: 160 bits, as of a git object
@@ -150,20 +150,10 @@ class Store:
             system.makedirs(path.rpartition('/')[0], exist_ok=True)
             system.pipe_file(path, content)
             return
-        folder, _, name = place.rpartition('/')
-        os.makedirs(folder, exist_ok=True)
-        # Readers of Parquet folders pass over names that begin with a dot.
-        part = f'{folder}/.{name}.{uuid4().hex}'
-        try:
-            with open(part, 'wb') as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, place)
-        except BaseException:
-            if os.path.exists(part):
-                os.unlink(part)
-            raise
+        # Readers of Parquet folders pass over names that begin with a dot, as unfinished ones do.
+        os.makedirs(place.rpartition('/')[0], exist_ok=True)
+        with new_file(place) as file:
+            file.write(content)
 
     def read(self, columns: Sequence[str] | None = None, filters: Any = None) -> Any:
         """Return the rows as an Arrow table, with the column robot.

@@ -9,6 +9,7 @@ Trends are drawn by the browser from numbers in the page, so that thousands of t
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -75,7 +76,7 @@ function showRecording(k) {
   line.textContent = 'Its own page: ';
   const code = document.createElement('code');
   const quoted = "'" + path.replaceAll("'", "'\\\\''") + "'";
-  code.textContent = 'pprs diagnose ' + quoted + ' --report recording.html';
+  code.textContent = 'pprs diagnose ' + quoted + data.given + ' --report recording.html';
   line.append(code);
   const table = document.createElement('table');
   for (const [key, trend] of Object.entries(data.trends)) {
@@ -102,7 +103,8 @@ matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
 '''
 
 
-def fleet_page(fleet: FleetTrends, beside: str | None = None) -> Page:
+def fleet_page(fleet: FleetTrends, beside: str | None = None,
+               given: Sequence[str] = ()) -> Page:
     """Return the page, most important first.
 
     Parameters
@@ -110,6 +112,8 @@ def fleet_page(fleet: FleetTrends, beside: str | None = None) -> Page:
     fleet : FleetTrends
     beside : str, optional
         Column of the manifest to be drawn beside every trend.
+    given : sequence of str
+        Options of the survey that the command for a single recording needs, too.
     """
     changed = [robot for robot in fleet.robots if fleet.flagged(robot)]
     page = Page(f'Fleet: {len(changed)} of {len(fleet.robots)} robots changed')
@@ -123,9 +127,11 @@ def fleet_page(fleet: FleetTrends, beside: str | None = None) -> Page:
                     'recordings, or, by the button, from the fleet\'s median. Framed: a change '
                     'that chance does not explain. Click a field for its trend, and a point there '
                     'for the recording.')
+        data = {**_data(fleet, changed, beside), 'given': ''.join(
+            f' {shlex.quote(word)}' for word in given)}
         page.interactive('<h2 id="trend-title">Trend</h2><div id="trend" role="img"></div>'
                          '<section id="recording" class="card" hidden></section>',
-                         'fleet-data', json.dumps(_data(fleet, changed, beside), allow_nan=False),
+                         'fleet-data', json.dumps(data, allow_nan=False),
                          _SCRIPT)
     if fleet.errors:
         page.heading('Recordings without a result')

@@ -23,11 +23,14 @@ class GivenFiles:
     recordings, validate : tuple of str
     model : str
         '' for the default.
+    topic : str
+        '' where none was chosen.
     """
 
     recordings: tuple[str, ...] = ('RECORDING',)
     validate: tuple[str, ...] = ()
     model: str = ''
+    topic: str = ''
 
     def command(self, *words: str, held_out: bool = False) -> str:
         """Return a command of `pprs` on the recordings, then options; quoted for a shell.
@@ -44,7 +47,8 @@ class GivenFiles:
         given = ['pprs', *words[:first], *self.recordings]
         if held_out:
             given += [part for name in self.validate for part in ('--validate', name)]
-        given += ['--model', self.model] if self.model else []
+        for option, value in (('--model', self.model), ('--topic', self.topic)):
+            given += [option, value] if value else []
         return shlex.join([*given, *words[first:]])
 
 
@@ -74,4 +78,4 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Repeat the recording: what comes back is the machine, what does not was noise',
                 repeat)
     return ('Nothing to add. Another motion may show what this one does not excite',
-            GivenFiles((SECOND,), (), files.model).command('diagnose'))
+            replace(files, recordings=(SECOND,)).command('diagnose'))
