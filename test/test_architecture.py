@@ -28,7 +28,7 @@ MAY_USE = {
     'measurement': {'system', 'physics'},
     'simulation': {'system', 'physics', 'measurement'},
     'inference': {'system', 'physics', 'measurement'},
-    'ros': {'system', 'physics', 'measurement', 'simulation'},
+    'ros': {'system', 'physics', 'measurement', 'simulation', 'inference'},
     'app': {'system', 'physics', 'measurement', 'simulation', 'inference', 'ros'},
 }
 # Inside a room, a folder uses itself and those before it.

@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics.errors import EffectError, PprsError
 from pprs_dynamics.measurement.residuals.live import (
@@ -24,11 +25,12 @@ from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.keys import is_arm
 from pprs_dynamics.ros import conversions
 from pprs_dynamics.ros.clocks import steady_timer
+from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.parameters import NodeParameter, declare_own, overrides
 from pprs_dynamics.ros.preparation import prepare_beside
 from pprs_dynamics.ros.provenance import hardware_of
-from pprs_dynamics.ros.qos import publisher, subscription
+from pprs_dynamics.ros.qos import LATCHED, publisher, subscription
 from pprs_dynamics.ros.rejection import CODES, Rejection
 from pprs_dynamics.ros.status import StatusReporter
 
@@ -39,8 +41,13 @@ PARAMETERS = (
                   upper=600.0),
     NodeParameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
                   lower=1.0, upper=1000.0),
+    NodeParameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
+                  'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0),
+    NodeParameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
+                  upper=3600.0),
 )
 
+LOOK = 0.2  # [s] between looks for an answer of the diagnosis
 
 
 class MonitorNode(ExplainsRefusals):
@@ -66,6 +73,11 @@ class MonitorNode(ExplainsRefusals):
         self._error = publisher(self, Float64MultiArray, '~/error')
         subscription(self, JointState, 'joint_states', self._on_state, raw=True)
         steady_timer(self, 1.0 / own['update_rate'], self._judge)
+        self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
+        self._worker, self._changed = DiagnosisWorker(), ''
+        if own['diagnose_every']:
+            self._diagnosis = publisher(self, String, '~/diagnosis', LATCHED)
+            steady_timer(self, LOOK, self._diagnose)
         self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
 
     def _use(self) -> None:
@@ -84,6 +96,7 @@ class MonitorNode(ExplainsRefusals):
             self._origin = stamp
         # Counted from the first stamp: seconds since 1970 would cost digits.
         self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position, effort)
+        self._windows.push(stamp, position, effort)
 
     def _judge(self) -> None:
         try:
@@ -108,7 +121,36 @@ class MonitorNode(ExplainsRefusals):
         self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
                                        for value in running.tolist()]
         unit = common_effort(self._settings.model.units)
-        self._status.report('OK', 'OK', f'largest running error {worst:.4g} {unit}')
+        text = f'largest running error {worst:.4g} {unit}'
+        if self._changed:
+            self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
+        else:
+            self._status.report('OK', 'OK', text)
+
+    def _diagnose(self) -> None:
+        """Pass on what the worker has found, and give it the next window."""
+        if (answer := self._worker.poll()) is not None:
+            if 'error' in answer:
+                self.get_logger().warning(f'a window was not diagnosed: {answer["error"]}')
+                answer = {'effects': [], 'confirmed': False, 'since': None,
+                          'note': answer['error']}
+            changed = answer.get('text', '')
+            if changed != self._changed:
+                self.get_logger().warning(changed or 'what had changed is gone')
+            self._changed = changed
+            self._diagnosis.publish(String(data=json.dumps(answer)))
+        if not self._worker.busy and (samples := self._windows.take()) is not None:
+            model = self._settings.model
+            self._worker.submit(model.values, model.source, samples)
+
+    def finish(self) -> None:
+        """End the process that diagnoses."""
+        self._worker.close()
+
+    def destroy_node(self) -> None:
+        """Take the process that diagnoses along."""
+        self._worker.close()
+        super().destroy_node()
 
     def _publish(self, compared: Compared) -> None:
         for topic, efforts in ((self._model_effort, compared.model),

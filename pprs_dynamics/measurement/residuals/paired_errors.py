@@ -30,8 +30,10 @@ def rms_by_drive(residuals: Residuals) -> dict[str, float]:
             if np.isfinite(residuals.error[:, d]).any()}
 
 
-def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseSpectrum]) -> Array:
-    """Return what a model takes off the whitened squared error of each block, (B,).
+def sample_gains(
+    before: Residuals, after: Residuals, noises: Mapping[str, NoiseSpectrum],
+) -> Array:
+    """Return what a model takes off the whitened squared error of each sample, (M,).
 
     Parameters
     ----------
@@ -40,9 +42,8 @@ def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseS
     noises : mapping of str to NoiseSpectrum
         By drive.
     """
-    edges = np.linspace(0, len(before), BLOCKS + 1)
     bands = FrequencyBands.for_residuals(before)
-    gains = np.zeros(BLOCKS)
+    gains = np.zeros(len(before))
     for d, name in enumerate(before.drives):
         for sign, residuals in ((1, before), (-1, after)):
             series = DriveSeries(residuals, d, bands)
@@ -50,9 +51,16 @@ def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseS
                 continue
             root = np.sqrt(noises[name].power(series.frequency))
             squares = series.inverse(series.transform(series.error) / root) ** 2 * series.known
-            block = np.searchsorted(edges, series.index, side='right') - 1
-            gains += sign * np.bincount(block, squares, BLOCKS)
+            np.add.at(gains, series.index, sign * squares)
     return gains
+
+
+def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseSpectrum]) -> Array:
+    """Return the gains of `sample_gains` summed over blocks of equal length, (B,)."""
+    gains = sample_gains(before, after, noises)
+    edges = np.linspace(0, len(before), BLOCKS + 1)
+    block = np.searchsorted(edges, np.arange(len(before)), side='right') - 1
+    return np.bincount(block, gains, BLOCKS)
 
 
 def certainty(gains: Array) -> float:

@@ -262,7 +262,8 @@ NAMES = frozenset({*KEYS, *AXIS_KEYS, *arm_keys(1)})
 NODE_KEYS = frozenset({
     'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in',
     'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
-    'window', 'error_span', 'update_rate', 'encoder_resolution', 'effort_noise',
+    'window', 'error_span', 'update_rate', 'diagnose_every', 'diagnose_span',
+    'encoder_resolution', 'effort_noise',
     'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
     'use_sim_time', 'start_type_description_service'})

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""How often live diagnosis is right: streams in which an effect sets in, and streams without.
+
+    python benchmarks/live_diagnosis.py changes SEEDS [EFFECT ...]
+    python benchmarks/live_diagnosis.py nothing WINDOWS
+
+A stream is a row of windows of 40 s of one robot, each along a random motion of its own. In
+`changes` an effect of SNR 1 to 3 sets in at a random moment of the second window and ends with
+the fourth; six windows are diagnosed. In `nothing` there is only noise: AR(1) and 1/f in turns.
+Lines of JSON go to output/live_MODE.jsonl; what is there already is not computed again.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hidden_recordings import LEAD, NOISE, PINK, RATE, Case, Scene, _draw, _motion, noise_settings
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS
+from pprs_dynamics.simulation.prescribed import PrescribedPlant
+from pprs_dynamics.simulation.sensors import EffortNoise
+
+OUTPUT = Path(__file__).resolve().parents[1] / 'output'
+STEPS = ('plain', 'change', 'hidden', 'hidden', 'plain', 'plain')
+NOISES: tuple[float | str, ...] = (0.9, 0.98, 0.997, PINK)
+
+
+def window(place: Scene, seed: int, effects: tuple[Any, ...], moment: float | None,
+           deviation: float, noise: float | str) -> Recording:
+    """Return one window along a motion of its own; the effects from a moment on [s], or always."""
+    _, motion = _motion(seed)
+    plant = PrescribedPlant({**place.model.values, **place.robot}, motion, place.settings)
+    read = plant.readings(effects)
+    position, effort = read.position[LEAD:], read.effort[LEAD:]
+    clock = motion.time[LEAD:]
+    if moment is not None:
+        plain = plant.readings([])
+        early = (clock < moment)[:, None]
+        position = np.where(early, plain.position[LEAD:], position)
+        effort = np.where(early, plain.effort[LEAD:], effort)
+    settings = noise_settings(noise, deviation)
+    rng = np.random.default_rng((seed, 77))
+    added = EffortNoise(settings, rng).samples(len(clock))
+    return Recording.from_arrays(f'window {seed}', clock, settings.quantised(position), None,
+                                 effort + added)
+
+
+def changes(name: str, seed: int) -> dict[str, Any]:
+    """Return what was said of one stream with a change."""
+    case = Case('live', (name,), seed, snr=0.0)
+    place = Scene(seed, 1.0)
+    drawn = _draw(case, place, name)
+    rng = np.random.default_rng((seed, 5))
+    length = len(place.motion.time[LEAD:]) / RATE
+    moment = float(rng.uniform(0.2, 0.8)) * length
+    truth = drawn.effect.truth()
+    live, said, start, used = LiveDiagnosis(place.model), [], 0.0, time.process_time()
+    for number, what in enumerate(STEPS):
+        effects = () if what == 'plain' else (drawn.effect,)
+        recording = window(place, 1000 * seed + number, effects,
+                           moment if what == 'change' else None, drawn.noise, 0.9)
+        live = live.with_window(recording, start)
+        said.append({'claimed': [[*map(str, sorted(one.names)), one.found.drives, one.since]
+                                 for one in live.claimed],
+                     'named': [one.found.name for one in live.effects],
+                     'withdrawn': [one.found.name for one in live.withdrawn]})
+        start += length
+    found = [one for one in said[3]['claimed'] if name in one[:-2]]
+    return {'name': name, 'seed': seed, 'snr': drawn.snr * NOISE / drawn.noise,
+            'drives': truth.get('drives'), 'moment': length + moment,
+            'named': bool(found), 'right_drives': bool(found) and (
+                found[0][-2] is None or set(found[0][-2]) == set(truth.get('drives') or [])),
+            'since': found[0][-1] if found else None,
+            'early': bool(said[0]['claimed'] or said[1]['claimed']),
+            'others': len(said[3]['claimed']) - bool(found),
+            'ended': not said[5]['claimed'], 'said': said,
+            'seconds': time.process_time() - used}
+
+
+def nothing(first: int, count: int = 10) -> dict[str, Any]:
+    """Return what was said of a stream of windows without any change."""
+    place = Scene(first, 0.0)
+    noise = NOISES[first % len(NOISES)]
+    live, claimed, named, start = LiveDiagnosis(place.model), [], [], 0.0
+    for number in range(count):
+        recording = window(place, 1000 * first + number, (), None, NOISE, noise)
+        live = live.with_window(recording, start)
+        start += recording.time[-1] - recording.time[0]
+        claimed.append([one.found.name for one in live.claimed])
+        named.append([one.found.name for one in live.effects])
+    return {'seed': first, 'noise': noise, 'windows': count, 'claimed': claimed, 'named': named}
+
+
+def run(mode: str, arguments: list[str]) -> Iterator[dict[str, Any]]:
+    """Yield results one after the other."""
+    if mode == 'changes':
+        names = arguments[1:] or sorted(HIDDEN_EFFECTS)
+        for seed in range(int(arguments[0])):
+            for name in names:
+                yield {'key': f'{name} {seed}', 'of': lambda n=name, s=seed: changes(n, 300 + s)}
+    else:
+        for first in range(int(arguments[0]) // 10):
+            yield {'key': f'nothing {first}', 'of': lambda f=first: nothing(500 + f)}
+
+
+def main() -> int:
+    """Run what is not there yet."""
+    mode, arguments = sys.argv[1], sys.argv[2:]
+    OUTPUT.mkdir(exist_ok=True)
+    file = OUTPUT / f'live_{mode}.jsonl'
+    done = ({json.loads(line)['key'] for line in file.read_text().splitlines()}
+            if file.exists() else set())
+    for one in run(mode, arguments):
+        if one['key'] in done:
+            continue
+        try:
+            result = {'key': one['key'], **one['of']()}
+        except PprsError as error:
+            result = {'key': one['key'], 'error': str(error)}
+        with file.open('a') as output:
+            output.write(json.dumps(result) + '\n')
+        print(json.dumps({k: v for k, v in result.items() if k != 'said'}), flush=True)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

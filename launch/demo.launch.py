@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The closed loop without a robot: simulated_robot, feedforward, monitor and a path.
+
+    ros2 launch pprs_dynamics demo.launch.py
+    ros2 launch pprs_dynamics demo.launch.py hidden_effects:="['stribeck_friction']"
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the nodes and their arguments."""
+    arguments = {
+        'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
+                  'model file, with a path'),
+        'namespace': ('', 'of the nodes'),
+        'rate': ('100.0', 'messages of the path per second'),
+        'repeat': ('0', 'how often the path is played; 0: until stopped'),
+        'hidden_effects': ('[]', 'effects that the simulated robot has and the model lacks'),
+        'diagnose_every': ('0.0', 'seconds between diagnoses of the stream; 0: never'),
+    }
+    given = {name: LaunchConfiguration(name) for name in arguments}
+    common = {'package': 'pprs_dynamics', 'namespace': given['namespace'], 'output': 'screen'}
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=value, description=text)
+          for name, (value, text) in arguments.items()),
+        Node(executable='simulated_robot', parameters=[given['model'], {
+            'hidden_effects': ParameterValue(given['hidden_effects'], value_type=list[str])}],
+             **common),
+        Node(executable='feedforward', parameters=[given['model']],
+             remappings=[('~/joint_command', 'simulated_robot/joint_command')], **common),
+        Node(executable='monitor', parameters=[given['model'], {
+            'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
+             **common),
+        Node(executable='play_trajectory', parameters=[{
+            'rate': ParameterValue(given['rate'], value_type=float),
+            'repeat': ParameterValue(given['repeat'], value_type=int),
+            'source': 'excitation', 'lead_in': 2.0, 'ahead': 0.05}], **common),
+    ])

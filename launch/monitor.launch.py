@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The monitor alone: measured efforts against the model, and what changes on the machine.
+
+    ros2 launch pprs_dynamics monitor.launch.py model:=/path/robot.yaml diagnose_every:=60.0
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the node and its arguments."""
+    arguments = {
+        'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
+                  'model file, with a path'),
+        'namespace': ('', 'of the node'),
+        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1'),
+        'joint_states': ('joint_states', 'topic of the measurements'),
+        'diagnose_every': ('0.0', 'seconds between diagnoses of the stream; 0: never'),
+        'use_sim_time': ('false', 'the clock is that of /clock'),
+    }
+    given = {name: LaunchConfiguration(name) for name in arguments}
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=value, description=text)
+          for name, (value, text) in arguments.items()),
+        Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
+             parameters=[given['model'], {
+                 'joint_prefix': given['prefix'], 'use_sim_time': given['use_sim_time'],
+                 'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
+             output='screen', remappings=[('joint_states', given['joint_states'])]),
+    ])

@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What changed on a running robot: one window of its stream diagnosed after the other.
+
+A window is diagnosed as a recording is. What it names is only a hypothesis: it is claimed once
+the model that was fitted to the window also predicts the next one, which it was not fitted to,
+better than the model without it, and once that window's own diagnosis names it again. It is
+withdrawn when the latest window neither names nor needs it. When the change came is where the
+cumulated difference of the two models' whitened squared errors is lowest: the maximum-likelihood
+change point between two known models (Hinkley, Biometrika 57, 1970).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.quantities import with_drives, with_uncertainty
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.paired_errors import (
+    block_gains,
+    certainty,
+    sample_gains,
+)
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+
+@dataclass(frozen=True)
+class LiveDecisions:
+    """The numbers that decide what is claimed of a stream.
+
+    Parameters
+    ----------
+    certainty : float
+        Standard errors by which a change must lower the error of the next window. With ten blocks
+        a window, 2 keeps one effect in 30 that is none; two windows must name it besides.
+    least_motion : float
+        Share of a window's samples in which some drive moves, below which nothing is fitted: at
+        rest, friction is anything within its static value.
+    moving : float
+        Share of its highest speed above which a drive moves.
+    recent : int
+        Windows before the one that confirms a change in which its beginning is looked for: the one
+        that named it first, and the one before, which the change may have hidden from.
+    """
+
+    certainty: float = 2.0
+    least_motion: float = 0.2
+    moving: float = 0.02
+    recent: int = 2
+
+
+LIVE_DECISIONS = LiveDecisions()
+# Slower than any motion that tells of friction [m/s, rad/s]: an encoder's noise looks like it.
+STANDSTILL = 1e-4
+MOST_VALUES = 3  # of an effect that its sentence holds
+GLANCE = 0.1  # [s] over which speeds are taken to tell motion from rest
+
+
+@dataclass(frozen=True)
+class LiveEffect:
+    """An effect of the stream.
+
+    Parameters
+    ----------
+    found : FoundEffect
+        As the latest window that names it has it.
+    since : float or None
+        When it began [s], on the stream's clock; None where it was there from the start.
+    confirmed : bool
+        Whether it held on a window that it was not fitted to.
+    names : frozenset of str
+        Its own name and those of its rivals, which the window could not tell apart.
+    """
+
+    found: FoundEffect
+    since: float | None
+    confirmed: bool
+    names: frozenset[str]
+
+    def is_same(self, other: LiveEffect) -> bool:
+        """Return whether two windows mean the same: one of both's names, on the same drives."""
+        return (bool({self.found.name} & other.names | {other.found.name} & self.names)
+                and self.found.drives == other.found.drives)
+
+    def sentence(self, every: tuple[str, ...]) -> str:
+        """Return what changed in words; `every` names all drives."""
+        what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
+        values = ', '.join(
+            f'{key} {with_uncertainty(one.value, one.std, one.unit)}'
+            for key, one in list(self.found.parameters.items())[:MOST_VALUES])
+        since = 'from the start' if self.since is None else (
+            f'since {datetime.fromtimestamp(self.since):%H:%M:%S}')
+        return f'{what}: {values}, {since}'
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON of `pprs diagnose` for an effect, with since and confirmed."""
+        return {**self.found.to_dict(), 'since': self.since, 'confirmed': self.confirmed}
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window of the stream with what its diagnosis says.
+
+    Parameters
+    ----------
+    recording : Recording
+    start, end : float
+        [s], on the stream's clock.
+    diagnosis : dict
+        JSON of `pprs diagnose`.
+    adopted : ForceModel
+        The model with what was found.
+    noise : mapping of str to NoiseSpectrum
+        By drive.
+    """
+
+    recording: Recording
+    start: float
+    end: float
+    diagnosis: Mapping[str, Any]
+    adopted: ForceModel
+    noise: Mapping[str, NoiseSpectrum]
+
+
+@dataclass(frozen=True)
+class LiveDiagnosis:
+    """What is known of a stream, window after window; each step returns another one.
+
+    Parameters
+    ----------
+    model : ForceModel
+        As given: every window is diagnosed against it.
+    effects : tuple of LiveEffect
+        Named by the latest windows; only the confirmed ones are claimed.
+    last : Window, optional
+        The latest window that was diagnosed.
+    withdrawn : tuple of LiveEffect
+        Claimed before, and gone with the latest window.
+    note : str
+        Why the latest window was not diagnosed; empty where it was.
+    recent : tuple of (Recording, float)
+        The latest windows and when they begin [s], in which the beginning of a change is looked
+        for.
+    """
+
+    model: ForceModel
+    effects: tuple[LiveEffect, ...] = ()
+    last: Window | None = None
+    withdrawn: tuple[LiveEffect, ...] = ()
+    note: str = ''
+    recent: tuple[tuple[Recording, float], ...] = ()
+
+    @property
+    def claimed(self) -> tuple[LiveEffect, ...]:
+        """The confirmed effects."""
+        return tuple(effect for effect in self.effects if effect.confirmed)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON of `pprs diagnose` on the latest window, with since and confirmed."""
+        content = dict(self.last.diagnosis) if self.last is not None else {}
+        return {**content, 'effects': [effect.to_dict() for effect in self.effects],
+                'withdrawn': [effect.to_dict() for effect in self.withdrawn],
+                'confirmed': bool(self.claimed),
+                'since': min((effect.since for effect in self.claimed
+                              if effect.since is not None), default=None),
+                'text': '; '.join(effect.sentence(self.model.drives) for effect in self.claimed),
+                'window': [self.last.start, self.last.end] if self.last else None,
+                'note': self.note}
+
+    def with_window(
+        self, recording: Recording, start: float, decisions: Decisions = DECISIONS,
+        live: LiveDecisions = LIVE_DECISIONS,
+    ) -> LiveDiagnosis:
+        """Return what is known with one more window.
+
+        Parameters
+        ----------
+        recording : Recording
+            Of the model's drives; it must not overlap the last one, on which it is judged
+            whether what was found there holds.
+        start : float
+            When it begins [s], on the stream's clock.
+
+        Raises
+        ------
+        PprsError
+            As `diagnose`.
+        """
+        if share_in_motion(recording, live.moving) < live.least_motion:
+            return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
+        answer = diagnose(self.model, [recording], decisions=decisions)
+        noise = answer.noise
+        window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
+                        answer.to_dict(), answer.adopted, noise)
+        holds = self.last is not None and self.effects and _certainty(
+            self.model, self.last.adopted, recording, noise) > live.certainty
+        effects = []
+        for found in answer.effects:
+            effect = LiveEffect(found, None, False, _names(answer, found))
+            before = next((one for one in self.effects if one.is_same(effect)), None)
+            if before is not None and before.confirmed:
+                effect = replace(effect, since=before.since, confirmed=True)
+            elif before is not None and holds:
+                effect = replace(effect, since=self._beginning(answer, window), confirmed=True)
+            effects.append(effect)
+        missed = [one for one in self.effects if one.confirmed
+                  and not any(one.is_same(effect) for effect in effects)]
+        # A window in which a change happens to be weak does not end it while it still helps.
+        if holds:
+            effects += missed
+        return replace(self, effects=tuple(effects), last=window, note='',
+                       recent=(*self.recent, (recording, start))[-live.recent:],
+                       withdrawn=() if holds else tuple(missed))
+
+    def _beginning(self, answer: Diagnosis, window: Window) -> float | None:
+        """Return when the change that a window has came, in this or a recent one [s]."""
+        gains, times = [], []
+        for each, start in (*self.recent, (window.recording, window.start)):
+            before, _ = measure_residuals(self.model, [each])
+            after, _ = measure_residuals(answer.adopted, [each])
+            gains.append(sample_gains(before, after, answer.noise))
+            times.append(start + before.time - before.time[0])
+        return change_point(np.concatenate(times), np.concatenate(gains))
+
+
+def change_point(time: Array, gains: Array) -> float | None:
+    """Return when a model with a change becomes the better one.
+
+    Parameters
+    ----------
+    time, gains : (M,) arrays
+        Times [s], and whitened squared error of the model without the change less that of the
+        model with it: negative before, positive after.
+
+    Returns
+    -------
+    float or None
+        None where it is the better one from the first sample on.
+    """
+    cumulated = np.concatenate(([0.0], np.cumsum(gains)))
+    first = int(np.argmin(cumulated))
+    return None if first == 0 else float(time[min(first, len(time) - 1)])
+
+
+def share_in_motion(recording: Recording, moving: float = LIVE_DECISIONS.moving) -> float:
+    """Return the share of samples in which some drive moves, by its highest speed."""
+    # From sample to sample an encoder's steps look like motion; over a tenth of a second not.
+    span = max(1, round(GLANCE / float(np.median(np.diff(recording.time)))))
+    step, moved = np.diff(recording.time[::span]), np.diff(recording.position[::span], axis=0)
+    if not len(step):
+        return 0.0
+    speed = np.abs(moved) / step[:, None]
+    return float(np.mean(np.any(
+        speed > np.maximum(moving * speed.max(axis=0), STANDSTILL), axis=1)))
+
+
+def _certainty(without: ForceModel, with_effects: ForceModel, recording: Recording,
+               noise: Mapping[str, NoiseSpectrum]) -> float:
+    """Return by how many standard errors a model predicts a recording better than another."""
+    before, _ = measure_residuals(without, [recording])
+    after, _ = measure_residuals(with_effects, [recording])
+    return certainty(block_gains(before, after, noise))
+
+
+def _names(answer: Diagnosis, found: FoundEffect) -> frozenset[str]:
+    """Return the names under which a window may know an effect: its own and its rivals'."""
+    return frozenset({found.name}).union(*(names for names in answer.indistinguishable
+                                if found.name in names))

@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The monitor's live diagnosis: windows of the stream, diagnosed in a process of its own.
+
+The process has the lowest priority and one thread; the node only copies arrays to it and looks,
+now and then, whether there is an answer. It is ended with the node, and started anew where it
+ended by itself.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from multiprocessing import get_context
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+
+LOWEST_PRIORITY = 19
+LEAST_WINDOW = 0.5  # share of the span that a window must have to be diagnosed
+
+
+class Samples(NamedTuple):
+    """Joint states of one window: stamps [ns] (N,), position and effort (N, D)."""
+
+    stamp: np.typing.NDArray[np.int64]
+    position: Array
+    effort: Array
+
+
+class StreamWindows:
+    """Cuts a stream of joint states into windows that do not overlap.
+
+    Parameters
+    ----------
+    every : float
+        Between diagnoses [s], by the stream's stamps; 0: never.
+    span : float
+        Longest window [s].
+    """
+
+    def __init__(self, every: float, span: float) -> None:
+        self._every, self._span = round(every * 1e9), round(span * 1e9)
+        self._ring: deque[tuple[int, Array, Array]] = deque()
+        self._due: int | None = None
+
+    def push(self, stamp: int, position: Array, effort: Array) -> None:
+        """Take one sample; stamps that go back begin a new stream."""
+        if not self._every:
+            return
+        if self._ring and stamp <= self._ring[-1][0]:
+            self._ring.clear()
+            self._due = None
+        if self._due is None:
+            self._due = stamp + max(self._every, round(LEAST_WINDOW * self._span))
+        self._ring.append((stamp, position, effort))
+        while self._ring[0][0] < stamp - self._span:
+            self._ring.popleft()
+
+    def take(self) -> Samples | None:
+        """Return the window that is due, None where none is; its samples are given away."""
+        if self._due is None or not self._ring or self._ring[-1][0] < self._due:
+            return None
+        length = self._ring[-1][0] - self._ring[0][0]
+        self._due += self._every
+        if length < LEAST_WINDOW * self._span:
+            return None
+        rows = list(self._ring)
+        self._ring.clear()
+        return Samples(np.array([stamp for stamp, _, _ in rows]),
+                       np.stack([position for _, position, _ in rows]),
+                       np.stack([effort for _, _, effort in rows]))
+
+
+class DiagnosisWorker:
+    """A process that diagnoses one window after the other, and remembers what it found."""
+
+    def __init__(self) -> None:
+        self._process: Any = None
+        self._pipe: Any = None
+        self.busy = False
+
+    def submit(self, values: Mapping[str, Any], source: str, samples: Samples) -> None:
+        """Begin with a window; with another model than before all is forgotten."""
+        if self._process is None or not self._process.is_alive():
+            self.close()
+            context = get_context('spawn')
+            self._pipe, theirs = context.Pipe()
+            self._process = context.Process(target=_work, args=(theirs,), daemon=True)
+            self._process.start()
+            theirs.close()
+        self._pipe.send((dict(values), source, samples))
+        self.busy = True
+
+    def poll(self) -> dict[str, Any] | None:
+        """Return the answer of `LiveDiagnosis.to_dict`, or {'error': sentence}; None: not yet."""
+        if not self.busy:
+            return None
+        try:
+            if not self._pipe.poll():
+                return None
+            self.busy = False
+            answer: dict[str, Any] = self._pipe.recv()
+            return answer
+        except (EOFError, OSError):
+            self.busy = False
+            return {'error': 'the process that diagnoses has ended; what it knew is forgotten'}
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._pipe.close()
+        self._process, self.busy = None, False
+
+
+def _work(pipe: Any) -> None:
+    """Answer windows until the pipe is closed."""
+    with suppress(OSError):
+        os.nice(LOWEST_PRIORITY)
+    from pprs_dynamics.errors import PprsError
+    from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
+    from pprs_dynamics.measurement.files.recording import Recording
+    from pprs_dynamics.physics.model.model_file import build_model
+
+    known: tuple[dict[str, Any], str] | None = None
+    while True:
+        try:
+            values, source, samples = pipe.recv()
+        except (EOFError, OSError):
+            return
+        start = int(samples.stamp[0])
+        try:
+            if known != (values, source):
+                live, known = LiveDiagnosis(build_model(values, source)), (values, source)
+            live = live.with_window(
+                Recording.from_arrays(
+                    'the last window', (samples.stamp - start) / 1e9, samples.position,
+                    effort=samples.effort, drives=live.model.drives), start / 1e9)
+            answer = live.to_dict()
+        except PprsError as error:
+            answer = {'error': str(error)}
+        pipe.send(answer)

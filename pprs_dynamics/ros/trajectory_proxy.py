@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Node `trajectory_proxy`: goals of FollowJointTrajectory, passed on with efforts filled in.
+
+MoveIt and other planners send goals to `~/follow_joint_trajectory`; the node computes the drives'
+efforts at every point and sends the goal on to the controller's own action. Feedback, result and
+cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is aborted
+with the reason in `error_string`, and nothing reaches the controller.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from rclpy.action import ActionClient, ActionServer, CancelResponse
+from rclpy.serialization import deserialize_message, serialize_message
+from trajectory_msgs.msg import JointTrajectory
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.preparation import prepare
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
+from pprs_dynamics.ros.answer import Feedforward
+from pprs_dynamics.ros.answer_cdr import AnswerBytes
+from pprs_dynamics.ros.feedforward_settings import parameters_for
+from pprs_dynamics.ros.joint_request import read_joint_trajectory
+from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.parameters import NodeParameter, declare_own, drive_count
+from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.request_reader import reader_for
+from pprs_dynamics.ros.status import StatusReporter
+from pprs_dynamics.ros.trajectory_request import SPLINE, TrajectoryRequest
+
+# Of the feedforward node's parameters, those that say what may go out.
+SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
+ACTION = NodeParameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
+                       'of the controller that the goals are passed on to')
+Goal = FollowJointTrajectory.Goal
+Result = FollowJointTrajectory.Result
+
+
+class TrajectoryProxyNode(ExplainsRefusals):
+    """Passes goals on with the efforts that the model says."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
+        parameters = (ACTION, *(one for one in parameters_for(drive_count(self))
+                                if one.name in SHARED))
+        own = declare_own(self, parameters)
+        self._settings = ModelParameters(self, parameters, lambda: None)
+        prepare(self._settings.model)
+        self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
+        self._status = StatusReporter(self, {'action': own['action']}, self._counters)
+        self._theirs: dict[bytes, Any] = {}
+        self._client = ActionClient(self, FollowJointTrajectory, own['action'])
+        self._server = ActionServer(
+            self, FollowJointTrajectory, '~/follow_joint_trajectory', self._execute,
+            cancel_callback=self._cancel)
+        self._status.report('OK', 'WAITING', f'goals go to {own["action"]}')
+
+    async def _execute(self, handle: Any) -> Any:
+        self._counters['received'] += 1
+        try:
+            goal = self._filled(handle.request)
+        except PprsError as error:
+            reason = Rejection.of(error)
+            return self._refused(handle, Result.INVALID_GOAL, reason.code, reason.text)
+        if not self._client.server_is_ready():
+            return self._refused(handle, Result.INVALID_GOAL, 'CONTROLLER', 'nobody serves '
+                                 f'{self._settings.own["action"]}: is the controller active?')
+        theirs = await self._client.send_goal_async(
+            goal, feedback_callback=lambda message: handle.publish_feedback(message.feedback))
+        if not theirs.accepted:
+            return self._refused(handle, Result.INVALID_GOAL, 'CONTROLLER', 'the controller '
+                                 'rejected the goal; its log says why')
+        self._counters['passed_on'] += 1
+        self._status.report('OK', 'OK', 'a goal was passed on with its efforts')
+        key = bytes(handle.goal_id.uuid)
+        self._theirs[key] = theirs
+        if handle.is_cancel_requested:  # while the controller made up its mind
+            theirs.cancel_goal_async()
+        answer = await theirs.get_result_async()
+        del self._theirs[key]
+        if answer.status == GoalStatus.STATUS_SUCCEEDED:
+            handle.succeed()
+        elif answer.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        return answer.result
+
+    def _cancel(self, handle: Any) -> CancelResponse:
+        theirs = self._theirs.get(bytes(handle.goal_id.uuid))
+        if theirs is not None:
+            theirs.cancel_goal_async()
+        return CancelResponse.ACCEPT
+
+    def _refused(self, handle: Any, code: int, status: str, text: str) -> Any:
+        self._counters['refused'] += 1
+        self._status.report('ERROR', status, text)
+        self.get_logger().warning(f'refused, {status}: {text}', throttle_duration_sec=1.0)
+        handle.abort()
+        return Result(error_code=code, error_string=f'{status}: {text}')
+
+    def _filled(self, goal: Any) -> Any:
+        """Return the goal for the controller: of all drives, with their efforts.
+
+        Raises
+        ------
+        PprsError
+            Where it breaks a rule.
+        """
+        model, own = self._settings.model, self._settings.own
+        feedforward = Feedforward(model, own)
+        answer = feedforward.answer(self._request(model, goal))
+        trajectory = deserialize_message(AnswerBytes(model.drives).joint_trajectory(
+            0, answer.request.offsets, answer.forces, answer.effort), JointTrajectory)
+        given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
+        trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives
+        return Goal(
+            trajectory=trajectory, path_tolerance=goal.path_tolerance,
+            goal_tolerance=goal.goal_tolerance, goal_time_tolerance=goal.goal_time_tolerance)
+
+    def _request(self, model: Any, goal: Any) -> TrajectoryRequest:
+        now = self.get_clock().now().nanoseconds
+        missing = self._settings.own['missing_derivatives'] or SPLINE
+        if not isinstance(model, DriveModel):
+            return reader_for(model).read(serialize_message(goal.trajectory), now, 0.0, missing)
+        if not goal.trajectory.points:
+            return reader_for(model).read(
+                serialize_message(goal.multi_dof_trajectory), now, 0.0, missing)
+        # Drives' positions: the platform's motion follows from them.
+        request = read_joint_trajectory(goal.trajectory, model.drives, now, 0.0, missing)
+        drives: Any = request.motion
+        found = solve_forward_motion(
+            model.robot.geometry, drives.position, drives.velocity, drives.acceleration)
+        return request._replace(motion=found.motion)

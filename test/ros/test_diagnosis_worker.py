@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Windows of a stream, and the process that diagnoses them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, Samples, StreamWindows
+
+SECOND = 1_000_000_000
+EPOCH = 1_700_000_000 * SECOND
+PATIENCE = 120.0  # [s] for one window on a busy machine
+
+
+def pushed(windows: StreamWindows, seconds: float, rate: float, start: int) -> list[Samples]:
+    """Return the windows that are due while a stream runs."""
+    found = []
+    for k in range(round(seconds * rate)):
+        windows.push(start + round(k * SECOND / rate), np.full(6, k), np.zeros(6))
+        if (samples := windows.take()) is not None:
+            found.append(samples)
+    return found
+
+
+def test_windows_do_not_overlap_and_are_no_longer_than_the_span() -> None:
+    found = pushed(StreamWindows(10.0, 10.0), 35.0, 20.0, EPOCH)
+    assert len(found) == 3
+    for one, following in zip(found, found[1:], strict=False):
+        assert one.stamp[-1] < following.stamp[0]
+    assert all(one.stamp[-1] - one.stamp[0] <= 10 * SECOND for one in found)
+
+
+def test_a_short_period_waits_until_half_a_span_is_there() -> None:
+    found = pushed(StreamWindows(2.0, 10.0), 30.0, 20.0, EPOCH)
+    assert all(one.stamp[-1] - one.stamp[0] >= 5 * SECOND for one in found)
+
+
+def test_a_clock_that_is_set_back_begins_a_new_stream() -> None:
+    windows = StreamWindows(10.0, 10.0)
+    pushed(windows, 8.0, 20.0, EPOCH)
+    found = pushed(windows, 12.0, 20.0, EPOCH - 3600 * SECOND)
+    assert [one.stamp[0] for one in found] == [EPOCH - 3600 * SECOND]
+
+
+def test_never_takes_no_memory() -> None:
+    windows = StreamWindows(0.0, 10.0)
+    assert pushed(windows, 20.0, 20.0, EPOCH) == []
+    assert not windows._ring
+
+
+def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
+    model = DriveModel.load()
+    motion = Excitation(15.0, seed=1).motion(np.arange(0, 15.0, 0.01))
+    forces = model.drive_forces(motion)
+    effort = forces.total + 0.05 * np.random.default_rng(0).standard_normal(forces.total.shape)
+    stamp = EPOCH + np.arange(len(effort), dtype=np.int64) * SECOND // 100
+    samples = Samples(stamp, forces.mechanism.position, effort)
+    worker = DiagnosisWorker()
+    try:
+        worker.submit(model.values, model.source, samples)
+        os.kill(worker._process.pid, signal.SIGKILL)
+        assert 'ended' in waited_for(worker)['error']
+        worker.submit(model.values, model.source, samples)
+        assert os.getpriority(os.PRIO_PROCESS, worker._process.pid) >= 0
+        answer = waited_for(worker)
+        assert answer['effects'] == []
+        assert answer['verdict'] == 'adequate'
+        assert answer['window'][0] == EPOCH / SECOND
+    finally:
+        worker.close()
+    assert not worker.busy
+
+
+def waited_for(worker: DiagnosisWorker) -> dict[str, Any]:
+    """Return the worker's answer."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if (answer := worker.poll()) is not None:
+            return answer
+        time.sleep(0.05)
+    raise AssertionError('no answer')
