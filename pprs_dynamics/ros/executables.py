@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
+import importlib.util
 import signal
 import sys
 
@@ -32,6 +33,15 @@ def play_trajectory() -> int:
 def simulated_robot() -> int:
     """Run `ros2 run pprs_dynamics simulated_robot`."""
     return _run('simulated_robot', 'SimulatedRobotNode')
+
+
+def trajectory_proxy() -> int:
+    """Run `ros2 run pprs_dynamics trajectory_proxy`."""
+    if importlib.util.find_spec('control_msgs') is None:
+        print('trajectory_proxy needs control_msgs: apt install ros-$ROS_DISTRO-control-msgs',
+              file=sys.stderr)
+        return 2
+    return _run('trajectory_proxy', 'TrajectoryProxyNode')
 
 
 def _run(module: str, node: str) -> int:
