@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ def pushed(windows: StreamWindows, seconds: float, rate: float, start: int) -> l
 def test_windows_do_not_overlap_and_are_no_longer_than_the_span() -> None:
     found = pushed(StreamWindows(10.0, 10.0), 35.0, 20.0, EPOCH)
     assert len(found) == 3
-    for one, following in zip(found, found[1:], strict=False):
+    for one, following in pairwise(found):
         assert one.stamp[-1] < following.stamp[0]
     assert all(one.stamp[-1] - one.stamp[0] <= 10 * SECOND for one in found)
 

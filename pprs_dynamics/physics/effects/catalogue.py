@@ -32,6 +32,7 @@ from pprs_dynamics.physics.effects.laws.homing_error import HomingError
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
+from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.effects.laws.payload_inertia import PayloadInertia
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.laws.payload_moment import PayloadMoment
@@ -52,7 +53,8 @@ if TYPE_CHECKING:
 
 GROUP = 'pprs_dynamics.effects'
 # Parts of the drive forces and keys of the block `effects` that have these names already.
-RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
+RESERVED = ('active', 'active_friction', 'measured', 'measured_curve', 'offset',
+            'passive_friction', 'rigid_body')
 
 CATALOGUE: dict[str, type[CatalogueEffect]] = {
     effect.name: effect
@@ -88,10 +90,13 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
     )
 }
 
+# In model files and nodes like any effect, but never searched for: it explains nothing.
+MEASURED: dict[str, type[CatalogueEffect]] = {MeasuredCurve.name: MeasuredCurve}
+
 
 def find_effect(name: str) -> type[CatalogueEffect] | None:
     """Return the effect of that name, or None; other packages are asked only where need be."""
-    return CATALOGUE.get(name) or catalogue().get(name)
+    return MEASURED.get(name) or CATALOGUE.get(name) or catalogue().get(name)
 
 
 @cache

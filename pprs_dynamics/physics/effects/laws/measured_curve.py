@@ -1,0 +1,211 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A measured curve: a drive's force over one variable that no law of the catalogue explains.
+
+It is a correction table, as cogging maps and cable forces are compensated in practice: no cause,
+and nothing outside the range in which it was measured. The curve is a cubic B-spline with uniform
+knots (de Boor, A Practical Guide to Splines, 1978), periodic where the joint turns; beyond its
+range it goes on with its last value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.effect import Card
+from pprs_dynamics.physics.three_pprs.state import DriveStates
+
+OWN = ('position', 'velocity', 'acceleration', 'load')  # of the drive itself
+OF = ('position', 'velocity')  # of another drive: 'position of lift_1'
+FEWEST, MOST = 1, 400  # intervals between knots
+DEGREE = 3
+
+
+class Curve(NamedTuple):
+    """One drive's curve.
+
+    Parameters
+    ----------
+    variable : str
+        One of `OWN`, or 'position of DRIVE', 'velocity of DRIVE'.
+    start, end : float
+        Range in which it was measured, in the variable's unit.
+    values : tuple of float
+        Coefficients of the B-splines [N, N m]: one per interval where it is periodic, else three
+        more.
+    periodic : bool
+        Whether the end joins the start.
+    """
+
+    variable: str
+    start: float
+    end: float
+    values: tuple[float, ...]
+    periodic: bool = False
+
+    @property
+    def intervals(self) -> int:
+        """Between knots."""
+        return len(self.values) - (0 if self.periodic else DEGREE)
+
+    def basis(self, x: Array) -> tuple[np.ndarray, Array]:
+        """Return which four coefficients count at each x, (N, 4), and their weights, (N, 4)."""
+        return spline_basis(x, self.start, self.end, self.intervals, self.periodic)
+
+    def force(self, x: Array) -> Array:
+        """Return the force at values of the variable, (N,) [N, N m]."""
+        index, weight = self.basis(x)
+        force: Array = (np.asarray(self.values)[index] * weight).sum(axis=1)
+        return force
+
+    def outside(self, x: Array) -> Array:
+        """Return which samples lie outside the measured range, (N,) bool."""
+        if self.periodic:
+            return np.zeros(len(x), dtype=bool)
+        return (x < self.start) | (x > self.end)
+
+
+def spline_basis(
+    x: Array, start: float, end: float, intervals: int, periodic: bool,
+) -> tuple[np.ndarray, Array]:
+    """Return indices and values of the four cubic B-splines that are not zero at each x.
+
+    Parameters
+    ----------
+    x : (N,) array
+    start, end : float
+        Outermost knots; x beyond them counts as on them, or joins on the other side.
+    intervals : int
+        Between the knots.
+    periodic : bool
+
+    Returns
+    -------
+    (N, 4) int array, (N, 4) array
+    """
+    u = (x - start) / (end - start) * intervals
+    u = np.mod(u, intervals) if periodic else np.clip(u, 0.0, intervals)
+    interval = np.minimum(u.astype(int), intervals - 1)
+    f = u - interval
+    weight = np.stack(((1 - f) ** 3, 3 * f ** 3 - 6 * f ** 2 + 4,
+                       -3 * f ** 3 + 3 * f ** 2 + 3 * f + 1, f ** 3), axis=1) / 6
+    index = interval[:, None] + np.arange(DEGREE + 1)
+    return (index % intervals if periodic else index), weight
+
+
+class MeasuredCurve(DriveEffect):
+    """A drive's force over one variable, as it was measured: a table, not a cause."""
+
+    name: ClassVar[str] = 'measured_curve'
+    linear = ()
+    variants = ((),)
+    card = Card(
+        'f(x), a cubic B-spline over position, velocity, acceleration, load, or position or '
+        'velocity of another drive',
+        'whatever no other effect explains, as long as it depends on one variable',
+        'not told: a cogging map, a cable that pulls, a bent screw and a belt stage look like this',
+        'a second recording along another motion must fall by it as well',
+        'de Boor, A Practical Guide to Splines, Springer, 1978')
+
+    def __init__(self, drives: Mapping[str, Mapping[str, Any]]) -> None:
+        super().__init__({drive: dict(values) for drive, values in drives.items()})
+        self.curves = {drive: Curve(
+            values['variable'], values['from'], values['to'], tuple(values['values']),
+            values['periodic']) for drive, values in drives.items() if 'values' in values}
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return none: a curve is adopted as a whole, not scaled."""
+        return ()
+
+    def force(self, state: DriveStates, memory: Any = None) -> Array:
+        """Return the curves' forces [N, N m], (N, D)."""
+        force = np.zeros_like(state.velocity)
+        for drive, curve in self.curves.items():
+            force[:, state.drives.index(drive)] = curve.force(
+                variable_of(state, drive, curve.variable))
+        return force
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from `{drive: {variable, from, to, values, periodic}}`."""
+        prefix = f'effects.{cls.name}'
+        if not isinstance(values, Mapping) or not values:
+            raise ModelError(prefix, values, 'map drives to curves, e.g. lift_1: {variable: '
+                             'position, from: 0.0, to: 0.1, values: [...]}')
+        return cls({drive: _checked(f'{prefix}.{drive}', block, complete)
+                    for drive, block in values.items()})
+
+    def to_file(self) -> dict[str, Any]:
+        """Return `{drive: {variable, from, to, values, periodic}}`."""
+        return {drive: {key: list(value) if key == 'values' else value
+                        for key, value in values.items()}
+                for drive, values in self.drives.items()}
+
+
+def variable_of(state: DriveStates, drive: str, variable: str) -> Array:
+    """Return the variable of a drive's curve at all samples, (N,)."""
+    name, _, other = variable.partition(' of ')
+    column = state.drives.index(other or drive)
+    values: Array = getattr(state, 'guide_load' if name == 'load' else name)[:, column]
+    return values
+
+
+def check_variable(key: str, variable: Any, drives: Sequence[str] = ()) -> str:
+    """Return a variable that a curve may have, or raise ModelError."""
+    rule = (f'be one of {", ".join(OWN)}, or {" or ".join(f"{name} of DRIVE" for name in OF)}')
+    if not isinstance(variable, str):
+        raise ModelError(key, variable, rule)
+    name, of, other = variable.partition(' of ')
+    if name not in (OF if of else OWN) or (of and not other):
+        raise ModelError(key, variable, rule)
+    if of and drives and other not in drives:
+        raise UnknownNameError('drive', other, drives, key)
+    return variable
+
+
+def _checked(prefix: str, block: Any, complete: bool) -> dict[str, Any]:
+    keys = ('variable', 'from', 'to', 'values', 'periodic')
+    if not isinstance(block, Mapping):
+        raise ModelError(prefix, block, f'map {", ".join(keys)} to their values')
+    for key in block:
+        if key not in keys:
+            raise UnknownNameError('key', f'{prefix}.{key}', [f'{prefix}.{one}' for one in keys])
+    missing = [key for key in keys[:-1] if key not in block]
+    if missing and complete:
+        raise ModelError(f'{prefix}.{missing[0]}', MISSING, 'be given')
+    found: dict[str, Any] = {}
+    if 'variable' in block:
+        found['variable'] = check_variable(f'{prefix}.variable', block['variable'])
+    for key in ('from', 'to'):
+        if key in block:
+            found[key] = _number(f'{prefix}.{key}', block[key])
+    if len(found) == 3 and not found['from'] < found['to']:
+        raise ModelError(f'{prefix}.to', found['to'], f'be greater than from, {found["from"]:g}')
+    periodic = block.get('periodic', False)
+    if not isinstance(periodic, bool):
+        raise ModelError(f'{prefix}.periodic', periodic, 'be true or false')
+    found['periodic'] = periodic
+    if 'values' in block:
+        values = block['values']
+        least, most = FEWEST + DEGREE, MOST + DEGREE
+        if isinstance(values, str) or not isinstance(values, Sequence) or not (
+                least <= len(values) <= most):
+            raise ModelError(f'{prefix}.values', values,
+                             f'be a list of {least} to {most} numbers, coefficients of B-splines')
+        found['values'] = tuple(_number(f'{prefix}.values', value) for value in values)
+    return found
+
+
+def _number(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ModelError(key, value, 'be a finite number')
+    return float(value)
