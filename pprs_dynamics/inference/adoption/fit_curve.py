@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A curve over one variable, fitted to what a model leaves of a drive's error.
+
+The curve is a B-spline with a prior on its roughness (Eilers & Marx, Flexible smoothing with
+B-splines and penalties, Statistical Science 11, 1996). Number of knots and smoothness maximise the
+restricted likelihood under the drive's noise: with the coefficients integrated out, more knots are
+no better by themselves. The same number, against that without a curve, is the evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError, UnknownNameError
+from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.laws.measured_curve import (
+    DEGREE,
+    OF,
+    Curve,
+    MeasuredCurve,
+    check_variable,
+    spline_basis,
+)
+
+INTERVALS = (6, 12, 24, 48, 96)  # between knots, tried
+# Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
+ROUGHNESS = np.geomspace(1e-3, 3.0, 15)
+WIDEST = 10.0  # prior standard deviation of the curve itself, as a multiple of the error's rms
+LEAST_SHARE = 0.002  # of the samples at each end of the variable, beyond which nothing is fitted
+TURN = 2 * pi
+BLOCKS = 10
+
+
+class CurveError(PprsError, ValueError):
+    """A curve that recordings cannot give."""
+
+
+@dataclass(frozen=True)
+class CurveRequest:
+    """A curve that somebody wants in the model: measured_curve:DRIVE@VARIABLE.
+
+    Parameters
+    ----------
+    drive, variable : str
+        The latter as in the results of a comparison.
+    """
+
+    drive: str
+    variable: str
+
+    @classmethod
+    def of(cls, text: str, known: tuple[str, ...]) -> CurveRequest:
+        """Read DRIVE@VARIABLE.
+
+        Raises
+        ------
+        CurveError, UnknownNameError, ModelError
+            For another form, a drive that is not known, a variable that no curve has.
+        """
+        drive, at, variable = text.partition('@')
+        if not at:
+            raise CurveError(f'measured_curve:{text} must be measured_curve:DRIVE@VARIABLE, e.g. '
+                             f'measured_curve:{known[0]}@position')
+        if drive not in known:
+            raise UnknownNameError('drive', drive, known, 'measured_curve')
+        return cls(drive, check_variable('measured_curve', variable, known))
+
+    @property
+    def drives(self) -> tuple[str]:
+        """The drive alone."""
+        return (self.drive,)
+
+    @property
+    def effect(self) -> type[MeasuredCurve]:
+        """Of the model file."""
+        return MeasuredCurve
+
+    @property
+    def name(self) -> str:
+        """As in results and ledgers."""
+        return f'{MeasuredCurve.name}:{self.drive}@{self.variable}'
+
+
+@dataclass(frozen=True)
+class FittedCurve:
+    """A curve with its band.
+
+    Parameters
+    ----------
+    curve : Curve
+    covariance : (p, p) array
+        Of its values [N^2].
+    evidence : float
+        Twice the gain in log restricted likelihood, the curve's coefficients integrated out.
+    freedom : float
+        Effective number of coefficients.
+    roughness : float
+        Prior standard deviation of second differences [N].
+    """
+
+    curve: Curve
+    covariance: Array
+    evidence: float
+    freedom: float
+    roughness: float
+
+    def band(self, x: Array) -> Array:
+        """Return the standard deviation of the curve at values of its variable, (N,)."""
+        index, weight = self.curve.basis(x)
+        covariance = self.covariance[index[:, :, None], index[:, None, :]]
+        band: Array = np.sqrt(np.einsum('ni,nij,nj->n', weight, covariance, weight))
+        return band
+
+
+def curve_variable(residuals: Residuals, request: CurveRequest) -> Array:
+    """Return the variable at every sample of residuals, (M,).
+
+    Raises
+    ------
+    CurveError
+        Where it is not known of this robot.
+    """
+    name, _, other = request.variable.partition(' of ')
+    drive = residuals.drives.index(other if name in OF and other else request.drive)
+    values = residuals.variable(name, drive)
+    if values is None:
+        raise CurveError(f'{request.name}: {request.variable} is not known of this robot')
+    return values
+
+
+def fit_curve(
+    residuals: Residuals, request: CurveRequest, noise: NoiseSpectrum,
+    left_out: slice | None = None,
+) -> FittedCurve:
+    """Fit a curve to a drive's error.
+
+    Parameters
+    ----------
+    residuals : Residuals
+        Of the model that the curve joins.
+    request : CurveRequest
+    noise : NoiseSpectrum
+        Of the drive.
+    left_out : slice, optional
+        Samples that are not fitted.
+
+    Raises
+    ------
+    CurveError
+        Where the variable does not vary, or the drive was not measured.
+    """
+    drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
+    if left_out is not None:
+        measured = residuals.measured.copy()
+        measured[left_out, drive] = np.nan
+        if not np.isfinite(measured).any():
+            raise CurveError(f'{request.name}: {request.drive} was not measured')
+        residuals = replace(residuals, measured=measured)
+    series = DriveSeries(residuals, drive, FrequencyBands.for_residuals(residuals))
+    if series.known.sum() < 10 * (INTERVALS[0] + DEGREE):
+        raise CurveError(f'{request.name}: {request.drive} was measured at {series.known.sum()} '
+                         'samples only')
+    seen = x[series.index][series.known]
+    start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
+    if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
+        raise CurveError(f'{request.name}: {request.variable} hardly varies in the recordings')
+    turns = (request.variable.startswith('position') and seen.max() - seen.min() >= TURN
+             and residuals.units_of(request.drive).position == 'rad')
+    if turns:
+        start, end = -pi, pi
+    root = np.sqrt(noise.power(series.frequency))
+    error = series.transform(series.error) / root
+    scale = float(np.sqrt(np.mean(series.error[series.known] ** 2)))
+    best: FittedCurve | None = None
+    for intervals in INTERVALS:
+        index, weight = spline_basis(x[series.index], start, end, intervals, turns)
+        count = intervals + (0 if turns else DEGREE)
+        columns = np.zeros((count, len(series)))
+        for k in range(DEGREE + 1):
+            np.add.at(columns, (index[:, k], np.arange(len(series))), weight[:, k])
+        rows = series.transform(columns) / root
+        gram, moment = rows @ rows.T, rows @ error
+        for fitted in _smoothed(gram, moment, scale, turns):
+            if best is None or fitted[2] > best.evidence:
+                values, covariance, evidence, freedom, roughness = fitted
+                best = FittedCurve(
+                    Curve(request.variable, float(start), float(end),
+                          tuple(map(float, values)), turns), covariance, evidence, freedom,
+                    roughness)
+    assert best is not None
+    return best
+
+
+def _smoothed(gram: Array, moment: Array, scale: float, periodic: bool,
+              ) -> Iterator[tuple[Array, Array, float, float, float]]:
+    """Yield values, covariance, evidence, freedom and roughness for each prior of smoothness."""
+    count = len(gram)
+    second = np.diff(np.eye(count), 2, axis=0)
+    if periodic:
+        second = np.eye(count) - 2 * np.roll(np.eye(count), 1, 1) + np.roll(np.eye(count), 2, 1)
+    wide = np.eye(count) / (WIDEST * scale) ** 2
+    for share in ROUGHNESS:
+        deviation = share * scale
+        prior = second.T @ second / deviation ** 2 + wide
+        factor = np.linalg.cholesky(gram + prior)
+        half = np.linalg.solve(factor, moment)
+        values = np.linalg.solve(factor.T, half)
+        inverse = np.linalg.inv(factor)
+        covariance = inverse.T @ inverse
+        logs = 2 * np.log(np.diag(factor)).sum() - np.linalg.slogdet(prior)[1]
+        yield (values, covariance, float(half @ half - logs),
+               float(np.trace(covariance @ gram)), deviation)
+
+
+def held_out_error(
+    residuals: Residuals, request: CurveRequest, noise: NoiseSpectrum,
+    report: Callable[[float], None] = lambda share: None,
+) -> Array:
+    """Return a drive's error with the curve, each block's from a fit to the others, (M,)."""
+    drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
+    error: Array = residuals.error[:, drive].copy()
+    edges = np.linspace(0, len(residuals), BLOCKS + 1).astype(int)
+    for number, (first, last) in enumerate(pairwise(edges)):
+        block = slice(int(first), int(last))
+        error[block] -= fit_curve(residuals, request, noise, block).curve.force(x[block])
+        report((number + 1) / BLOCKS)
+    return error
+
+
+def price(drives: int, variables: int) -> float:
+    """Return what choosing one curve among all costs [2 log odds]."""
+    return 2.0 * float(np.log(drives * variables))
+
+
