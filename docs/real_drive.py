@@ -20,7 +20,8 @@ from emps import IDENTIFICATION, PULSES, find_data, read_emps
 from scipy.signal import butter, decimate, filtfilt
 
 from pprs_dynamics import AxisModel, AxisMotion, PprsError
-from pprs_dynamics.inference.adoption.adopt import Adoption, adopt
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose

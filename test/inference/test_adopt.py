@@ -27,7 +27,8 @@ from ros_processes import environment, executable, node_process
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.adoption import loop, objections
-from pprs_dynamics.inference.adoption.adopt import Adoption, adopt
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.measurement.files.fingerprint import fingerprint

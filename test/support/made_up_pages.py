@@ -28,7 +28,7 @@ from pprs_dynamics.app.report.experiment_page import experiment_page
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.history_page import history_page
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.inference.adoption.adopt import VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles

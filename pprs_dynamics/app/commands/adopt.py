@@ -25,7 +25,7 @@ from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
-from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
@@ -34,7 +34,8 @@ from pprs_dynamics.physics.model.parameter_file import find_file
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('effect', metavar='EFFECT', help='name of an effect, on the drives that '
-                        'the recordings call for; or EFFECT:drive,drive')
+                        'the recordings call for; or EFFECT:drive,drive; or '
+                        'measured_curve:DRIVE@VARIABLE for what no effect explains')
     add_recordings(parser)
     add_validation(parser)
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL), required=True,
@@ -51,8 +52,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     base = find_file(options.model)
     model = load_model(base)
-    request = EffectRequest.of(options.effect, model.drives)
-    request.require_place(model)
+    request = requested(options.effect, model)
     recordings = read_recordings(options, screen, model)
     validation = read_validation(options, screen, model, recordings)
     with progress_bar(screen, f'adopting {request.name}') as progress:

@@ -13,7 +13,7 @@ import numpy as np
 from pprs_dynamics.app.report.adoption_tables import error_rows, headline, parameter_rows
 from pprs_dynamics.app.report.diagnosis_figures import before_and_after, contributions
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.inference.adoption.adopt import Adoption
+from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive

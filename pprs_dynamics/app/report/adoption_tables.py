@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.panel import Panel
 from rich.table import Table
 
-from pprs_dynamics.inference.adoption.adopt import VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.diagnosis.quantities import counted, in_unit, plain, with_uncertainty
 
 MOST_SHOWN = 6  # values without --details

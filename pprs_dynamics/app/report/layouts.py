@@ -24,7 +24,8 @@ FORCES = 'measured and model'
 def plotjuggler_layout(drives: Sequence[str]) -> str:
     """Return a layout with one tab for efforts and one for residuals, one plot a drive."""
     root = ElementTree.Element('root')
-    window = ElementTree.SubElement(root, 'tabbed_widget', name='Main Window', parent='main_window')
+    window = ElementTree.SubElement(
+        root, 'tabbed_widget', {'name': 'Main Window', 'parent': 'main_window'})
     for name, topics in ((FORCES, (MEASURED, MODEL)), ('residual', (RESIDUAL,))):
         tab = ElementTree.SubElement(window, 'Tab', tab_name=name, containers='1')
         share = ';'.join([f'{1 / len(drives):.6f}'] * len(drives))

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.inference.adoption.adopt import Adoption, adopt
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment

@@ -34,7 +34,8 @@ from pprs_dynamics.app.workbench.shown import (
 from pprs_dynamics.app.workbench.tick_board import TickBoard
 from pprs_dynamics.app.workbench.what_if import WhatIf
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.adoption.adopt import Adoption, original
+from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis

@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption import objections
+from pprs_dynamics.inference.adoption.adopt_curve import adopt_curve
+from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
 from pprs_dynamics.inference.adoption.fit_effect import StandingError, fit_effect
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
@@ -39,91 +41,12 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.model_file import build_model
 
-BLOCKS, VALIDATION = 'blocks', 'validation'
 # Shares of the work, for the progress bar.
 DIAGNOSIS, FIT = 0.5, 0.85
 
 
-@dataclass(frozen=True)
-class Adoption:
-    """The answer to a requested effect.
-
-    Parameters
-    ----------
-    request : EffectRequest
-    drives : tuple of str or None
-        On which it was fitted.
-    adopted, forced : bool
-        Forced: in spite of objections.
-    reason : str
-        Why, in one sentence.
-    objections, remarks : tuple of str
-    parameters : dict of str to Estimate
-    calibrated : tuple of Calibration
-        Numbers of the model that moved within their tolerances.
-    rivals : tuple of str
-        Effects that explain the recordings as well.
-    before, after : ForceModel
-        As given; and with the effect. The latter is the former where the effect gives no model.
-    residuals_before, residuals_after : Residuals
-        On the recordings.
-    error_before, error_after, held_out_before, held_out_after : float
-        [N]
-    held_out_on : {'blocks', 'validation'}
-    noise_floor : float
-        Root of the mean square of the noise, as the diagnosis has it [N].
-    noise_floors : mapping of str to float
-        The same by drive [N].
-    """
-
-    request: EffectRequest
-    drives: tuple[str, ...] | None
-    adopted: bool
-    forced: bool
-    reason: str
-    objections: tuple[str, ...]
-    remarks: tuple[str, ...]
-    parameters: dict[str, Estimate]
-    calibrated: tuple[Calibration, ...]
-    rivals: tuple[str, ...]
-    before: ForceModel
-    after: ForceModel
-    residuals_before: Residuals
-    residuals_after: Residuals
-    error_before: float
-    error_after: float
-    held_out_before: float
-    held_out_after: float
-    held_out_on: str
-    noise_floor: float
-    noise_floors: dict[str, float]
-
-    @property
-    def unit(self) -> str:
-        """Unit of errors over all drives."""
-        return self.residuals_before.unit
-
-    @property
-    def effect(self) -> str:
-        """Name of the effect."""
-        return self.request.name
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON of `pprs adopt`."""
-        return {
-            'adopted': self.adopted, 'reason': self.reason, 'effect': self.effect,
-            'drives': None if self.drives is None else list(self.drives),
-            'error_before': self.error_before, 'error_after': self.error_after,
-            'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after,
-            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
-            'forced': self.forced, 'objections': list(self.objections),
-            'remarks': list(self.remarks), 'rivals': list(self.rivals),
-            'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
-            'calibrated': [one.to_dict() for one in self.calibrated]}
-
-
 def adopt(
-    model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
+    model: ForceModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
     decisions: Decisions = DECISIONS,
@@ -133,7 +56,7 @@ def adopt(
     Parameters
     ----------
     model : ForceModel
-    request : EffectRequest
+    request : EffectRequest or CurveRequest
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
@@ -152,6 +75,8 @@ def adopt(
     PprsError
         As `measure_residuals`.
     """
+    if isinstance(request, CurveRequest):
+        return adopt_curve(model, request, recordings, validate, force, progress, diagnosis)
     report = progress or (lambda share: None)
     request.require_place(model)
     start = original(model)

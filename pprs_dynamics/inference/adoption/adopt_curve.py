@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.inference.adoption import objections
-from pprs_dynamics.inference.adoption.adopt import BLOCKS, VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.fit_curve import (
     CurveRequest,
     FittedCurve,

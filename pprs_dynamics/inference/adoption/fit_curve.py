@@ -31,6 +31,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import (
     check_variable,
     spline_basis,
 )
+from pprs_dynamics.physics.model.force_model import ForceModel
 
 INTERVALS = (6, 12, 24, 48, 96)  # between knots, tried
 # Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
@@ -84,6 +85,9 @@ class CurveRequest:
     def effect(self) -> type[MeasuredCurve]:
         """Of the model file."""
         return MeasuredCurve
+
+    def require_place(self, model: ForceModel) -> None:
+        """Accept every model: a curve acts in each of them."""
 
     @property
     def name(self) -> str:
@@ -174,8 +178,8 @@ def fit_curve(
     start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
     if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
         raise CurveError(f'{request.name}: {request.variable} hardly varies in the recordings')
-    turns = (request.variable.startswith('position') and seen.max() - seen.min() >= TURN
-             and residuals.units_of(request.drive).position == 'rad')
+    turns = bool(request.variable.startswith('position') and seen.max() - seen.min() >= TURN
+                 and residuals.units_of(request.drive).position == 'rad')
     if turns:
         start, end = -pi, pi
     root = np.sqrt(noise.power(series.frequency))

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
-from pprs_dynamics.inference.adoption.adopt import Adoption, adopt, original
+from pprs_dynamics.inference.adoption.adopt import adopt, original
+from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect

@@ -9,9 +9,11 @@ import difflib
 from dataclasses import dataclass
 
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
 from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
@@ -81,3 +83,19 @@ class EffectRequest:
                 return not isinstance(effect, DriveEffect) or (
                     self.drives is not None and set(self.drives) <= set(effect.drives))
         return False
+
+
+def requested(text: str, model: ForceModel) -> EffectRequest | CurveRequest:
+    """Read EFFECT, EFFECT:drive,drive or measured_curve:DRIVE@VARIABLE for a model.
+
+    Raises
+    ------
+    PprsError
+        As `EffectRequest.of`, `EffectRequest.require_place` and `CurveRequest.of`.
+    """
+    name, _, rest = text.partition(':')
+    if name == MeasuredCurve.name:
+        return CurveRequest.of(rest, model.drives)
+    request = EffectRequest.of(text, model.drives)
+    request.require_place(model)
+    return request

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 
@@ -59,6 +60,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.verdict == 'unknown':
+        if (curve := _curve(diagnosis)) is not None:
+            return ('Look at that place on the machine. A measured curve takes the error away '
+                    'until the cause is known', files.command(
+                        'adopt', curve, '--output', 'with_curve.yaml', held_out=True))
         return ('Look at that place on the machine, and record the motion again: what comes back '
                 'is the machine. Then diagnose both recordings', repeat)
     if diagnosis.verdict == 'ambiguous':
@@ -79,3 +84,12 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 repeat)
     return ('Nothing to add. Another motion may show what this one does not excite',
             replace(files, recordings=(SECOND,)).command('diagnose'))
+
+
+def _curve(diagnosis: Diagnosis) -> str | None:
+    """Return the curve that takes what no effect explains, as `adopt` takes it."""
+    for one in diagnosis.depends_on:
+        name, _, other = one.variable.partition(' of ')
+        if name in (OF if other else OWN):
+            return f'{MeasuredCurve.name}:{one.drive}@{one.variable}'
+    return None

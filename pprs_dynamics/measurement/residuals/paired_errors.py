@@ -60,7 +60,8 @@ def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseS
     gains = sample_gains(before, after, noises)
     edges = np.linspace(0, len(before), BLOCKS + 1)
     block = np.searchsorted(edges, np.arange(len(before)), side='right') - 1
-    return np.bincount(block, gains, BLOCKS)
+    summed: Array = np.bincount(block, gains, BLOCKS).astype(float)
+    return summed
 
 
 def certainty(gains: Array) -> float:

@@ -66,7 +66,7 @@ class Curve(NamedTuple):
         force: Array = (np.asarray(self.values)[index] * weight).sum(axis=1)
         return force
 
-    def outside(self, x: Array) -> Array:
+    def outside(self, x: Array) -> np.ndarray:
         """Return which samples lie outside the measured range, (N,) bool."""
         if self.periodic:
             return np.zeros(len(x), dtype=bool)
@@ -146,9 +146,12 @@ class MeasuredCurve(DriveEffect):
 
     def to_file(self) -> dict[str, Any]:
         """Return `{drive: {variable, from, to, values, periodic}}`."""
-        return {drive: {key: list(value) if key == 'values' else value
-                        for key, value in values.items()}
-                for drive, values in self.drives.items()}
+        blocks: dict[str, dict[str, Any]] = {
+            drive: dict(values) for drive, values in self.drives.items()}
+        for block in blocks.values():
+            if 'values' in block:
+                block['values'] = list(block['values'])
+        return blocks
 
 
 def variable_of(state: DriveStates, drive: str, variable: str) -> Array:

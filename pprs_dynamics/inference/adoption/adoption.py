@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The answer to a requested effect: the model with it, errors before and after, objections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+BLOCKS, VALIDATION = 'blocks', 'validation'
+
+
+@dataclass(frozen=True)
+class Adoption:
+    """The answer to a requested effect.
+
+    Parameters
+    ----------
+    request : EffectRequest or CurveRequest
+    drives : tuple of str or None
+        On which it was fitted.
+    adopted, forced : bool
+        Forced: in spite of objections.
+    reason : str
+        Why, in one sentence.
+    objections, remarks : tuple of str
+    parameters : dict of str to Estimate
+    calibrated : tuple of Calibration
+        Numbers of the model that moved within their tolerances.
+    rivals : tuple of str
+        Effects that explain the recordings as well.
+    before, after : ForceModel
+        As given; and with the effect. The latter is the former where the effect gives no model.
+    residuals_before, residuals_after : Residuals
+        On the recordings.
+    error_before, error_after, held_out_before, held_out_after : float
+        [N]
+    held_out_on : {'blocks', 'validation'}
+    noise_floor : float
+        Root of the mean square of the noise, as the diagnosis has it [N].
+    noise_floors : mapping of str to float
+        The same by drive [N].
+    """
+
+    request: EffectRequest | CurveRequest
+    drives: tuple[str, ...] | None
+    adopted: bool
+    forced: bool
+    reason: str
+    objections: tuple[str, ...]
+    remarks: tuple[str, ...]
+    parameters: dict[str, Estimate]
+    calibrated: tuple[Calibration, ...]
+    rivals: tuple[str, ...]
+    before: ForceModel
+    after: ForceModel
+    residuals_before: Residuals
+    residuals_after: Residuals
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    held_out_on: str
+    noise_floor: float
+    noise_floors: dict[str, float]
+
+    @property
+    def unit(self) -> str:
+        """Unit of errors over all drives."""
+        return self.residuals_before.unit
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect."""
+        return self.request.name
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON of `pprs adopt`."""
+        return {
+            'adopted': self.adopted, 'reason': self.reason, 'effect': self.effect,
+            'drives': None if self.drives is None else list(self.drives),
+            'error_before': self.error_before, 'error_after': self.error_after,
+            'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after,
+            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
+            'forced': self.forced, 'objections': list(self.objections),
+            'remarks': list(self.remarks), 'rivals': list(self.rivals),
+            'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
+            'calibrated': [one.to_dict() for one in self.calibrated]}
