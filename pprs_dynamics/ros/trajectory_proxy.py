@@ -29,6 +29,7 @@ from pprs_dynamics.ros.feedforward_settings import parameters_for
 from pprs_dynamics.ros.joint_request import read_joint_trajectory
 from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.parameters import NodeParameter, declare_own, drive_count
+from pprs_dynamics.ros.provenance import hardware_of
 from pprs_dynamics.ros.rejection import Rejection
 from pprs_dynamics.ros.request_reader import reader_for
 from pprs_dynamics.ros.status import StatusReporter
@@ -53,7 +54,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._settings = ModelParameters(self, parameters, lambda: None)
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
-        self._status = StatusReporter(self, {'action': own['action']}, self._counters)
+        self._status = StatusReporter(self, {'action': own['action']}, self._counters,
+                                      hardware_of(self._settings.model))
         self._theirs: dict[bytes, Any] = {}
         self._client = ActionClient(self, FollowJointTrajectory, own['action'])
         self._server = ActionServer(
