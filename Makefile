@@ -104,7 +104,7 @@ $(VENV)/.test: $(VENV)/.demo
 
 $(VENV)/.docs: $(VENV)/.demo
 	@echo 'Installing Sphinx for the documentation ...'
-	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,arm,fleet,docs]'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,docs]'
 	@touch $@
 
 $(VENV)/bin/python:

@@ -40,7 +40,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
-        (f'share/{package_name}/config', glob('config/*.yaml')),
+        (f'share/{package_name}/config', glob('config/*.yaml') + glob('config/*.urdf')),
         (f'share/{package_name}/config/ros2_control', glob('config/ros2_control/*.yaml')),
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
     ],
@@ -55,12 +55,11 @@ setup(
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
-        'arm': ['pin>=3'],
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
         # The site of the documentation: Markdown and notebooks, in a theme that reads on a phone.
-        'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8', 'pin>=3'],
+        'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',

@@ -15,7 +15,14 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import ARM_JOINTS, KEYS, NAMES, NODE_PREFIXES, is_arm
+from pprs_dynamics.physics.model.keys import (
+    KEYS,
+    NAMES,
+    NODE_PREFIXES,
+    drives_key,
+    is_mechanism,
+    mechanism_block,
+)
 from pprs_dynamics.ros.parameters import (
     NodeParameter,
     added_descriptor,
@@ -83,7 +90,7 @@ class ModelParameters:
         self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
     ) -> None:
         self._node, self._declared, self._changed = node, tuple(own), changed
-        self._kind: type[NodeModel] = ArmModel if is_arm(overrides(node)) else DriveModel
+        self._kind: type[NodeModel] = ArmModel if is_mechanism(overrides(node)) else DriveModel
         taken_from_paper = []
         if self._kind is ArmModel:
             declare_arm(node)
@@ -108,7 +115,8 @@ class ModelParameters:
         own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
         model = self._kind.from_parameters(values)
         if self._drives not in (None, model.drives):
-            raise ModelError(ARM_JOINTS, model.drives, 'stay as it was when the node started: '
+            raise ModelError(drives_key(mechanism_block(values)), model.drives,
+                             'stay as it was when the node started: '
                              f'{", ".join(self._drives or ())}')
         model.initial_state()  # an effect that cannot even begin is refused
         return model, own

@@ -22,7 +22,7 @@ from pprs_dynamics.measurement.residuals.live import (
     LiveComparison,
 )
 from pprs_dynamics.physics.mechanism.units import common_effort
-from pprs_dynamics.physics.model.keys import is_arm
+from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros import conversions
 from pprs_dynamics.ros.clocks import steady_timer
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
@@ -56,7 +56,7 @@ class MonitorNode(ExplainsRefusals):
     def __init__(self, **options: Any) -> None:
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
         parameters = PARAMETERS
-        if is_arm(overrides(self)):
+        if is_mechanism(overrides(self)):
             parameters = (replace(PARAMETERS[0], default=ARM_WINDOW), *PARAMETERS[1:])
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use)

@@ -20,17 +20,18 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ADDED,
-    ARM_JOINTS,
-    ARM_URDF,
+    FILES,
     KEYS,
     LARGEST,
     NAMES,
     NODE_KEYS,
     Key,
     as_list,
-    is_arm,
+    drives_key,
     is_axis,
+    is_mechanism,
     keys_of,
+    mechanism_block,
 )
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
@@ -145,8 +146,9 @@ def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, An
 def drive_count(node: Node) -> int:
     """Return how many drives the model has that a node was given."""
     given = overrides(node)
-    joints = given.get(ARM_JOINTS)
-    return len(joints) if is_arm(given) and isinstance(joints, list) and joints else len(DRIVES)
+    block = mechanism_block(given)
+    joints = given.get(drives_key(block)) if block else None
+    return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 
 def declare_arm(node: Node) -> None:
@@ -158,9 +160,9 @@ def declare_arm(node: Node) -> None:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
-    urdf = given.get(ARM_URDF)
-    if isinstance(urdf, str):
-        given[ARM_URDF] = str(folder_of(ARM_URDF) / urdf)
+    for key in FILES:
+        if isinstance(given.get(key), str) and given[key]:
+            given[key] = str(folder_of(key) / given[key])
     _declare_keys(node, keys_of(given), given, {})
 
 
@@ -174,7 +176,7 @@ def declare_model(node: Node) -> list[str]:
     """
     defaults = default_parameters()
     given = overrides(node)
-    if is_axis(given) or is_arm(given):
+    if is_axis(given) or is_mechanism(given):
         DriveModel.from_parameters(given)  # refuses it
     if any(name.startswith('geometry.') for name in given):
         # Somebody's own robot: what is missing must not become the paper's in silence.

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.keys import ARM_URDF, is_arm
+from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.system.bounded_yaml import parse, read_text
 from pprs_dynamics.system.plain_text import displayed
@@ -35,7 +35,8 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
 def hardware_of(model: ForceModel) -> str:
     """Return which robot a model is of: an arm by its URDF."""
     name = model.title.partition(' ')[2]
-    return f'{name} {Path(model.values[ARM_URDF]).stem}' if is_arm(model.values) else name
+    described = [Path(model.values[key]).stem for key in FILES if model.values.get(key)]
+    return ' '.join((name, *described))
 
 
 def check_files(arguments: Sequence[str]) -> None:

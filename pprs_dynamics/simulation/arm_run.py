@@ -10,15 +10,22 @@ of the arm is that of the model file, hidden effects have forms of their own (`a
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.mechanism.closures import ROWS
+from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, require_known, truth
@@ -29,6 +36,7 @@ RATE = 100.0  # [Hz]
 HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
+SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
 ENCODER = 2e-5  # [rad, m]
 COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sample to sample
 COMPILER = {'fusestatic': 'true', 'balanceinertia': 'false'}
@@ -55,7 +63,10 @@ class ArmRun:
 
 
 class ArmEngine:
-    """MuJoCo's model of an arm.
+    """MuJoCo's model of a mechanism.
+
+    Its inertia, gravity and derivatives; loops are projected out exactly: of all efforts of the
+    tree's joints and forces of the closures those are taken in which no passive joint is driven.
 
     Parameters
     ----------
@@ -63,19 +74,34 @@ class ArmEngine:
     """
 
     def __init__(self, model: ArmModel) -> None:
-        self.engine = mujoco = load_engine('a simulated arm')
-        self.model = mujoco.MjModel.from_xml_string(_bare(Path(model.values['arm.urdf'])))
+        self.engine = mujoco = load_engine('a simulated robot')
+        robot = self.robot = model.robot
+        structure = self.structure = robot.structure
+        path = Path(structure.description.path)
+        if path.suffix == '.urdf' or model.values.get(f'{model.block}.urdf'):
+            self.model = mujoco.MjModel.from_xml_string(_bare(path))
+        else:
+            self.model = mujoco.MjModel.from_xml_path(str(path))
         self.data = mujoco.MjData(self.model)
-        self.joints = [self.model.joint(name) for name in model.drives]
-        self.qpos = np.array([int(joint.qposadr[0]) for joint in self.joints])
-        self.dofs = np.array([int(joint.dofadr[0]) for joint in self.joints])
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self.model.dof_armature[:], self.model.dof_damping[:] = 0.0, 0.0
+        self.model.dof_frictionloss[:], self.model.jnt_stiffness[:] = 0.0, 0.0
         # All that is fixed to a joint is in its inertial parameters: other bodies weigh nothing.
         self.model.body_mass[1:], self.model.body_inertia[1:] = LEAST, LEAST
-        for joint, parameters in zip(self.joints, model.arm.inertial, strict=True):
-            self._set_body(int(self.model.jnt_bodyid[joint.id]), parameters)
+        self.links = {row: int(self.model.body(structure.moved_by[row]).id)
+                      for row in {0, *structure.rows.values(), *structure.tables.loop_a.tolist(),
+                                  *structure.tables.loop_b.tolist(), *robot.bodies.tolist()} if row}
+        self.links[0] = 0
+        for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
+            self._set_body(self.links[int(row)], parameters)
         mujoco.mj_setConst(self.model, self.data)
-        self.gravity = np.asarray(model.arm.gravity, dtype=float)
+        # MuJoCo's world is the root of the description, ours its base.
+        hung = {joint.child for joint in structure.description.joints.values()}
+        root = next(name for name in structure.description.links if name not in hung)
+        self.root = structure.links[root][1]
+        self.gravity = np.asarray(robot.gravity, dtype=float)
+        self.joints = {int(k): name for k in range(self.model.njnt)
+                       if (name := self.model.joint(k).name)}
 
     def _set_body(self, body: int, parameters: Array) -> None:
         mass = float(parameters[0])
@@ -91,40 +117,130 @@ class ArmEngine:
         self.engine.mju_mat2Quat(quaternion, axes.ravel())
         self.model.body_iquat[body] = quaternion
 
-    def add_payload(self, model: ArmModel, mass: float, offset: Array) -> None:
-        """Hang a point mass on the tool, `offset` from its origin in its axes [m]."""
-        tree = model.arm.tree
-        frame, joint = tree.model.frames[tree.tool], tree.carrier
-        at = frame.placement.rotation @ offset + frame.placement.translation
-        parameters = model.arm.inertial[joint].copy()
-        parameters[0] += mass
-        parameters[1:4] += mass * at
-        x, y, z = at
-        parameters[4:] += mass * np.array([y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z,
-                                           x * x + y * y])
-        self._set_body(int(self.model.jnt_bodyid[self.joints[joint].id]), parameters)
+    def _put(self, robot: Mechanism, row: int) -> None:
+        at = int(np.flatnonzero(robot.bodies == row)[0])
+        self._set_body(self.links[row], robot.inertial[at])
         self.engine.mj_setConst(self.model, self.data)
 
-    def add_to_link(self, model: ArmModel, joint: int, mass: float) -> None:
-        """Make what a joint moves up to the next denser by a mass [kg]."""
-        parameters = model.arm.inertial[joint]
-        self._set_body(int(self.model.jnt_bodyid[self.joints[joint].id]),
+    def add_payload(self, mass: float, offset: Array) -> None:
+        """Hang a point mass on the tool, `offset` from its origin in its axes [m]."""
+        x, y, z = offset
+        tool = self.structure.tool
+        point = mass * np.array([1, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z,
+                                 x * x + y * y])
+        row = self.structure.links[tool][0]
+        self.links.setdefault(row, int(self.model.body(self.structure.moved_by[row]).id))
+        self._put(self.robot.with_body(tool, point), row)
+
+    def add_to_link(self, body: int, mass: float) -> None:
+        """Make a body denser by a mass [kg]."""
+        parameters = self.robot.inertial[body]
+        self._set_body(self.links[int(self.robot.bodies[body])],
                        parameters * (1 + mass / parameters[0]))
         self.engine.mj_setConst(self.model, self.data)
 
-    def torques(self, motion: JointMotion, gravity: Array | None = None) -> Array:
-        """Return inverse dynamics along a motion, (N, n)."""
-        self.model.opt.gravity[:] = self.gravity if gravity is None else gravity
+    def torques(self, motion: JointMotion, gravity: Array | None = None,
+                passive: Mapping[str, Array] | None = None) -> Array:
+        """Return inverse dynamics along a motion, (N, D).
+
+        Parameters
+        ----------
+        motion : JointMotion
+        gravity : (3,) array, optional
+            In the base.
+        passive : mapping of str to (N,) array, optional
+            Efforts against friction of passive joints, by joint.
+        """
+        structure = self.structure
+        m = self.robot.at(motion.position, motion.velocity, motion.acceleration).motion
+        self.model.opt.gravity[:] = self.root.R.T @ (self.gravity if gravity is None else gravity)
         found = np.empty_like(motion.position)
-        data = self.data
+        data, dofs = self.data, [int(self.model.joint(name).dofadr[0])
+                                 for name in structure.drives]
         for k in range(len(motion)):
-            data.qpos[:], data.qvel[:], data.qacc[:] = 0.0, 0.0, 0.0
-            data.qpos[self.qpos] = motion.position[k]
-            data.qvel[self.dofs] = motion.velocity[k]
-            data.qacc[self.dofs] = motion.acceleration[k]
+            self._set_state(m, k)
             self.engine.mj_inverse(self.model, data)
-            found[k] = data.qfrc_inverse[self.dofs]
+            needed = data.qfrc_inverse.copy()
+            for name, effort in (passive or {}).items():
+                needed[int(self.model.joint(name).dofadr[0])] += effort[k]
+            rows = self._constraints()
+            if not len(rows) and len(dofs) == self.model.nv:
+                found[k] = needed[dofs]
+                continue
+            columns = np.zeros((self.model.nv, len(dofs) + len(rows)))
+            columns[dofs, np.arange(len(dofs))] = 1.0
+            columns[:, len(dofs):] = rows.T
+            # Joints that stand are driven by whatever holds them.
+            moved = np.setdiff1d(np.arange(self.model.nv), self._standing)
+            found[k] = np.linalg.lstsq(columns[moved], needed[moved], rcond=1e-10)[0][:len(dofs)]
         return found
+
+    @cached_property
+    def _standing(self) -> Array:
+        """Degrees of freedom of joints that are locked or held."""
+        structure = self.structure
+        held = set(structure.mobility.held.tolist())
+        standing = [int(self.model.jnt_dofadr[k]) for k, name in self.joints.items()
+                    if name in structure.description.joints and self.model.jnt_type[k] != 0 and (
+                        name not in structure.rows
+                        or int(structure.tables.coordinate[structure.rows[name]]) in held)]
+        return np.array(standing, dtype=int)
+
+    def _set_state(self, m: Any, k: int) -> None:
+        t, data = self.structure.tables, self.data
+        data.qpos[:], data.qvel[:], data.qacc[:] = self.model.qpos0, 0.0, 0.0
+        for at, name in self.joints.items():
+            q, v = int(self.model.jnt_qposadr[at]), int(self.model.jnt_dofadr[at])
+            if self.model.jnt_type[at] == self.engine.mjtJoint.mjJNT_FREE:
+                row, _ = self.structure.links[self.structure.description.joints[name].child]
+                R = self.root.R.T @ m.R[k, row]
+                quaternion = np.empty(4)
+                self.engine.mju_mat2Quat(quaternion, R.ravel())
+                data.qpos[q:q + 3] = self.root.R.T @ (m.p[k, row] - self.root.p)
+                data.qpos[q + 3:q + 7] = quaternion
+                for own, (linear, angular) in ((data.qvel, (m.u, m.w)), (data.qacc, (m.ud, m.wd))):
+                    own[v:v + 3] = self.root.R.T @ linear[k, row]
+                    own[v + 3:v + 6] = m.R[k, row].T @ angular[k, row]
+            elif name in self.structure.rows:
+                row = self.structure.rows[name]
+                c, ratio = t.coordinate[row], t.ratio[row]
+                data.qpos[q] = ratio * m.q[k, c] + t.offset[row]
+                data.qvel[v], data.qacc[v] = ratio * m.v[k, c], ratio * m.a[k, c]
+
+    def _constraints(self) -> Array:
+        """Return derivatives of the closures and couplings, (r, nv)."""
+        structure, t, nv = self.structure, self.structure.tables, self.model.nv
+        rows: list[Array] = []
+        for k, loop in enumerate(structure.loops):
+            sides = []
+            for row, R, p in ((int(t.loop_a[k]), t.a_R[k], t.a_p[k]),
+                              (int(t.loop_b[k]), t.b_R[k], t.b_p[k])):
+                body = self.links[row]
+                at = self.root.inverse if row == 0 else Frame(
+                    self.data.xmat[body].reshape(3, 3), self.data.xpos[body])
+                sides.append((body, at @ Frame(R, p)))
+            (a, frame_a), (b, frame_b) = sides
+            linear, angular = np.zeros((2, 3, nv))
+            for body, sign in ((b, 1.0), (a, -1.0)):
+                J_p, J_r = np.zeros((2, 3, nv))
+                self.engine.mj_jac(self.model, self.data, J_p, J_r, frame_b.p, body)
+                linear += sign * J_p
+                angular += sign * J_r
+            A, B = frame_a.R, frame_b.R
+            for kind, (i, j, g, h), (f, s) in ROWS[loop.kind]:
+                rows.append(A[:, i] @ linear if kind == TRANSLATION else
+                            (f * np.cross(B[:, j], A[:, i]) + s * np.cross(B[:, h], A[:, g]))
+                            @ angular)
+        for name, row in structure.rows.items():
+            if structure.description.joints[name].mimic is not None:
+                coupling = np.zeros(nv)
+                first = next(other for other, at in structure.rows.items()
+                             if t.coordinate[at] == t.coordinate[row]
+                             and structure.description.joints[other].mimic is None)
+                coupling[int(self.model.joint(name).dofadr[0])] = 1.0
+                coupling[int(self.model.joint(first).dofadr[0])] = -t.ratio[row]
+                rows.append(coupling)
+        return np.array(rows).reshape(-1, nv)
 
 
 def _bare(path: Path) -> str:
@@ -135,27 +251,40 @@ def _bare(path: Path) -> str:
                      *link.findall('inertial')):
             link.remove(part)
         inertial = ElementTree.SubElement(link, 'inertial')
+        # Off the frame, else MuJoCo takes short cuts that hold for this inertia alone.
+        ElementTree.SubElement(inertial, 'origin', xyz='0.1 0.2 0.3', rpy='0.1 0.2 0.3')
         ElementTree.SubElement(inertial, 'mass', value='1')
-        ElementTree.SubElement(inertial, 'inertia', ixx='1', iyy='1', izz='1', ixy='0', ixz='0',
+        ElementTree.SubElement(inertial, 'inertia', ixx='1', iyy='1.1', izz='1.2', ixy='0', ixz='0',
                                iyz='0')
     ElementTree.SubElement(ElementTree.SubElement(robot, 'mujoco'), 'compiler', COMPILER)
     return ElementTree.tostring(robot, encoding='unicode')
 
 
 def draw_motion(model: ArmModel, duration: float, seed: int) -> JointMotion:
-    """Return a random Fourier series of all joints within the URDF's limits."""
-    tree, random = model.arm.tree, np.random.default_rng(seed)
-    lower, upper = np.maximum(tree.lower, -np.pi), np.minimum(tree.upper, np.pi)
-    reach = np.minimum(0.9 * (upper - lower) / 2, WIDEST)
+    """Return a random Fourier series of all drives within their limits and the workspace."""
+    structure, random = model.robot.structure, np.random.default_rng(seed)
+    lower, upper = np.maximum(structure.lower, -np.pi), np.minimum(structure.upper, np.pi)
+    middle = (lower + upper) / 2
+    if structure.loops:
+        middle = structure.home[structure.tables.drives]
+    reach = np.minimum(0.9 * np.minimum(upper - middle, middle - lower), WIDEST)
     shape = random.normal(size=(len(model.drives), JointSeries.size(HARMONICS)))
     time = np.arange(0.0, duration, 1 / RATE)
-    raw = JointSeries(shape, (lower + upper) / 2, duration, HARMONICS)
+    raw = JointSeries(shape, middle, duration, HARMONICS)
     motion = raw.motion(time)
-    top = np.where(np.isfinite(tree.speed), tree.speed, np.pi)
+    top = np.where(np.isfinite(structure.speed), structure.speed, np.pi)
     uses = np.max([np.abs(values).max(axis=0) / bound for values, bound in (
         (motion.position - raw.middle, reach), (motion.velocity, FASTEST * top),
         (motion.acceleration, QUICKEST))], axis=0)
-    return JointSeries(shape / uses[:, None], raw.middle, duration, HARMONICS).motion(time)
+    for _ in range(SHRINKS):
+        motion = JointSeries(shape / uses[:, None], raw.middle, duration, HARMONICS).motion(time)
+        try:
+            model.robot.at(motion.position, motion.velocity, motion.acceleration)
+        except WorkspaceError:
+            uses = uses / SHRINK
+        else:
+            return motion
+    raise HiddenEffectError('no motion about home stays within the workspace')
 
 
 def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float = 1.0,
@@ -198,17 +327,17 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     hidden: list[dict[str, Any]] = []
     gravity = None
     if 'payload_mass' in chosen:
-        mass = scale * float(random.uniform(0.05, 0.12)) * float(model.arm.masses.sum())
-        engine.add_payload(model, mass, np.array([0.0, 0.0, 0.05]))
+        mass = scale * float(random.uniform(0.05, 0.12)) * float(model.robot.masses.sum())
+        engine.add_payload(mass, np.array([0.0, 0.0, 0.05]))
         hidden.append(truth('payload_mass', None, {'mass': mass}, 'a point 5 cm before the tool'))
     if 'link_mass' in chosen:
         # What turns about an upright axis shows in no weight, and the last link is the payload's.
-        links = [j for j in range(1, len(model.drives)) if j != model.arm.tree.carrier]
+        links = [j for j in range(1, len(model.drives)) if j != model.robot.carrier]
         if not links:
             raise HiddenEffectError('link_mass needs a link between the first and that of the tool')
         joint = int(random.choice(links))
-        mass = scale * float(random.uniform(0.1, 0.3)) * float(model.arm.masses[joint])
-        engine.add_to_link(model, joint, mass)
+        mass = scale * float(random.uniform(0.1, 0.3)) * float(model.robot.masses[joint])
+        engine.add_to_link(joint, mass)
         hidden.append(truth('link_mass', None, {f'link_{joint + 1}': mass}, 'denser'))
     if 'base_tilt' in chosen:
         angle = scale * float(random.uniform(0.01, 0.03))
@@ -221,7 +350,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     largest = np.abs(efforts).max(axis=0)
     if 'external_wrench' in chosen:
         force = scale * 0.05 * float(largest.max()) * np.array([0, 0, 1.0, 0, 0, 0])
-        efforts += model.arm.wrench_torques(motion.position, np.tile(force, (len(motion), 1)))
+        linkage = model.robot.at(motion.position, motion.velocity, motion.acceleration)
+        efforts += linkage.wrench_efforts(np.tile(force, (len(motion), 1)))
         hidden.append(truth('external_wrench', None, {'force_z': force[2]}, 'at the tool'))
     for name in chosen:
         if name in FORMS:
@@ -254,10 +384,13 @@ def _own_friction(model: ArmModel, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them."""
     values, v = model.values, motion.velocity
     friction: Array = (
-        np.array(values['arm.armature']) * motion.acceleration
+        model.robot.armature * motion.acceleration
         + np.array(values['friction.viscous']) * v
         + np.array(values['friction.coulomb']) * np.tanh(v / np.asarray(model.reversal.velocity))
         + np.array(values['friction.offset']))
+    for effect in model.effects:
+        if isinstance(effect, LinkageFriction):
+            friction = friction + effect.force(model.mechanism(motion))
     return friction
 
 
@@ -273,7 +406,7 @@ def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: 
         moment = JointMoment(
             motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
             load[:, j], float(largest[j]), float(np.abs(motion.velocity[:, j]).max()),
-            float(model.values['arm.gear_ratio'][j]))
+            float(model.gear_ratios[j]))
         drawn = form.draw(random, moment)
         first = next(iter(drawn))
         drawn[first] *= scale

@@ -39,7 +39,7 @@ def found(model: ArmModel):
 
 def test_it_keeps_the_limits_with_their_margin(model: ArmModel, found) -> None:
     motion = found.motion(np.linspace(0, DURATION, 5001))
-    tree = model.arm.tree
+    tree = model.robot.structure
     assert np.all(np.abs(motion.position) <= 0.901 * np.minimum(tree.upper, np.pi))
     assert np.all(np.abs(motion.velocity) <= 0.901 * tree.speed)
     assert np.all(np.abs(motion.acceleration) <= 0.901 * 5.0)

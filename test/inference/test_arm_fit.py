@@ -31,7 +31,7 @@ NOISE = 0.2
 def heavier(folder: Path) -> ArmModel:
     """Return an arm that is not as described: heavier links, rotors, friction."""
     model = ArmModel.load(arm.write_arm(folder))
-    mass = np.array(model.arm.inertial)
+    mass = np.array(model.robot.inertial)
     factors = np.array([1.2, 0.8, 1.3])[:, None]
     changed = mass * factors
     return arm.real_arm(folder, **{
@@ -79,12 +79,12 @@ def test_fitted_links_are_bodies(tmp_path: Path) -> None:
     described = ArmModel.load(arm.write_arm(tmp_path))
     fit = fit_base(described, [arm.record(heavier(tmp_path), arm.motion(20.0), 5.0)])
     assert isinstance(fit.model, ArmModel)
-    for link in fit.model.arm.inertial:
+    for link in fit.model.robot.inertial:
         assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > -1e-6
 
 
 def test_points_of_bodies_begin_at_the_description(tmp_path: Path) -> None:
-    described = ArmModel.load(arm.write_arm(tmp_path)).arm.inertial
+    described = ArmModel.load(arm.write_arm(tmp_path)).robot.inertial
     bodies = Bodies(described)
     assert bodies.inertial(np.zeros(len(bodies))) == pytest.approx(described, rel=1e-9, abs=1e-12)
     assert np.all(bodies.distance(np.zeros(len(bodies))) == 0)

@@ -106,8 +106,8 @@ def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
 def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
     model = ArmModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
     motion = states()
-    rows = model.arm.regressor(motion.position, motion.velocity, motion.acceleration)
-    assert rows @ model.arm.inertial.ravel() == pytest.approx(
+    rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
+    assert rows @ model.robot.inertial.ravel() == pytest.approx(
         model.drive_forces(motion).total, abs=1e-9)
 
 

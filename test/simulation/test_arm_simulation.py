@@ -26,7 +26,7 @@ from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, simulate_ar
 def model(tmp_path_factory: pytest.TempPathFactory) -> ArmModel:
     """Return an arm whose links are not those of its URDF, and with joints in another order."""
     described = arm.real_arm(tmp_path_factory.mktemp('arm'))
-    mass = np.array(described.arm.inertial) * np.array([1.3, 0.9, 1.1])[:, None]
+    mass = np.array(described.robot.inertial) * np.array([1.3, 0.9, 1.1])[:, None]
     found = build_model({
         **described.values, 'links.mass': tuple(mass[:, 0]),
         'links.moment': tuple(mass[:, 1:4].ravel()),
@@ -48,7 +48,7 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: ArmModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = ArmEngine(model)
     before = engine.torques(motion)
-    engine.add_payload(model, 1.5, np.zeros(3))
+    engine.add_payload(1.5, np.zeros(3))
     loaded = build_model({**model.values, 'effects.active': ['payload_mass'],
                           'effects.payload_mass.mass': 1.5}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
@@ -59,7 +59,7 @@ def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = ArmEngine(model)
     before = engine.torques(motion)
-    engine.add_to_link(model, 1, 0.7)
+    engine.add_to_link(1, 0.7)
     loaded = build_model({**model.values, 'effects.active': ['link_mass'],
                           'effects.link_mass.link_2': 0.7}, model.source)
     assert engine.torques(motion) - before == pytest.approx(

@@ -33,7 +33,7 @@ from pprs_dynamics.inference.experiments.next_experiment import (
 from pprs_dynamics.measurement.files.motion_files import write_motion
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import is_arm
+from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 
 RATE = 100.0  # [Hz], the default of play_trajectory
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     base = find_file(options.model)
     model: DriveModel | ArmModel
     limits: MotionLimits | ArmLimits
-    if is_arm(read_parameters(base)):
+    if is_mechanism(read_parameters(base)):
         model = ArmModel.load(base)
         limits = ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
                            options.margin)

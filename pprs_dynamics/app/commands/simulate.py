@@ -25,7 +25,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import is_arm
+from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.simulation.arm_forms import NAMES as ARM_EFFECTS
 from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    if is_arm(read_parameters(find_file(options.model))):
+    if is_mechanism(read_parameters(find_file(options.model))):
         return _run_arm(options, screen)
     model = DriveModel.load(options.model)
     motion = _motion(options)

@@ -105,13 +105,13 @@ class _Information:
     def __init__(self, motions: ArmMotions) -> None:
         self.model, self.duration = motions.model, motions.duration
         self.effort = motions.effort
-        self.bodies = Bodies(motions.model.arm.inertial)
+        self.bodies = Bodies(motions.model.robot.inertial)
 
     def of(self, found: JointSeries) -> Array:
         """Return by how much each combination is told better than by the description, squared."""
         motion = found.motion(np.linspace(0, self.duration, LOOKED_AT))
         count = len(self.effort)
-        rows = self.model.arm.regressor(motion.position, motion.velocity, motion.acceleration)
+        rows = self.model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
         origin = np.zeros(len(self.bodies))
         described = self.bodies.inertial(origin).ravel()
         step = 1e-6

@@ -59,7 +59,7 @@ class ArmMotions:
     """
 
     def __init__(self, model: ArmModel, limits: ArmLimits, duration: float) -> None:
-        tree, left = model.arm.tree, 1 - limits.margin
+        tree, left = model.robot.structure, 1 - limits.margin
         self.model, self.duration = model, duration
         lower, upper = np.maximum(tree.lower, -WIDEST), np.minimum(tree.upper, WIDEST)
         self.middle, self.reach = (lower + upper) / 2, left * (upper - lower) / 2

@@ -18,8 +18,8 @@ from pprs_dynamics.measurement.motion.reconstruction import (
     reconstruct,
     treated_forces,
 )
+from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.mechanism.urdf import PARAMETERS
 from pprs_dynamics.physics.model.arm_model import ArmModel
 
 # Numbers of a joint beside those of its link, in this order.
@@ -60,11 +60,11 @@ class ArmColumns:
         inertial = np.empty((len(treat), count, PARAMETERS * count))
         for chunk in found.chunks():
             s: Any = chunk.motion
-            rows = model.arm.regressor(s.position, s.velocity, s.acceleration)
+            rows = model.robot.regressor(s.position, s.velocity, s.acceleration)
             inertial[chunk.blocks] = chunk.treat(rows)
         motion = np.stack((treat(found.acceleration), treat(found.velocity)), axis=-1)
         columns = cls(treat(found.effort), np.zeros_like(total), inertial, motion, found)
-        own = columns.efforts(own_numbers(model), model.arm.inertial,
+        own = columns.efforts(own_numbers(model), model.robot.inertial,
                               np.asarray(model.reversal.velocity))
         return cls(columns.measured, total - own, inertial, motion, found)
 
@@ -98,7 +98,7 @@ def own_numbers(model: ArmModel) -> Array:
     """Return armature, viscous and dry friction, and offset of each joint, (n, 4)."""
     values = model.values
     return np.column_stack([values[key] for key in (
-        'arm.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
+        f'{model.block}.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
 
 
 def columns_of(model: ArmModel, recordings: Sequence[Recording]) -> list[ArmColumns]:

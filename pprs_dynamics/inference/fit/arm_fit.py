@@ -29,7 +29,7 @@ from pprs_dynamics.inference.fit.arm_columns import (
 )
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.inference.regression.base_columns import rounded
-from pprs_dynamics.physics.mechanism.urdf import PARAMETERS
+from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.model.arm_model import ArmModel, inertial_values
 from pprs_dynamics.physics.model.model_file import build_model
 
@@ -81,7 +81,7 @@ def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
         Of that model.
     """
     count = len(model.drives)
-    bodies = Bodies(model.arm.inertial)
+    bodies = Bodies(model.robot.inertial)
     known = np.concatenate([np.isfinite(one.measured) for one in columns])
     inertial = np.concatenate([one.inertial for one in columns])
     rest = np.concatenate([one.measured - one.rest for one in columns])
@@ -111,7 +111,7 @@ def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
     names = np.array(model.drives)
     return ArmFit(
         _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
-        links, {'arm.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
+        links, {f'{model.block}.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
                 'friction.coulomb': std[COULOMB], 'friction.offset': std[OFFSET]},
         tuple(names[masses > DETERMINED].tolist()), tuple(names[~moving].tolist()))
 
@@ -124,7 +124,8 @@ def _with(model: ArmModel, inertial: Array, own: Array, width: Array) -> ArmMode
     values: dict[str, Any] = {
         **model.values,
         **{key: numbers(np.array(found)) for key, found in inertial_values(inertial).items()},
-        'arm.armature': numbers(own[:, ARMATURE]), 'friction.viscous': numbers(own[:, VISCOUS]),
+        f'{model.block}.armature': numbers(own[:, ARMATURE]),
+        'friction.viscous': numbers(own[:, VISCOUS]),
         'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
         'friction.reversal_velocities': numbers(width)}
     fitted = build_model(values, model.source)

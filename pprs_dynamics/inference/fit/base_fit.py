@@ -182,7 +182,7 @@ def _told(model: ArmModel, fit: ArmFit) -> tuple[str, ...]:
                     f'{", ".join(fit.weak_links)} move')
     if fit.standing:
         told.append(f'{", ".join(fit.standing)} hardly moves: its friction stays as it was')
-    if model.values['arm.effort_unit'] == 'A':
-        told.append('efforts are currents times arm.gain: a gain that is wrong by 1 % makes all '
-                    'numbers wrong by 1 %')
+    if model.efforts_in_amperes:
+        told.append(f'efforts are currents times {model.block}.gain: a gain that is wrong by '
+                    '1 % makes all numbers wrong by 1 %')
     return tuple(told)

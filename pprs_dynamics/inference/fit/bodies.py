@@ -21,7 +21,11 @@ from __future__ import annotations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.urdf import PARAMETERS, pinocchio
+from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    from_pseudo_inertia,
+    pseudo_inertia,
+)
 
 LEAST_MASS = 1e-3  # [kg]; links without mass are given this, and
 LEAST_RADIUS = 0.02  # [m] this radius: thin rods of a drawing have none across
@@ -34,15 +38,12 @@ class Bodies:
     Parameters
     ----------
     described : (n, 10) array
-        Inertial parameters of the description; see `Arm`.
+        Inertial parameters of the description; see `Mechanism`.
     """
 
     def __init__(self, described: Array) -> None:
         self.roots = np.stack([np.linalg.cholesky(_thick(pseudo_inertia(one)))
                                for one in described])
-        # Elements of a symmetric 4 x 4 matrix are linear in the parameters: by units.
-        units = np.array([pseudo_inertia(unit) for unit in np.eye(PARAMETERS)])
-        self._to_parameters = np.linalg.pinv(units.reshape(PARAMETERS, 16).T)
 
     def __len__(self) -> int:
         return PARAMETERS * len(self.roots)
@@ -50,8 +51,7 @@ class Bodies:
     def inertial(self, point: Array) -> Array:
         """Return the inertial parameters (n, 10) at a point (10 n,)."""
         P = self.roots @ self._relative(point) @ self.roots.transpose(0, 2, 1)
-        parameters: Array = P.reshape(-1, 16) @ self._to_parameters.T
-        return parameters
+        return np.array([from_pseudo_inertia(one) for one in P])
 
     def distance(self, point: Array) -> Array:
         """Return the distance from the description, element by element, (16 n,)."""
@@ -63,13 +63,6 @@ class Bodies:
         M[:, ROWS, COLUMNS] += point.reshape(-1, PARAMETERS)
         relative: Array = M @ M.transpose(0, 2, 1)
         return relative
-
-
-def pseudo_inertia(parameters: Array) -> Array:
-    """Return the pseudo-inertia matrix of inertial parameters (10,), (4, 4)."""
-    matrix: Array = np.array(
-        pinocchio().PseudoInertia.FromDynamicParameters(np.asarray(parameters)).toMatrix())
-    return matrix
 
 
 def _thick(P: Array) -> Array:

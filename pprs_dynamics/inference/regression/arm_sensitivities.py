@@ -25,10 +25,10 @@ from pprs_dynamics.inference.regression.sensitivities import (
 )
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
-from pprs_dynamics.physics.mechanism.arm import ArmState
+from pprs_dynamics.physics.mechanism.mechanism import LinkageState
 from pprs_dynamics.physics.model.arm_model import ArmForces, ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.keys import ARM_GAIN
+from pprs_dynamics.physics.model.keys import is_gain
 
 HOMING_STEP = 1e-4  # [rad, m]
 
@@ -51,7 +51,7 @@ class ArmSensitivities(Sensitivities):
             if not effect.is_measurement and not isinstance(effect, BodyEffect)
             and effect.initial_memory() is None]
         # Built once, not chunk by chunk.
-        self._moved = [None if number.key == ARM_GAIN else self._with(number)
+        self._moved = [None if is_gain(number.key) else self._with(number)
                        for number in self.numbers]
 
     def columns(self, forces: ArmForces) -> dict[str, Array]:
@@ -95,15 +95,15 @@ class ArmSensitivities(Sensitivities):
             one + step * (k == number.element) for k, one in enumerate(value)))
         return ArmModel.from_parameters({**self.model.values, number.key: moved})
 
-    def _state(self, model: ArmModel, state: ArmState) -> ArmState:
+    def _state(self, model: ArmModel, state: LinkageState) -> LinkageState:
         """Return the same motion with the bodies of another model."""
-        found = replace(state, robot=model.arm, reversal=model.reversal, load=None)
+        found = replace(state, robot=model.robot, reversal=model.reversal, load=None)
         for effect in model.effects:
             if isinstance(effect, BodyEffect):
                 found = effect.apply(found)
         return found
 
-    def _efforts(self, model: ArmModel, state: ArmState) -> Array:
+    def _efforts(self, model: ArmModel, state: LinkageState) -> Array:
         """Return efforts at a state, without effects that know their past."""
         at: Any = state
         own = {effect.name: effect for effect in model.effects}
@@ -111,7 +111,7 @@ class ArmSensitivities(Sensitivities):
             own[effect.name].force(at) for effect in self._following)
         return total
 
-    def _homing(self, state: ArmState, reference: Array) -> Array:
+    def _homing(self, state: LinkageState, reference: Array) -> Array:
         """Return the change per radian, or metre, that each joint is measured too far."""
         columns = np.empty((len(self.model.drives), *state.velocity.shape))
         for k in range(len(columns)):
@@ -121,7 +121,7 @@ class ArmSensitivities(Sensitivities):
             columns[k] = (self._efforts(self.model, moved) - reference) / HOMING_STEP
         return columns
 
-    def _of_structure(self, effect: type[StructureEffect], state: ArmState, reference: Array,
+    def _of_structure(self, effect: type[StructureEffect], state: LinkageState, reference: Array,
                       values: Mapping[str, float]) -> tuple[Array, Array]:
         """Return columns per unit of each coefficient, around values that the model has.
 

@@ -21,7 +21,7 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
-from pprs_dynamics.physics.model.keys import ARM_GAIN
+from pprs_dynamics.physics.model.keys import is_gain
 
 COLUMN = 'column '
 
@@ -52,7 +52,7 @@ class ColumnCollector:
         self.sensitivities = sensitivities
         # A gain changes nothing of efforts that were not recorded as currents.
         self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
-                             if number.key == ARM_GAIN
+                             if is_gain(number.key)
                              and np.isnan(reconstruction.gain[number.element])]
         self.share = reconstruction.recorded_share(sensitivities.model)
         self.sensors = [effect.name for effect in sensitivities.model.effects

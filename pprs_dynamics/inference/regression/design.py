@@ -227,7 +227,7 @@ class Design:
     def absent(self, effect: type[CatalogueEffect]) -> frozenset[str]:
         """Return the coefficients of an effect that the model has no body for."""
         if isinstance(self.model, ArmModel) and issubclass(effect, BodyEffect):
-            return effect.absent(self.model.arm)
+            return effect.absent(self.model.robot)
         return frozenset()
 
     def drive_rows(self, effect: type[DriveEffect], drive: int,

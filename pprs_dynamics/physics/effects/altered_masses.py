@@ -9,7 +9,7 @@ import copy
 from dataclasses import replace
 from typing import Any
 
-from pprs_dynamics.physics.mechanism.arm import Arm
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.three_pprs.robot import Robot
 
 
@@ -26,8 +26,8 @@ def with_masses(robot: Robot, **masses: Any) -> Robot:
     return replace(robot, masses=altered)
 
 
-def with_payload(robot: Robot | Arm, mass: float) -> Robot | Arm:
+def with_payload(robot: Robot | Mechanism, mass: float) -> Robot | Mechanism:
     """Return the robot with a mass more [kg]: at the platform's centre, or at the tool."""
-    if isinstance(robot, Arm):
+    if isinstance(robot, Mechanism):
         return robot.with_payload(mass)
     return with_masses(robot, payload=robot.masses.payload + mass)

@@ -64,7 +64,7 @@ class BodyEffect(StructureEffect):
         return None
 
     def apply(self, state: Any) -> Any:
-        """Return the state, a `MechanismState` or an `ArmState`, with the effect in its bodies."""
+        """Return the state with the effect in its bodies."""
         return state.loaded(self.changed(state.robot), self.load(state))
 
     def force(self, state: Any, memory: Any = None) -> Array:

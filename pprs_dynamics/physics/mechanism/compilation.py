@@ -22,6 +22,10 @@ REPLACED: dict[Any, Any] = {
     arithmetic.tanh: arithmetic.compiled_tanh,
     arithmetic.larger: arithmetic.compiled_larger,
     arithmetic.everywhere: arithmetic.compiled_everywhere,
+    arithmetic.sin: arithmetic.compiled_sin,
+    arithmetic.cos: arithmetic.compiled_cos,
+    arithmetic.largest: arithmetic.compiled_largest,
+    arithmetic.solve: arithmetic.compiled_solve,
 }
 PHYSICS = Path(__file__).parents[1]
 
@@ -43,6 +47,57 @@ def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
     except RuntimeError:  # no locator available: nowhere to write
         return None
     return _compiled_loop
+
+
+def compiled_or_none(function: Any) -> Callable[..., Any] | None:
+    """Return a function of this package compiled, or None where `compiler` is."""
+    return _kept(function) if compiler() else None
+
+
+@cache
+def _kept(function: FunctionType) -> Callable[..., Any]:
+    """Return a function compiled for the arguments that it gets, kept on disk."""
+    import numba
+
+    clone = _clone(function, _plain)
+    # See `_compiled_loop` on the name.
+    clone.__qualname__ = f'{function.__name__}_{_code_digest(function)}'
+    compiled: Callable[..., Any] = numba.njit(
+        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True)(clone)
+    return compiled
+
+
+@cache
+def _plain(function: FunctionType) -> Any:
+    """Return a function of this package, and all that it calls, for Numba.
+
+    What has no loop is inlined: each call would count references to every array of its tables.
+    """
+    import numba
+
+    loops = any(step.opname == 'FOR_ITER' for step in dis.get_instructions(function.__code__))
+    return numba.njit(nogil=True, error_model='numpy', forceinline=not loops,
+                      no_cpython_wrapper=True, no_cfunc_wrapper=True)(_clone(function, _plain))
+
+
+def _code_digest(function: FunctionType) -> str:
+    """Return a fingerprint of the code of a function and of all that it calls."""
+    content, seen = hashlib.sha256(Path(__file__).read_bytes()), set()
+    waiting = [function]
+    while waiting:
+        one = waiting.pop()
+        one = REPLACED.get(one, one)
+        if one in seen:
+            continue
+        seen.add(one)
+        content.update(one.__code__.co_code + repr(one.__code__.co_consts).encode())
+        for name in sorted(_names(one.__code__) & one.__globals__.keys()):
+            used = one.__globals__[name]
+            if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
+                waiting.append(used)
+            elif isinstance(used, (int, float)):
+                content.update(f'{name}={used}'.encode())
+    return content.hexdigest()[:12]
 
 
 def _nothing(p: Any, s: Any) -> bool:
@@ -95,14 +150,24 @@ def _reader(named: tuple[Any, ...]) -> Any:
 @cache
 def _compiled(function: FunctionType) -> Any:
     """Return a function of this package, and all that it calls, for Numba."""
+    return _inlined(_clone(function, _compiled))
+
+
+def _clone(function: FunctionType, compile_one: Callable[[Any], Any]) -> FunctionType:
+    """Return a copy of a function whose callees of this package are compiled."""
+    def callee(used: Any) -> Any:
+        if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
+            return compile_one(REPLACED.get(used, used))
+        return used
+
     namespace = dict(function.__globals__)
     for name in _names(function.__code__) & namespace.keys():
-        namespace[name] = _callee(namespace[name])
-    cells = tuple(CellType(_callee(cell.cell_contents)) for cell in function.__closure__ or ())
+        namespace[name] = callee(namespace[name])
+    cells = tuple(CellType(callee(cell.cell_contents)) for cell in function.__closure__ or ())
     clone = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__,
                          cells)
     clone.__module__ = function.__module__
-    return _inlined(clone)
+    return clone
 
 
 def _inlined(function: FunctionType) -> Any:
@@ -113,13 +178,6 @@ def _inlined(function: FunctionType) -> Any:
     # Python, and wrappers for that would take half of the compiling.
     return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
                       no_cfunc_wrapper=True)(function)
-
-
-def _callee(used: Any) -> Any:
-    """Return a variable for compiled code: compiled, where it is a function of this package."""
-    if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
-        return _compiled(REPLACED.get(used, used))
-    return used
 
 
 def _names(code: CodeType) -> set[str]:

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model of a serial arm from its URDF.
+"""Model of a mechanism from its description: a serial arm, or a robot with loops.
 
-tau = RNEA(q, q_dot, q_ddot) + armature q_ddot + F_v q_dot + F_c sgn(q_dot) + offset + effects,
-per joint, positive along the joint's positive direction.
+tau = T' RNEA(q, q_dot, q_ddot) + armature q_ddot + F_v q_dot + F_c sgn(q_dot) + offset + effects,
+per drive, positive along its positive direction; T, rates of all joints per rate of the drives.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.physics.effects.effect import ARM, CatalogueEffect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.arm import Arm, ArmState
+from pprs_dynamics.physics.mechanism.description import REVOLUTE
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.units import DriveUnits
-from pprs_dynamics.physics.mechanism.urdf import TURNING, ArmTree, read_arm
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import (
     RIGID_BODY,
@@ -36,33 +37,41 @@ from pprs_dynamics.physics.model.force_model import (
     ModelState,
     total_force,
 )
-from pprs_dynamics.physics.model.keys import ARM_GAIN, ARM_JOINTS, ARM_URDF, Key, arm_keys, is_arm
+from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
+from pprs_dynamics.physics.model.keys import (
+    GAIN,
+    Key,
+    drives_key,
+    keys_of,
+    mechanism_block,
+)
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
+from pprs_dynamics.physics.model.robot_block import passive_friction, read_structure
 
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
 BLOCKS_PER_PERIOD = 100.0
-# Elements of an inertia tensor: as files have them, and as Pinocchio has them.
-OF_FILES, OF_PINOCCHIO = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
-FROM_FILES = [OF_FILES.index(axes) for axes in OF_PINOCCHIO]
-TO_FILES = [OF_PINOCCHIO.index(axes) for axes in OF_FILES]
+# Elements of an inertia tensor: as files have them, and as `Mechanism` has them.
+OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
+FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
+TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
 
 
 @dataclass(frozen=True)
 class ArmForces(Forces):
     """Efforts of N samples, (N, n)."""
 
-    mechanism: ArmState
+    mechanism: LinkageState
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmModel(ForceModel):
-    """The inverse dynamic model of a serial arm.
+    """The inverse dynamic model of a mechanism.
 
     Parameters
     ----------
-    arm : Arm
+    robot : Mechanism
     effects, reversal, values, source
         See `ForceModel`; friction and offset are the first effects.
     """
@@ -70,38 +79,43 @@ class ArmModel(ForceModel):
     kind: ClassVar[str] = ARM
     title: ClassVar[str] = 'a serial arm'
 
-    arm: Arm
+    robot: Mechanism
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Names of the joints."""
-        return self.arm.tree.joints
+        """Names of the drives."""
+        return self.robot.structure.drives
+
+    @property
+    def block(self) -> str:
+        """Block of its file: `arm` or `robot`."""
+        return mechanism_block(self.values)
 
     @property
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
-        return arm_keys(len(self.drives))
+        return keys_of(self.values)
 
     @property
     def units(self) -> tuple[DriveUnits, ...]:
-        """Units of the joints' quantities."""
-        return tuple(DriveUnits(kind == TURNING) for kind in self.kinds)
+        """Units of the drives' quantities."""
+        return tuple(DriveUnits(kind == REVOLUTE) for kind in self.robot.structure.kinds)
 
     @property
     def content(self) -> str:
-        """Hash of the URDF."""
-        return self.arm.tree.digest
+        """Hash of the description."""
+        return self.robot.structure.description.digest
 
     @property
     def gain(self) -> tuple[float, ...]:
-        """Torque, or force, per ampere of each joint [N m/A, N/A]."""
-        gain: tuple[float, ...] = self.values[ARM_GAIN]
+        """Torque, or force, per ampere of each drive [N m/A, N/A]."""
+        gain: tuple[float, ...] = self.values[self.block + GAIN]
         return gain
 
     @property
     def gear_ratios(self) -> tuple[float, ...]:
-        """Turns of the motor per turn of each joint."""
-        ratios: tuple[float, ...] = self.values['arm.gear_ratio']
+        """Turns of the motor per turn of each drive."""
+        ratios: tuple[float, ...] = self.values[f'{self.block}.gear_ratio']
         return ratios
 
     @property
@@ -112,7 +126,7 @@ class ArmModel(ForceModel):
     @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
-        return bool(self.values['arm.effort_unit'] == 'A')
+        return bool(self.values[f'{self.block}.effort_unit'] == 'A')
 
     @property
     def rest_speed(self) -> float:
@@ -126,20 +140,12 @@ class ArmModel(ForceModel):
 
     @cached_property
     def limits(self) -> JointLimits:
-        """Ranges and efforts of the URDF, the latter in the unit of recordings and commands."""
-        tree, units = self.arm.tree, self.units
-        # A URDF may leave them out, of a prismatic joint as well.
-        bounded = tree.lower < tree.upper
+        """Ranges and efforts of the description, the latter in the unit of recordings."""
+        structure, units = self.robot.structure, self.units
         return JointLimits(
-            tree.joints, tuple(one.position for one in units),
+            structure.drives, tuple(one.position for one in units),
             tuple('A' if self.efforts_in_amperes else one.effort for one in units),
-            np.where(bounded, tree.lower, -np.inf), np.where(bounded, tree.upper, np.inf),
-            tree.effort * self.amperes)
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """`revolute` or `prismatic`, of each joint."""
-        return self.arm.tree.kinds
+            structure.lower, structure.upper, structure.effort * self.amperes)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> ArmModel:
@@ -148,12 +154,10 @@ class ArmModel(ForceModel):
         Raises
         ------
         UnreadableFileError
-            Where the file, or its URDF, does not exist or cannot be read.
+            Where the file, or its description, does not exist or cannot be read.
         ModelError
-            For a key that is unknown, missing, of the wrong type or impossible, and for a URDF
-            that is not covered.
-        MissingLibraryError
-            Without Pinocchio.
+            For a key that is unknown, missing, of the wrong type or impossible, and for a
+            mechanism that cannot be.
         """
         file = find_file(path)
         return cls.from_parameters(read_parameters(file), source=str(file))
@@ -162,29 +166,30 @@ class ArmModel(ForceModel):
     def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> ArmModel:
         """Build the model from flat keys and values, each checked; see `build_model`."""
         with source_of_errors(source):
-            if not is_arm(parameters):
-                raise ModelError(ARM_URDF, MISSING, 'be given: this needs a serial arm')
-            if ARM_JOINTS in parameters and not parameters[ARM_JOINTS]:
-                raise ModelError(ARM_JOINTS, parameters[ARM_JOINTS], 'name at least one joint')
+            block = mechanism_block(parameters)
+            if not block:
+                raise ModelError('arm.urdf', MISSING, 'be given: this needs a serial arm, or a '
+                                 'robot with loops')
+            listed = drives_key(block)
+            if listed in parameters and not parameters[listed]:
+                raise ModelError(listed, parameters[listed], 'name at least one joint')
             values = checked_values(parameters)
-            values[ARM_URDF] = str((Path(source).parent / values[ARM_URDF]).resolve())
-            tree = read_arm(values[ARM_URDF], values['arm.base'], values['arm.tool'],
-                            values[ARM_JOINTS])
-            arm = Arm(tree, _inertial(tree, values), np.array(values['arm.armature']),
-                      values['arm.gravity'])
+            structure = read_structure(values, Path(source).parent)
+            robot = _mechanism(structure, values)
             effects = (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
-                       AxisOffset(values['friction.offset']),
-                       *added_effects(parameters, cls, tree.joints))
-            loaded = arm
+                       AxisOffset(values['friction.offset']), *passive_friction(structure, values),
+                       *added_effects(parameters, cls, structure.drives))
+            loaded = robot
             for effect in effects:
                 if isinstance(effect, BodyEffect):
-                    _require_present(effect, arm)
+                    _require_present(effect, robot)
                     loaded = effect.changed(loaded)
                     _require_bodies(effect, loaded)
             common = values['friction.reversal_velocity']
             width = tuple(own or common for own in values['friction.reversal_velocities'])
-            return cls(arm=arm, effects=effects, reversal=Reversal(width), values=values,
-                       source=source)
+            return cls(robot=robot, effects=effects,
+                       reversal=Reversal(width, values.get('friction.reversal_rate', common)),
+                       values=values, source=source)
 
     def drive_forces(self, motion: JointMotion, state: ModelState | None = None) -> ArmForces:
         """Return the efforts that the joints need for a motion.
@@ -199,12 +204,12 @@ class ArmModel(ForceModel):
         with np.errstate(over='ignore', invalid='ignore'):
             return self.forces_at(self.mechanism(motion), state)
 
-    def mechanism(self, motion: JointMotion) -> ArmState:
+    def mechanism(self, motion: JointMotion) -> LinkageState:
         """Return what effects take of a motion."""
-        return ArmState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                        robot=self.arm, reversal=self.reversal)
+        return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
+                            robot=self.robot, reversal=self.reversal)
 
-    def forces_at(self, mechanism: ArmState, state: ModelState | None = None) -> ArmForces:
+    def forces_at(self, mechanism: LinkageState, state: ModelState | None = None) -> ArmForces:
         """Return the efforts at a state of the arm; see `drive_forces`."""
         state = self.initial_state() if state is None else state
         parts = {RIGID_BODY: mechanism.rigid_force}
@@ -221,44 +226,69 @@ class ArmModel(ForceModel):
                 parts[effect.name] = effect.force(at, state.memories[effect.name])
         return ArmForces(total_force(tuple(parts.values())), parts, mechanism)
 
-    def variables(self, state: ArmState) -> dict[str, Array]:
+    def variables(self, state: LinkageState) -> dict[str, Array]:
         """Return the loads of the gears."""
         return {'load': state.guide_load}
 
 
 def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:
-    """Return the keys and values in files of inertial parameters (n, 10); see `Arm`."""
+    """Return the keys and values in files of inertial parameters (B, 10); see `Mechanism`."""
     return {'links.mass': tuple(inertial[:, 0].tolist()),
             'links.moment': tuple(inertial[:, 1:4].ravel().tolist()),
             'links.inertia': tuple(inertial[:, 4:][:, TO_FILES].ravel().tolist())}
 
 
-def _inertial(tree: ArmTree, values: Mapping[str, Any]) -> Array:
-    """Return the inertial parameters of the links, from the file where it has them."""
-    inertial = tree.inertial.copy()
-    if values['links.mass']:
-        inertial[:, 0] = values['links.mass']
-    if values['links.moment']:
-        inertial[:, 1:4] = np.reshape(values['links.moment'], (-1, 3))
-    if values['links.inertia']:
-        inertial[:, 4:] = np.reshape(values['links.inertia'], (-1, 6))[:, FROM_FILES]
-    for name, mass in zip(tree.joints, inertial[:, 0], strict=True):
+def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
+    """Return the mechanism with its bodies, from the file where it has them."""
+    block = mechanism_block(values)
+    rows = [structure.rows[name] for name in structure.drives]
+    bodies = np.array(rows) if block == ARM_BLOCK else np.flatnonzero(structure.inertial[:, 0] > 0)
+    inertial = structure.inertial[bodies]
+    for key, first, size in (('links.mass', 0, 1), ('links.moment', 1, 3),
+                             ('links.inertia', 4, 6)):
+        if not values[key]:
+            continue
+        if len(values[key]) != size * len(bodies):
+            names = ', '.join(structure.moved_by[int(row)] for row in bodies)
+            raise ModelError(key, list(values[key]), f'hold {size * len(bodies)} numbers, {size} '
+                             f'for each of {names}')
+        given = np.reshape(values[key], (-1, size))
+        inertial[:, first:first + size] = given[:, FROM_FILES] if size == 6 else given
+    for row, mass in zip(bodies, inertial[:, 0], strict=True):
         if not mass > 0:
+            name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
-    return inertial
+    robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
+                      values[f'{block}.gravity'])
+    if block != ARM_BLOCK:
+        _require_driven_bodies(robot)
+    return robot
 
 
-def _require_present(effect: BodyEffect, arm: Arm) -> None:
-    """Raise ModelError where an effect changes a body that the arm does not have."""
-    for name in sorted(effect.absent(arm)):
+def _require_driven_bodies(robot: Mechanism) -> None:
+    """Raise ModelError for a drive that moves no mass at home."""
+    structure = robot.structure
+    home = structure.home[None, structure.tables.drives]
+    for d, name in enumerate(structure.drives):
+        pushed = np.zeros_like(home)
+        pushed[0, d] = 1.0
+        rest = np.zeros_like(home)
+        moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
+        if not moved - still + robot.armature[d] > 0:
+            raise ModelError('robot.drives', name, 'move a body: no link that it moves has a mass')
+
+
+def _require_present(effect: BodyEffect, robot: Mechanism) -> None:
+    """Raise ModelError where an effect changes a body that the mechanism does not have."""
+    for name in sorted(effect.absent(robot)):
         if effect.values[name]:
             raise ModelError(
                 f'effects.{effect.name}.{name}', effect.values[name], 'be left out: this arm has '
                 'no such link, or it is the one that carries the tool, of which payload_mass tells')
 
 
-def _require_bodies(effect: CatalogueEffect, arm: Arm) -> None:
+def _require_bodies(effect: CatalogueEffect, robot: Mechanism) -> None:
     """Raise ModelError where an effect leaves bodies that cannot be."""
-    if not np.all(arm.masses > 0):
+    if not np.all(robot.masses > 0):
         raise ModelError(f'effects.{effect.name}', effect.to_file(),
                          'leave masses greater than 0')

@@ -1,29 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Efforts of an arm at one sample, as a control loop asks for them: little beside Pinocchio's.
-
-Friction is added in place by a compiled loop: every call of NumPy would cost as much as a third of
-the rigid body.
-"""
+"""Efforts of a mechanism at one sample, as a control loop asks for them: one compiled call."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from functools import cache
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_table
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.urdf import pinocchio
+from pprs_dynamics.physics.mechanism.linkage import Sample
 from pprs_dynamics.physics.model.arm_model import ArmModel
 
 
 class ArmSample:
-    """Returns the efforts (n,) at one position, velocity and acceleration, (n,) each.
+    """Returns the efforts (D,) at one position, velocity and acceleration, (D,) each.
 
     Parameters
     ----------
@@ -33,56 +27,28 @@ class ArmSample:
 
     def __init__(self, model: ArmModel) -> None:
         self.model = model
-        arm, count = model.arm, len(model.drives)
-        self._order = arm.tree.order
-        self._in_order = bool(np.all(self._order == np.arange(count)))
-        self._is_plain = all(isinstance(effect, (AxisFriction, AxisOffset))
-                             for effect in model.effects)
-        values = model.values
-        self._friction = np.ascontiguousarray(np.array([
-            values['friction.viscous'], values['friction.coulomb'], values['friction.offset'],
-            np.broadcast_to(model.reversal.velocity, count)]))
-        self._rigid = arm.model
-        self._data = self._rigid.createData()
-        self._rnea = pinocchio().rnea
-        self._add = _friction_loop()
+        values, robot, count = model.values, model.robot, len(model.drives)
+        is_plain = all(isinstance(effect, (AxisFriction, AxisOffset, LinkageFriction))
+                       for effect in model.effects)
+        friction = friction_table(robot.structure, {}, 1.0)
+        for effect in model.effects:
+            if isinstance(effect, LinkageFriction):
+                friction = effect.table(model.reversal.rate)
+        own = np.array([robot.armature, values['friction.viscous'], values['friction.coulomb'],
+                        np.broadcast_to(model.reversal.velocity, count),
+                        values['friction.offset']])
+        sample = Sample(robot.structure.tables, robot.structure.home, robot.by_joint,
+                        np.array(robot.gravity, dtype=float), friction, own)
+        self._sample = sample if is_plain and sample.is_compiled else None
 
     def __call__(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Return what the joints need [N m, N]."""
-        if not (self._is_plain and self._in_order):
-            return self._by_model(position, velocity, acceleration)
-        efforts: Array = self._rnea(self._rigid, self._data, position, velocity, acceleration)
-        self._add(efforts, velocity, self._friction)
-        return efforts
-
-    def _by_model(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        motion = JointMotion(position[None], velocity[None], acceleration[None], np.zeros(1))
-        efforts: Array = self.model.drive_forces(motion).total[0]
-        return efforts
-
-
-def _add_friction(efforts: Any, velocity: Any, friction: Any) -> None:
-    for j in range(len(efforts)):
-        v = velocity[j]
-        efforts[j] += (friction[0, j] * v + friction[1, j] * np.tanh(v / friction[3, j])
-                       + friction[2, j])
-
-
-def _add_friction_by_numpy(efforts: Array, velocity: Array, friction: Array) -> None:
-    viscous, coulomb, offset, width = friction
-    efforts += viscous * velocity + coulomb * np.tanh(velocity / width) + offset
-
-
-@cache
-def _friction_loop() -> Callable[[Array, Array, Array], None]:
-    """Return what adds friction and offset to efforts, compiled where Numba is installed."""
-    try:
-        import numba
-    except ImportError:
-        return _add_friction_by_numpy
-    try:
-        compiled: Callable[[Array, Array, Array], None] = numba.njit(
-            cache=True, error_model='numpy')(_add_friction)
-    except RuntimeError:  # nowhere to keep what was compiled
-        return _add_friction_by_numpy
-    return compiled
+        """Return what the drives need [N m, N]."""
+        if self._sample is None:
+            motion = JointMotion(position[None], velocity[None], acceleration[None], np.zeros(1))
+            efforts: Array = self.model.drive_forces(motion).total[0]
+            return efforts
+        found = self._sample(position, velocity, acceleration)
+        if found is None:
+            raise WorkspaceError(0, 'the loops do not close for the positions of the drives',
+                                 'must be within reach, on the way from home')
+        return found

@@ -30,7 +30,7 @@ from pprs_dynamics.physics.model.force_model import (
     ModelState,
     total_force,
 )
-from pprs_dynamics.physics.model.keys import AXIS_KEYS, is_arm, is_axis
+from pprs_dynamics.physics.model.keys import AXIS_KEYS, is_axis, is_mechanism
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.three_pprs.robot import AXIS
@@ -116,7 +116,7 @@ class AxisModel(ForceModel):
             a 3-PPRS.
         """
         with source_of_errors(source):
-            if not is_axis(parameters) or is_arm(parameters):
+            if not is_axis(parameters) or is_mechanism(parameters):
                 raise ModelError('axis.mass', MISSING, 'be given: this needs a single axis')
             values = checked_values(parameters)
             friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])

@@ -34,7 +34,7 @@ from pprs_dynamics.physics.model.force_model import (
     ModelState,
     total_force,
 )
-from pprs_dynamics.physics.model.keys import KEYS, is_arm, is_axis
+from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import FORCES, OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
@@ -160,10 +160,10 @@ class DriveModel(ForceModel):
             a single axis.
         """
         with source_of_errors(source):
-            other = next((name for name in parameters if is_axis((name,)) or is_arm((name,))),
+            other = next((name for name in parameters if is_axis((name,)) or is_mechanism((name,))),
                          None)
             if other is not None:
-                kind = 'a serial arm' if is_arm((other,)) else 'a single axis'
+                kind = 'a serial arm' if is_mechanism((other,)) else 'a single axis'
                 raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
                                  f'{kind} is for pprs compare, diagnose, adopt, fit and history')
             values = checked_values(parameters)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -18,6 +18,7 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.three_pprs.robot import ELBOWS
 
 EQUATIONS = ('corrected', 'printed')
+ANY = -1
 LARGEST = 1e300  # beyond it is no physical quantity, and squares overflow
 APPROACHES = ('whole_mechanism', 'independent_chains')
 
@@ -34,7 +35,7 @@ class Key:
     unit : str
         Empty for words and pure numbers.
     size : int or None
-        Length of a list; None for a single value.
+        Length of a list, ANY for any; None for a single value.
     lower, upper : float
         Bounds, both allowed.
     positive : bool
@@ -44,7 +45,7 @@ class Key:
     is_text : bool
         True for a name, or a list of names.
     may_be_empty : bool
-        True for a list that says nothing where it is empty.
+        True for a list, or a name, that says nothing where it is empty.
     default : object
         Value where a file is silent; None where the file must have it.
     """
@@ -74,7 +75,8 @@ class Key:
         if self.is_text:
             form = 'be a name' if self.size is None else 'be a list of names'
             return f'{form} ({self.description})'
-        form = 'be a number' if self.size is None else f'be a list of {self.size} numbers'
+        form = ('be a number' if self.size is None else 'be a list of numbers'
+                if self.size == ANY else f'be a list of {self.size} numbers')
         return self._described(f'{form} {self._bounds}' if self._bounds else form)
 
     @property
@@ -102,14 +104,15 @@ class Key:
             return self._name(value, value) if self.is_text else self._number(value, value)
         if isinstance(value, (str, bytes)) or not hasattr(value, '__len__'):
             raise ModelError(self.name, value, self.rule)
-        if len(value) != self.size and not (self.may_be_empty and not len(value)):
+        if self.size != ANY and len(value) != self.size and not (
+                self.may_be_empty and not len(value)):
             raise ModelError(self.name, list(value), self.rule)
         if self.is_text:
             return tuple(self._name(element, list(value)) for element in value)
         return tuple(self._number(element, list(value)) for element in value)
 
     def _name(self, element: Any, value: Any) -> str:
-        if not isinstance(element, str) or not element:
+        if not isinstance(element, str) or not (element or self.may_be_empty):
             raise ModelError(self.name, value, self.rule)
         return element
 
@@ -188,48 +191,115 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 
 
 EFFORT_UNITS = ('N m', 'N', 'A')
-ARM_URDF, ARM_JOINTS, ARM_GAIN = 'arm.urdf', 'arm.joints', 'arm.gain'
+# Blocks of mechanisms: a serial arm, and a robot that may have loops. What the first names joints
+# the second names drives.
+ARM, ROBOT = 'arm', 'robot'
+GAIN = '.gain'
+FILES = ('arm.urdf', 'robot.urdf', 'robot.mjcf')  # keys that hold paths
+LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
+
+
+def drives_key(block: str) -> str:
+    """Return the key that names the drives."""
+    return 'arm.joints' if block == ARM else 'robot.drives'
+
+
+def is_gain(key: str) -> bool:
+    """Return whether a key is the effort per ampere."""
+    return key in (ARM + GAIN, ROBOT + GAIN)
+
+
+def mechanism_block(names: Iterable[str]) -> str:
+    """Return the block of a mechanism that keys are of, or an empty string."""
+    for name in names:
+        block = name.partition('.')[0]
+        if block in (ARM, ROBOT) and block != name:
+            return block
+    return ''
 
 
 @cache
-def arm_keys(count: int) -> dict[str, Key]:
-    """Return the keys of a serial arm with that many joints."""
+def mechanism_keys(block: str, count: int) -> dict[str, Key]:
+    """Return the keys of a mechanism with that many drives, but for those by names of its own."""
     zeros, ones = (0.0,) * count, (1.0,) * count
+    listed = drives_key(block)
 
-    def joints(name: str, description: str, unit: str = '', **more: Any) -> Key:
-        return Key(name, f'{description}, of each of arm.joints', unit, size=count,
+    def drives(name: str, description: str, unit: str = '', **more: Any) -> Key:
+        return Key(name, f'{description}, of each of {listed}', unit, size=count,
                    **{'default': zeros, **more})
 
     def links(name: str, description: str, unit: str, each: int) -> Key:
-        return Key(name, f'{description}; without it, as the URDF says', unit, size=each * count,
-                   may_be_empty=True, default=())
+        return Key(name, f'{description}; without it, as the URDF says', unit,
+                   size=each * count if block == ARM else ANY, may_be_empty=True, default=())
 
+    files = (Key('arm.urdf', "path of the arm's URDF, from the folder of this file",
+                 is_text=True),) if block == ARM else (
+        Key('robot.urdf', "path of the robot's URDF, from the folder of this file", is_text=True,
+            may_be_empty=True, default=''),
+        Key('robot.mjcf', "path of the robot's MJCF instead", is_text=True, may_be_empty=True,
+            default=''),
+        Key('friction.reversal_rate', 'width in which sgn turns over in passive joints',
+            'rad/s, m/s', positive=True, default=0.01))
     return {key.name: key for key in (
-        Key(ARM_URDF, "path of the arm's URDF, from the folder of this file", is_text=True),
-        Key('arm.base', 'link that stands', is_text=True),
-        Key('arm.tool', 'link that carries the load', is_text=True),
-        Key(ARM_JOINTS, 'revolute and prismatic joints that are driven', size=count,
-            is_text=True),
-        joints(ARM_GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
+        *files,
+        Key(f'{block}.base', 'link that stands', is_text=True),
+        Key(f'{block}.tool', 'link that carries the load', is_text=True),
+        Key(listed, 'revolute and prismatic joints that are driven', size=count, is_text=True),
+        drives(block + GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
                default=ones),
-        joints('arm.gear_ratio', 'turns of the motor per turn of the joint', '', positive=True,
-               default=ones),
-        Key('arm.effort_unit', 'unit of the efforts of recordings; A: times arm.gain',
+        drives(f'{block}.gear_ratio', 'turns of the motor per turn of the joint', '',
+               positive=True, default=ones),
+        Key(f'{block}.effort_unit', f'unit of the efforts of recordings; A: times {block}.gain',
             choices=EFFORT_UNITS, default=EFFORT_UNITS[0]),
-        Key('arm.gravity', 'gravity in the base', 'm/s^2', size=3, default=(0.0, 0.0, -9.81)),
-        joints('arm.armature', 'inertia of the rotor, seen at the joint', 'kg m^2, kg', lower=0),
+        Key(f'{block}.gravity', 'gravity in the base', 'm/s^2', size=3,
+            default=(0.0, 0.0, -9.81)),
+        drives(f'{block}.armature', 'inertia of the rotor, seen at the joint', 'kg m^2, kg',
+               lower=0),
         links('links.mass', 'mass of what each joint moves up to the next', 'kg', 1),
         links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m', 3),
         links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2', 6),
-        joints('friction.viscous', 'F_v, viscous friction', 'N m s/rad, N s/m', lower=0),
-        joints('friction.coulomb', 'F_c, dry friction', 'N m, N', lower=0),
-        joints('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
+        drives('friction.viscous', 'F_v, viscous friction', 'N m s/rad, N s/m', lower=0),
+        drives('friction.coulomb', 'F_c, dry friction', 'N m, N', lower=0),
+        drives('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
         Key('friction.reversal_velocity', 'width in which sgn turns over', 'rad/s, m/s',
             positive=True, default=0.01),
-        joints('friction.reversal_velocities',
+        drives('friction.reversal_velocities',
                'width in which sgn turns over; 0: friction.reversal_velocity', 'rad/s, m/s',
                lower=0),
     )}
+
+
+# Keys below names that a file gives: of loops, joints and links.
+OF_LOOP = {'type': Key('', 'kind of the closure', choices=LOOPS)} | {
+    f'{side}.{name}': key for side in 'ab' for name, key in (
+        ('link', Key('', 'link that the closure is on', is_text=True)),
+        ('xyz', Key('', 'place of the closure on it', 'm', size=3, default=(0.0,) * 3)),
+        ('rpy', Key('', 'roll, pitch and yaw of the closure on it', 'rad', size=3,
+                    default=(0.0,) * 3)))}
+OF_JOINT = {
+    'viscous': Key('', 'viscous friction', 'N m s/rad, N s/m', lower=0, default=0.0),
+    'torque': Key('', 'dry friction, whatever the load', 'N m, N', lower=0, default=0.0),
+    'coulomb': Key('', 'dry friction over the load across the axis', '', lower=0, default=0.0),
+    'radius': Key('', 'radius at which it acts; of a slide 1', 'm', lower=0, default=0.0)}
+POSE = '_pose'
+NAMED_BLOCKS: dict[str, dict[str, Key]] = {
+    'robot.loops.': OF_LOOP, 'friction.joints.': OF_JOINT, 'robot.home.': {}}
+
+
+def named_keys(parameters: Mapping[str, Any]) -> dict[str, Key]:
+    """Return the keys of a robot below names that its file gives."""
+    found = {}
+    for name in parameters:
+        if name.startswith('robot.home.'):
+            found[name] = (Key(name, 'x y z qx qy qz qw in the base near which the loops close',
+                               'm', size=7) if name.endswith(POSE) else
+                           Key(name, 'position near which the loops close', 'rad, m'))
+        for prefix, keys in NAMED_BLOCKS.items():
+            own = name.removeprefix(prefix).partition('.')[0]
+            if name.startswith(prefix) and name != prefix + own:
+                for last, key in keys.items():
+                    found[f'{prefix}{own}.{last}'] = replace(key, name=f'{prefix}{own}.{last}')
+    return found
 
 
 # Blocks whose keys are not listed one by one.
@@ -241,21 +311,24 @@ def is_axis(names: Iterable[str]) -> bool:
     return any(name.startswith('axis.') for name in names)
 
 
-def is_arm(names: Iterable[str]) -> bool:
-    """Return whether keys are those of a serial arm."""
-    return any(name.startswith('arm.') for name in names)
+def is_mechanism(names: Iterable[str]) -> bool:
+    """Return whether keys are those of a serial arm, or of a robot with loops."""
+    return bool(mechanism_block(names))
 
 
 def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
     """Return the keys of the kind of model that some keys and values belong to."""
-    if is_arm(parameters):
-        joints = parameters.get(ARM_JOINTS, ())
-        return arm_keys(len(joints) if isinstance(joints, (list, tuple)) and joints else 1)
+    block = mechanism_block(parameters)
+    if block:
+        drives = parameters.get(drives_key(block), ())
+        count = len(drives) if isinstance(drives, (list, tuple)) and drives else 1
+        keys = mechanism_keys(block, count)
+        return keys if block == ARM else {**keys, **named_keys(parameters)}
     return AXIS_KEYS if is_axis(parameters) else KEYS
 
 
 # Names of all keys of the model, of whatever kind.
-NAMES = frozenset({*KEYS, *AXIS_KEYS, *arm_keys(1)})
+NAMES = frozenset({*KEYS, *AXIS_KEYS, *mechanism_keys(ARM, 1), *mechanism_keys(ROBOT, 1)})
 
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.

@@ -49,7 +49,7 @@ def margins(model: DriveModel | ArmModel, mechanism: Any) -> Margins:
     Parameters
     ----------
     model : DriveModel or ArmModel
-    mechanism : MechanismState or ArmState
+    mechanism : MechanismState or LinkageState
         What `model.drive_forces` returned with the forces.
     """
     lower, upper = model.limits.strokes

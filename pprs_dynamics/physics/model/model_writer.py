@@ -28,7 +28,14 @@ import yaml
 
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
-from pprs_dynamics.physics.model.keys import ARM_JOINTS, ARM_URDF, Key, as_list, keys_of
+from pprs_dynamics.physics.model.keys import (
+    FILES,
+    Key,
+    as_list,
+    drives_key,
+    keys_of,
+    mechanism_block,
+)
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import (
     other_nodes,
@@ -68,10 +75,11 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
         Where a file cannot be read or written.
     """
     folder = Path(path).absolute().parent
-    if ARM_URDF in values:
-        # Files say where the URDF is from where they are.
-        urdf = Path(base or path).absolute().parent / values[ARM_URDF]
-        values = {**values, ARM_URDF: os.path.relpath(urdf, folder)}
+    for key in FILES:
+        if values.get(key):
+            # Files say where the URDF is from where they are.
+            urdf = Path(base or path).absolute().parent / values[key]
+            values = {**values, key: os.path.relpath(urdf, folder)}
     if base is None:
         write_text(path, format_model(values, str(path)))
         return
@@ -255,7 +263,8 @@ def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
     `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
     and a node takes no effect whose parameters it does not have.
     """
-    active, drives = values.get('effects.active') or (), values.get(ARM_JOINTS, DRIVES)
+    active, drives = values.get('effects.active') or (), values.get(
+        drives_key(mechanism_block(values)), DRIVES)
     block, name, *rest = key.split('.')
     if block != 'effects':
         return (2,)

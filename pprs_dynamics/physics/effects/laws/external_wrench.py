@@ -16,7 +16,7 @@ import numpy as np
 
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.arm import ArmState
+from pprs_dynamics.physics.mechanism.mechanism import LinkageState
 from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
@@ -58,7 +58,7 @@ class ExternalWrench(BodyEffect):
         'tell a downward force from a payload',
         'Tsai, Robot Analysis, 1999')
 
-    def load(self, state: MechanismState | ArmState) -> StructureLoad:
+    def load(self, state: MechanismState | LinkageState) -> StructureLoad:
         """Return the wrench, the same for every sample."""
         wrench = np.array([self.values[p.name] for p in self.parameters])
         samples = len(state.velocity)

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.arm import Arm
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 MOST_LINKS = 7  # that are told apart; arms hardly have more
 
@@ -46,7 +46,7 @@ class LinkMass(BodyEffect):
         'compare with the data sheet, or weigh the link when it is taken apart',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
-    def changed(self, robot: Arm) -> Arm:
+    def changed(self, robot: Mechanism) -> Mechanism:
         """Return the arm with the other links."""
         inertial = robot.inertial.copy()
         for k, parameter in enumerate(self.linear[:len(inertial)]):
@@ -54,8 +54,8 @@ class LinkMass(BodyEffect):
         return replace(robot, inertial=inertial)
 
     @classmethod
-    def absent(cls, robot: Arm) -> frozenset[str]:
+    def absent(cls, robot: Mechanism) -> frozenset[str]:
         """Return the links that the arm does not have, and the one that carries the tool."""
-        last = robot.tree.carrier
+        last = robot.carrier
         return frozenset(parameter.name for k, parameter in enumerate(cls.linear)
                          if k >= len(robot.inertial) or k == last)

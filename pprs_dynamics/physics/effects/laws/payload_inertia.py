@@ -15,7 +15,7 @@ from typing import ClassVar
 
 from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.arm import Arm
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 
@@ -41,6 +41,6 @@ class PayloadInertia(BodyEffect):
         'square of the frequency',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Arm) -> Arm:
+    def changed(self, robot: Mechanism) -> Mechanism:
         """Return the arm with the other inertia."""
         return robot.with_payload(inertia=tuple(self.values[p.name] for p in self.parameters))

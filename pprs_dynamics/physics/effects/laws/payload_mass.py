@@ -16,7 +16,7 @@ from typing import ClassVar
 from pprs_dynamics.physics.effects.altered_masses import with_payload
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.arm import Arm
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.three_pprs.robot import Robot
 
 
@@ -48,6 +48,6 @@ class PayloadMass(BodyEffect):
         'the drives that is wrong by 5 % makes this mass wrong by 5 %',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Robot | Arm) -> Robot | Arm:
+    def changed(self, robot: Robot | Mechanism) -> Robot | Mechanism:
         """Return the robot with the other payload."""
         return with_payload(robot, self.values['mass'])

@@ -15,7 +15,7 @@ from typing import ClassVar
 
 from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.arm import Arm
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 
 class PayloadMoment(BodyEffect):
@@ -36,7 +36,7 @@ class PayloadMoment(BodyEffect):
         'turn the last joint by 180 degrees while it is level: the error must change its sign',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Arm) -> Arm:
+    def changed(self, robot: Mechanism) -> Mechanism:
         """Return the arm with the other first moment."""
         x, y, z = (self.values[axis] for axis in 'xyz')
         return robot.with_payload(moment=(x, y, z))

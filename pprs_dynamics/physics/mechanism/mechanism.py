@@ -1,0 +1,348 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A mechanism with its bodies: an axis, a serial arm, or a tree whose loops are closed.
+
+References
+----------
+R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame, inertial_in
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.linkage import (
+    follow,
+    friction_efforts,
+    press,
+    twists,
+)
+from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction, Loads, Motion
+from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+
+# Condition number of the loops, lengths in units of the mechanism's size, over that at home.
+WORST_CONDITION = 300.0
+CONDITIONS = 64  # samples at most at which it is looked at, evenly spread
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """Bodies on a structure.
+
+    Parameters
+    ----------
+    structure : Structure
+    bodies : (B,) int array
+        Joints whose links have mass.
+    inertial : (B, 10) array
+        Inertial parameters of what they move up to the next: m, m c, and the inertia xx xy yy xz
+        yz zz about the joint's origin, in the joint's frame [kg, kg m, kg m^2].
+    armature : (D,) array
+        Inertia of the rotors, seen at the drives [kg m^2, kg].
+    gravity : (3,) sequence
+        In the base's frame [m/s^2].
+    """
+
+    structure: Structure
+    bodies: np.typing.NDArray[np.int_]
+    inertial: Array
+    armature: Array
+    gravity: tuple[float, float, float]
+
+    @property
+    def masses(self) -> Array:
+        """Of the bodies [kg], (B,)."""
+        masses: Array = self.inertial[:, 0]
+        return masses
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Links that the bodies are of: the first on each joint."""
+        return tuple(self.structure.moved_by[int(row)] for row in self.bodies)
+
+    @property
+    def carrier(self) -> int:
+        """Number of the body that carries the tool, or -1 where that has no mass."""
+        found = np.flatnonzero(self.bodies == self.structure.links[self.structure.tool][0])
+        return int(found[0]) if len(found) else -1
+
+    @cached_property
+    def by_joint(self) -> Array:
+        """Inertial parameters by joint, (J + 1, 10)."""
+        table = np.zeros((len(self.structure.tables.parent), PARAMETERS))
+        table[self.bodies] = self.inertial
+        return table
+
+    def with_body(self, link: str, parameters: Array) -> Mechanism:
+        """Return the mechanism with a body more on a link.
+
+        Parameters
+        ----------
+        link : str
+        parameters : (10,) array
+            In the link's frame; see `inertial`.
+        """
+        row, frame = self.structure.links[link]
+        added = inertial_in(frame, parameters)
+        at = np.flatnonzero(self.bodies == row)
+        if len(at):
+            inertial = self.inertial.copy()
+            inertial[at[0]] += added
+            return replace(self, inertial=inertial)
+        return replace(self, bodies=np.append(self.bodies, row),
+                       inertial=np.vstack((self.inertial, added)))
+
+    def with_payload(self, mass: float = 0.0, moment: tuple[float, ...] = (0.0,) * 3,
+                     inertia: tuple[float, ...] = (0.0,) * 6) -> Mechanism:
+        """Return the mechanism with more at the tool.
+
+        Parameters
+        ----------
+        mass : float
+            A point at the tool's origin [kg].
+        moment : (3,)
+            First moment about the tool's origin, in the tool's axes [kg m].
+        inertia : (6,)
+            xx yy zz xy xz yz about the tool's origin, in its axes [kg m^2].
+        """
+        xx, yy, zz, xy, xz, yz = inertia
+        return self.with_body(self.structure.tool,
+                              np.array([mass, *moment, xx, xy, yy, xz, yz, zz]))
+
+    def at(self, position: Array, velocity: Array, acceleration: Array) -> Linkage:
+        """Return the motion of all links for that of the drives, (N, D) each.
+
+        Raises
+        ------
+        WorkspaceError
+            Where the loops do not close.
+        SingularityError
+            Where the drives do not determine the motion.
+        """
+        return Linkage.of(self.structure, position, velocity, acceleration)
+
+    def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Return the efforts of the drives that move the bodies, (N, D) [N m, N]."""
+        return self.at(position, velocity, acceleration).efforts(self)
+
+    def regressor(self, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Return the derivatives of the efforts by `inertial`, (N, D, 10 B)."""
+        return self.at(position, velocity, acceleration).regressor(self)
+
+    def tool_positions(self, position: Array) -> Array:
+        """Return where the tool is in the base's frame, (N, 3) [m]."""
+        rest = np.zeros_like(position)
+        return self.at(position, rest, rest).frame_of(self.structure.tool).p
+
+
+@dataclass(frozen=True, eq=False)
+class Linkage:
+    """The motion of all links of a structure, at N samples.
+
+    Parameters
+    ----------
+    structure : Structure
+    motion : Motion
+    drives : tuple of (N, D) arrays
+        What it was computed for: position, velocity and acceleration.
+    """
+
+    structure: Structure
+    motion: Motion
+    drives: tuple[Array, Array, Array]
+
+    @classmethod
+    def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
+           ) -> Linkage:
+        """Return the motion, or raise as `Mechanism.at`."""
+        t = structure.tables
+        motion, failed = follow(t, structure.home, position, velocity, acceleration)
+        if failed >= 0:
+            raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
+                                 'must be within reach, on the way from home')
+        found = cls(structure, motion, (position, velocity, acceleration))
+        if len(t.row_loop):
+            found._require_regular()
+        return found
+
+    def is_of(self, position: Array, velocity: Array, acceleration: Array) -> bool:
+        """Return whether it was computed for these very arrays."""
+        return all(mine is other for mine, other in zip(
+            self.drives, (position, velocity, acceleration), strict=True))
+
+    @property
+    def condition(self) -> Array:
+        """Condition number of the loops over that at home, at `CONDITIONS` samples at most."""
+        chosen = self.motion.inverse[::-(-len(self.motion.q) // CONDITIONS)]
+        s = self.structure
+        t = s.tables
+        slides = np.array([not t.turns[np.flatnonzero(t.coordinate == c)[0]] for c in t.passive])
+        columns, rows = np.where(slides, s.size, 1.0), np.where(t.row_kind == 0, 1 / s.size, 1.0)
+        scaled = chosen / columns[:, None] / rows
+        with np.errstate(all='ignore'):
+            condition: Array = np.linalg.cond(np.where(np.isfinite(scaled), scaled, 1e300))
+        return condition / s.mobility.condition
+
+    def _require_regular(self) -> None:
+        determinant = self.motion.state[:, 1]
+        home = self._home_determinant
+        turned = np.flatnonzero(~(determinant * home > 0))
+        if len(turned):
+            raise SingularityError(
+                int(turned[0]), 'the motion leaves the assembly of home through a singularity',
+                'the determinant of the loops must keep its sign')
+        condition = self.condition
+        if not np.all(condition < WORST_CONDITION):
+            step = -(-len(determinant) // CONDITIONS)
+            worst = int(np.argmax(~(condition < WORST_CONDITION)))
+            raise SingularityError(
+                worst * step, f'the loops are {condition[worst]:.3g} times worse conditioned than '
+                'at home', f'must be below {WORST_CONDITION:g}: the drives nearly lose hold')
+
+    @property
+    def _home_determinant(self) -> float:
+        return home_determinant(self.structure)
+
+    def frame_of(self, link: str) -> Frame:
+        """Return the frames of a link in the base's, R (N, 3, 3) and p (N, 3)."""
+        row, frame = self.structure.links[link]
+        m = self.motion
+        return Frame(m.R[:, row] @ frame.R, m.p[:, row] + m.R[:, row] @ frame.p)
+
+    @cached_property
+    def twists(self) -> tuple[Array, Array]:
+        """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
+        return twists(self.structure.tables, self.motion)
+
+    def loads(self, mechanism: Mechanism, with_reactions: bool = False) -> Loads:
+        """Return the forces that move the bodies."""
+        return press(self.structure.tables, self.motion, mechanism.by_joint,
+                     np.array(mechanism.gravity, dtype=float), with_reactions)
+
+    def efforts(self, mechanism: Mechanism) -> Array:
+        """Return the efforts of the drives that move the bodies, (N, D)."""
+        efforts: Array = self.loads(mechanism).efforts
+        return efforts
+
+    def wrench_efforts(self, wrench: Array) -> Array:
+        """Return the efforts of wrenches that the tool applies, (N, D).
+
+        Parameters
+        ----------
+        wrench : (N, 6) array
+            Force [N] and moment about the tool's origin [N m], in the base's axes.
+        """
+        row, _ = self.structure.links[self.structure.tool]
+        W, U = (each[:, row] for each in self.twists)
+        arm = self.frame_of(self.structure.tool).p - self.motion.p[:, row]
+        force, moment = wrench[:, :3], wrench[:, 3:] + np.cross(arm, wrench[:, :3])
+        efforts: Array = (np.einsum('nid,ni->nd', U, force)
+                          + np.einsum('nid,ni->nd', W, moment))
+        return efforts
+
+    def regressor(self, mechanism: Mechanism) -> Array:
+        """Return the derivatives of the efforts by the bodies' parameters, (N, D, 10 B)."""
+        m, rows = self.motion, mechanism.bodies
+        R = m.R[:, rows]
+
+        def own(values: Array) -> Array:
+            """Return vectors, or columns of vectors, in the axes of their bodies."""
+            turned: Array = np.einsum('nbji,nbj...->nbi...', R, values)
+            return turned
+
+        W, U = (own(each[:, rows]) for each in self.twists)
+        w, wd = own(m.w[:, rows])[..., None], own(m.wd[:, rows])[..., None]
+        a = own(m.ud[:, rows] - np.asarray(mechanism.gravity))[..., None]
+
+        def cross(x: Array, y: Array) -> Array:
+            return np.stack([x[:, :, (i + 1) % 3] * y[:, :, (i + 2) % 3]
+                             - x[:, :, (i + 2) % 3] * y[:, :, (i + 1) % 3] for i in range(3)],
+                            axis=2)
+
+        samples, drives = len(m.q), U.shape[-1]
+        found = np.empty((samples, drives, len(rows), PARAMETERS))
+        found[..., 0] = np.sum(U * a, axis=2).transpose(0, 2, 1)
+        moment = (cross(U, wd) + w * np.sum(U * w, axis=2, keepdims=True)
+                  - U * np.sum(w * w, axis=2, keepdims=True) + cross(a, W))
+        found[..., 1:4] = moment.transpose(0, 3, 1, 2)
+        c = cross(W, w)
+        for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))):
+            column = W[:, :, i] * wd[:, :, j] + c[:, :, i] * w[:, :, j]
+            if i != j:
+                column = column + W[:, :, j] * wd[:, :, i] + c[:, :, j] * w[:, :, i]
+            found[..., 4 + k] = column.transpose(0, 2, 1)
+        return found.reshape(samples, drives, -1)
+
+    def joint_friction(self, mechanism: Mechanism, friction: JointFriction) -> Array:
+        """Return the drives' efforts against friction of passive joints, (N, D)."""
+        loads = self.loads(mechanism, with_reactions=True)
+        return friction_efforts(self.structure.tables, self.motion, loads, friction,
+                                self.twists[0])
+
+
+def home_determinant(structure: Structure) -> float:
+    """Return the determinant of the loops at home."""
+    t = structure.tables
+    q = structure.home[None, t.drives]
+    motion, _ = follow(t, structure.home, q, np.zeros_like(q), np.zeros_like(q))
+    return float(motion.state[0, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class LinkageState(JointMotion):
+    """A motion of a mechanism's drives with the quantities that effects take, (N, D) each."""
+
+    robot: Mechanism = field(kw_only=True)
+    reversal: Reversal = field(default_factory=Reversal, kw_only=True)
+    load: StructureLoad | None = field(default=None, kw_only=True)
+    known: Linkage | None = field(default=None, kw_only=True)
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        return self.robot.structure.drives
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """The motion of all links."""
+        if self.known is not None and self.known.is_of(self.position, self.velocity,
+                                                       self.acceleration):
+            return self.known
+        return self.robot.at(self.position, self.velocity, self.acceleration)
+
+    @cached_property
+    def direction(self) -> Array:
+        """Sign of the velocity, sgn, turning over within the reversal velocity."""
+        direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
+        return direction
+
+    @cached_property
+    def rigid_force(self) -> Array:
+        """Efforts without friction [N m, N]."""
+        efforts = self.linkage.efforts(self.robot) + self.robot.armature * self.acceleration
+        if self.load is not None:
+            efforts = efforts + self.linkage.wrench_efforts(self.load.wrench)
+        return efforts
+
+    @cached_property
+    def guide_load(self) -> Array:
+        """What a drive's gear carries: the size of its effort without friction [N m, N]."""
+        return np.abs(self.rigid_force)
+
+    def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> LinkageState:
+        """Return a state of this motion with other bodies, and with an additional load."""
+        if load is None:
+            load = self.load
+        elif self.load is not None:
+            load = self.load + load
+        return replace(self, robot=robot, load=load, known=self.linkage)

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Robot descriptions from MJCF, read by MuJoCo's own compiler.
+
+Hinges, slides, balls and free joints make the tree; `connect`, `weld` and linear `joint`
+constraints its loops and couplings. Several joints on one body are as many links without mass.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MissingLibraryError, ModelError, UnreadableFileError
+from pprs_dynamics.physics.mechanism.description import (
+    FIXED,
+    FLOATING,
+    PARAMETERS,
+    PRISMATIC,
+    REVOLUTE,
+    Description,
+    Frame,
+    Joint,
+    Loop,
+    Mimic,
+    body_at,
+)
+from pprs_dynamics.physics.mechanism.urdf import read_content
+
+WORLD = 'world'
+
+
+def read_mjcf(path: str) -> Description:
+    """Return what an MJCF says, at its reference configuration.
+
+    Raises
+    ------
+    MissingLibraryError
+        Without MuJoCo.
+    UnreadableFileError
+        Where it cannot be compiled.
+    ModelError
+        For a constraint that is no loop and no linear coupling.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingLibraryError('mujoco', 'a model from MJCF', 'sim') from None
+    content = read_content(path)
+    try:
+        model = mujoco.MjModel.from_xml_path(path)
+    except (ValueError, mujoco.FatalError) as error:
+        raise UnreadableFileError(path, f'not MJCF that can be compiled: {error}') from None
+    return _Reader(mujoco, model, path).description(hashlib.sha256(content).hexdigest())
+
+
+class _Reader:
+    """Reads a compiled model."""
+
+    def __init__(self, mujoco: Any, model: Any, path: str) -> None:
+        self.mujoco, self.model, self.path = mujoco, model, path
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        self.placed = [Frame(data.xmat[b].reshape(3, 3).copy(), data.xpos[b].copy())
+                       for b in range(model.nbody)]
+        self.bodies = [WORLD] + [model.body(b).name or f'body_{b}' for b in range(1, model.nbody)]
+        self.names = [model.joint(k).name or f'joint_{k}' for k in range(model.njnt)]
+
+    def description(self, digest: str) -> Description:
+        """Return the description."""
+        links: dict[str, Array] = {WORLD: np.zeros(PARAMETERS)}
+        joints: dict[str, Joint] = {}
+        for b in range(1, self.model.nbody):
+            self._body(b, links, joints)
+        loops = self._constraints(joints)
+        return Description(self.path, links, joints, digest, tuple(loops))
+
+    def _body(self, b: int, links: dict[str, Array], joints: dict[str, Joint]) -> None:
+        model = self.model
+        parent = self.bodies[int(model.body_parentid[b])]
+        at = Frame(_matrix(self.mujoco, model.body_quat[b]), model.body_pos[b].copy())
+        first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
+        name = self.bodies[b]
+        links[name] = self._inertial(b)
+        if not count:
+            joints[f'{name}_fixed'] = Joint(f'{name}_fixed', FIXED, parent, name, at,
+                                            np.array([1.0, 0, 0]))
+        for k in range(first, first + count):
+            kind = int(model.jnt_type[k])
+            axes, kinds, place = [model.jnt_axis[k].copy()], [REVOLUTE], model.jnt_pos[k].copy()
+            if kind == self.mujoco.mjtJoint.mjJNT_FREE:
+                joints[self.names[k]] = Joint(self.names[k], FLOATING, parent, name, at,
+                                              np.array([1.0, 0, 0]))
+                return
+            if kind == self.mujoco.mjtJoint.mjJNT_SLIDE:
+                kinds, place = [PRISMATIC], np.zeros(3)
+            elif kind == self.mujoco.mjtJoint.mjJNT_BALL:
+                axes, kinds = list(np.eye(3)), [REVOLUTE] * 3
+            for n, (axis, one) in enumerate(zip(axes, kinds, strict=True)):
+                own = self.names[k] if len(axes) == 1 else f'{self.names[k]}_{"xyz"[n]}'
+                last = k == first + count - 1 and n == len(axes) - 1
+                # About the joint's own place, which a link without mass stands for.
+                child = f'{own}_link'
+                links[child] = np.zeros(PARAMETERS)
+                lower, upper = (model.jnt_range[k] if model.jnt_limited[k] and len(axes) == 1
+                                else (-np.inf, np.inf))
+                joints[own] = Joint(own, one, parent, child, at @ Frame(np.eye(3), place), axis,
+                                    float(lower), float(upper))
+                parent, at = child, Frame(np.eye(3), -place)
+                if last:
+                    joints[f'{name}_on'] = Joint(f'{name}_on', FIXED, parent, name, at, axis)
+
+    def _inertial(self, b: int) -> Array:
+        model = self.model
+        R = _matrix(self.mujoco, model.body_iquat[b])
+        return body_at(float(model.body_mass[b]), tuple(model.body_ipos[b]),
+                       R @ np.diag(model.body_inertia[b]) @ R.T)
+
+    def _constraints(self, joints: dict[str, Joint]) -> list[Loop]:
+        model, kinds = self.model, self.mujoco.mjtEq
+        loops = []
+        for e in range(model.neq):
+            if not model.eq_active0[e]:
+                continue
+            name = model.equality(e).name or f'equality_{e}'
+            kind, a, b = int(model.eq_type[e]), int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+            numbers = model.eq_data[e]
+            if kind == kinds.mjEQ_JOINT:
+                self._couple(joints, name, a, b, numbers)
+                continue
+            if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+                raise ModelError('robot.mjcf', name, 'be a connect, weld or joint constraint')
+            if model.eq_objtype[e] == self.mujoco.mjtObj.mjOBJ_SITE:
+                frames = [Frame(_matrix(self.mujoco, model.site_quat[s]), model.site_pos[s].copy())
+                          for s in (a, b)]
+                a, b = (int(model.site_bodyid[s]) for s in (a, b))
+            elif kind == kinds.mjEQ_CONNECT:
+                frames = [Frame(np.eye(3), numbers[:3].copy()),
+                          Frame(np.eye(3), numbers[3:6].copy())]
+            else:
+                # Pose of the second body in the first, and a point of the second.
+                frames = [Frame(_matrix(self.mujoco, numbers[6:10]), numbers[3:6].copy()), Frame()]
+            loops.append(Loop(name, 'spherical' if kind == kinds.mjEQ_CONNECT else 'fixed',
+                              self.bodies[a], frames[0], self.bodies[b], frames[1]))
+        return loops
+
+    def _couple(self, joints: dict[str, Joint], name: str, a: int, b: int, numbers: Array) -> None:
+        if np.any(numbers[2:5]) or b < 0:
+            raise ModelError('robot.mjcf', name, 'be linear in another joint: position = c0 + c1 '
+                             'times its position')
+        own = joints[self.names[a]]
+        joints[own.name] = replace(own, mimic=Mimic(self.names[b], float(numbers[1]),
+                                                    float(numbers[0])))
+
+
+def _matrix(mujoco: Any, quaternion: Array) -> Array:
+    found = np.empty(9)
+    mujoco.mju_quat2Mat(found, np.asarray(quaternion, dtype=float))
+    return found.reshape(3, 3)
