@@ -59,35 +59,35 @@ feedforward: $(VENV)/.demo
 	$(BIN)/python docs/feedforward.py
 
 localisation: $(VENV)/.test
-	$(BIN)/python benchmarks/localisation.py 100
+	$(BIN)/python -m benchmarks.scores.localisation 100
 
 score: $(VENV)/.test
-	$(BIN)/python benchmarks/score.py --table docs/diagnosis_table.md
+	$(BIN)/python -m benchmarks.scores.diagnosis --table docs/diagnosis_table.md
 
 adoption: $(VENV)/.test
-	$(BIN)/python benchmarks/adoption_score.py 24
+	$(BIN)/python -m benchmarks.scores.adoption 24
 
 benchmark: $(VENV)/.test
-	$(BIN)/python benchmarks/speed.py
-	$(BIN)/python benchmarks/latency.py 10
+	$(BIN)/python -m benchmarks.speed.model
+	$(BIN)/python -m benchmarks.node.latency 10
 
 reliability: $(VENV)/.test
-	$(BIN)/python benchmarks/reliability.py
+	$(BIN)/python -m benchmarks.node.reliability
 
 reliability-full: $(VENV)/.test
-	$(BIN)/python benchmarks/reliability.py --full
+	$(BIN)/python -m benchmarks.node.reliability --full
 
 experiments: $(VENV)/.test
-	$(BIN)/python benchmarks/experiments_score.py
+	$(BIN)/python -m benchmarks.scores.experiments
 
 decisions: $(VENV)/.test
-	$(BIN)/python benchmarks/decision_scores.py
+	$(BIN)/python -m benchmarks.scores.decisions
 
 fleet: $(VENV)/.test
-	$(BIN)/python benchmarks/fleet.py
+	$(BIN)/python -m benchmarks.fleets.fleet
 
 workbench: $(VENV)/.test
-	$(BIN)/python benchmarks/workbench.py 30 docs/images/workbench.png
+	$(BIN)/python -m benchmarks.speed.workbench 30 docs/images/workbench.png
 
 # What the demonstration needs; the tests add to it.
 $(VENV)/.demo: setup.py | $(VENV)/bin/python

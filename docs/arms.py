@@ -269,9 +269,9 @@ def tell(bench: Bench) -> dict[str, str]:
         ['50 s, six joints, processor time', '≤ 10 s', f'{seconds[0]:.0f} to {seconds[-1]:.0f} s'],
         ['one sample with friction / bare `pin.rnea`', '≤ 1.5', f'{whole / rnea:.2f}'],
     ]
-    sys.path.insert(0, str(DOCS.parent / 'benchmarks'))
-    import arm_score
-    import cases_on_dask
+    sys.path.insert(0, str(DOCS.parent))
+    from benchmarks.scores import arms as arm_score
+    from benchmarks.scores import cases as cases_on_dask
 
     if not bench.as_far:
         arm_score.run(bench.folder / 'base.yaml', SEEDS, NOTHING, DURATION,

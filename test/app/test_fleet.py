@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 import pytest
-from cluster_kills import write_axis
 
+from benchmarks.fleets.cluster_kills import write_axis
 from pprs_dynamics import __version__
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.fleet.changes import find_changes

@@ -16,7 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from cluster_kills import (
+
+from benchmarks.fleets.cluster_kills import (
     PATIENCE,
     files,
     kill_one_after_another,
@@ -26,7 +27,6 @@ from cluster_kills import (
     wait_for,
     write_axes,
 )
-
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.fleet.engine import cluster, run_each
 

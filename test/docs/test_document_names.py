@@ -67,6 +67,9 @@ def wrong_commands(line: str) -> Iterator[str]:
     for found in re.findall(r'^make ([a-z-]+)', line):
         if not re.search(rf'^{found}:', (PROJECT / 'Makefile').read_text(), re.M):
             yield f'make {found}'
+    for found in re.findall(r'python -m (benchmarks[\w.]*)', line):
+        if not (PROJECT / f'{found.replace(".", "/")}.py').is_file():
+            yield f'python -m {found}'
     for found in re.findall(r'ros2 run pprs_dynamics (\w+)', line):
         if found not in executables():
             yield f'ros2 run pprs_dynamics {found}'
@@ -163,6 +166,7 @@ def test_a_page_names_only_what_exists(page: Path) -> None:
     ('```sh\npprs simulate \\\n  --outputs x.mcap\n```', 'pprs simulate --outputs'),
     ('`--no-such-option`', '--no-such-option'),
     ('`make coffee`', 'make coffee'),
+    ('`python -m benchmarks.scores.luck`', 'python -m benchmarks.scores.luck'),
     ('`ros2 run pprs_dynamics feedback`', 'ros2 run pprs_dynamics feedback'),
     ('`pprs_dynamics/physics/no_such.py`', 'pprs_dynamics/physics/no_such.py'),
     ('`selection/decisions.py`', 'selection/decisions.py'),

@@ -5,14 +5,12 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import resource
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -24,7 +22,9 @@ import numpy as np
 import pytest
 from node_bench import bench
 from ros_processes import environment, executable, node_process
+from short_recordings import short_recordings
 
+from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.adoption import loop, objections
 from pprs_dynamics.inference.adoption.adopt import adopt
@@ -40,8 +40,6 @@ from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
-BENCHMARKS = Path(__file__).parents[2] / 'benchmarks'
-MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'adoption_score')
 HIDDEN, WRONG = 'coulomb_friction', 'drive_spring'
 DURATION = 15.0  # [s]
 NOISE = 0.05  # [N], of recordings made without the simulated robot
@@ -71,13 +69,8 @@ def pprs(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]
 @pytest.fixture(scope='module')
 def score() -> Iterator[ModuleType]:
     """Yield the script that hides effects, with short recordings."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        modules = {name: importlib.import_module(name) for name in MODULES}
-        patch.setattr(modules['hidden_recordings'], 'DURATION', DURATION)
-        yield modules['adoption_score']
-    for name in MODULES:
-        sys.modules.pop(name, None)
+    with short_recordings(DURATION):
+        yield adoption
 
 
 @pytest.fixture(scope='module')

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hidden_recordings import Case, make_case
 
+from benchmarks.hidden.recordings import Case, make_case
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.fourier_path import FourierFamily, FourierPath

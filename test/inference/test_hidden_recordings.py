@@ -5,48 +5,34 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from cases_on_dask import here, read_outcomes
+from short_recordings import short_recordings
 
+from benchmarks.hidden import motions, recordings, strength
+from benchmarks.scores import diagnosis, diagnosis_table
+from benchmarks.scores.cases import here, read_outcomes
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.sensors import EffortNoise
 
-BENCHMARKS = Path(__file__).parents[2] / 'benchmarks'
-MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'score_table', 'score')
 
-
-@pytest.fixture(scope='module')
-def benchmarks() -> Iterator[dict[str, ModuleType]]:
-    """Yield the scripts, which are no package, with short recordings."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        modules = {name: importlib.import_module(name) for name in MODULES}
-        patch.setattr(modules['hidden_recordings'], 'DURATION', 8.0)
-        yield modules
-    for name in MODULES:
-        del sys.modules[name]
-
-
-@pytest.fixture(scope='module')
-def recordings(benchmarks: dict[str, ModuleType]) -> ModuleType:
-    return benchmarks['hidden_recordings']
+@pytest.fixture(scope='module', autouse=True)
+def short() -> Iterator[None]:
+    with short_recordings(8.0):
+        yield
 
 
 @pytest.mark.parametrize('seed', range(6))
 def test_random_motions_are_exact_and_keep_the_limits(
-    benchmarks: dict[str, ModuleType], seed: int,
+    seed: int,
 ) -> None:
-    model = benchmarks['hidden_recordings'].tolerant_model(0.05)
-    path = benchmarks['hidden_motions'].draw_motion(model, seed, 8.0)
+    model = recordings.tolerant_model(0.05)
+    path = motions.draw_motion(model, seed, 8.0)
     time = np.arange(0.0, 8.0, 0.001)
     state = model.mechanism(path.motion(time))
     model.limits.check_strokes(state.position)
@@ -62,7 +48,7 @@ def test_random_motions_are_exact_and_keep_the_limits(
 
 
 def test_a_robot_with_nothing_hidden_is_explained_by_its_own_numbers(
-    recordings: ModuleType,
+
 ) -> None:
     case = recordings.Case('nothing', (), 3, width=1.0)
     model, recording, truth = recordings.make_case(case)
@@ -77,7 +63,7 @@ def test_a_robot_with_nothing_hidden_is_explained_by_its_own_numbers(
 
 @pytest.mark.parametrize('names', [('drive_spring',), ('time_delay', 'payload_mass')])
 def test_a_case_has_the_strength_it_promises_and_repeats(
-    recordings: ModuleType, tmp_path: Path, names: tuple[str, ...],
+    tmp_path: Path, names: tuple[str, ...],
 ) -> None:
     case = recordings.Case('effects', names, 3, 1.0)
     model, recording, truth = recordings.make_case(case)
@@ -95,9 +81,9 @@ def test_a_case_has_the_strength_it_promises_and_repeats(
 
 
 @pytest.mark.parametrize('noise', [0.0, 0.9, 0.997, '1/f'])
-def test_whitened_noise_is_white(benchmarks: dict[str, ModuleType], noise: float | str) -> None:
-    settings = benchmarks['hidden_recordings'].noise_settings(noise, 0.08)
-    whitening = benchmarks['hidden_strength'].Whitening(settings, 5)
+def test_whitened_noise_is_white(noise: float | str) -> None:
+    settings = recordings.noise_settings(noise, 0.08)
+    whitening = strength.Whitening(settings, 5)
     samples = EffortNoise(settings, np.random.default_rng(6)).samples(100_000)
     white = whitening(samples.reshape(-1, 5, 6).mean(axis=1))
     assert np.sqrt(np.mean(white ** 2)) == pytest.approx(1.0, abs=0.01)
@@ -105,9 +91,9 @@ def test_whitened_noise_is_white(benchmarks: dict[str, ModuleType], noise: float
         assert abs(np.mean(white[lag:] * white[:-lag])) < 0.02
 
 
-def test_what_the_tolerances_allow_is_no_effect(benchmarks: dict[str, ModuleType]) -> None:
-    strength, rng = benchmarks['hidden_strength'], np.random.default_rng(7)
-    settings = benchmarks['hidden_recordings'].noise_settings(0.0, 0.1)
+def test_what_the_tolerances_allow_is_no_effect() -> None:
+    rng = np.random.default_rng(7)
+    settings = recordings.noise_settings(0.0, 0.1)
     columns = rng.normal(size=(3, 300, 6))
     refit = strength.Refit(columns, np.array([0.5, 0.0, -1.0]), strength.Whitening(settings, 1))
     # In tolerances: up to 1.5 and 1, and 0, are left upwards to take off.
@@ -142,10 +128,10 @@ def said(
 
 
 def test_the_score_appends_continues_and_counts_failures(
-    benchmarks: dict[str, ModuleType], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:
-    score, file = benchmarks['score'], tmp_path / 'score.jsonl'
-    todo = [benchmarks['hidden_recordings'].Case('nothing', (), 3, width=w) for w in (0.5, 1, 2)]
+    score, file = diagnosis, tmp_path / 'score.jsonl'
+    todo = [recordings.Case('nothing', (), 3, width=w) for w in (0.5, 1, 2)]
     calls = []
 
     def diagnose(model: object, recordings: list[Any]) -> Answer:
@@ -162,7 +148,7 @@ def test_the_score_appends_continues_and_counts_failures(
     assert calls == [case.name for case in todo]
     assert [outcome.get('judged', {}).get('claimed') for outcome in found] == [False, None, True]
     assert 'no idea' in capsys.readouterr().out
-    table = benchmarks['score_table'].make_table(found)
+    table = diagnosis_table.make_table(found)
     assert '50.0 % (1/2;' in table
     assert 'cases that ended in an error | 0 | 1 |' in table
 
@@ -178,10 +164,10 @@ def test_the_score_appends_continues_and_counts_failures(
     (said('adequate', suspects=[{'name': 'coulomb_friction'}]), {'suspected'}),
 ], ids=['right', 'added', 'second', 'set', 'wrong', 'missed', 'suspected'])
 def test_what_counts_as_right(
-    benchmarks: dict[str, ModuleType], answer: dict[str, Any], right: set[str],
+    answer: dict[str, Any], right: set[str],
 ) -> None:
     truth = {'effects': [{'name': 'coulomb_friction', 'drives': ['lift_1'], 'parameters': {}}]}
-    judged = benchmarks['score_table'].judge({'truth': truth, 'said': answer, 'row': 'effects'})
+    judged = diagnosis_table.judge({'truth': truth, 'said': answer, 'row': 'effects'})
     assert {key for key, value in judged.items() if value is True} - {'good'} == right
 
 
@@ -189,11 +175,11 @@ def test_what_counts_as_right(
     ('velocity of lift_2', 'slide_1', True), ('velocity of lift_1', 'slide_1', False),
     ('velocity of lift_2', 'lift_2', False)])
 def test_the_variable_of_a_coupling_is_the_other_drives(
-    benchmarks: dict[str, ModuleType], variable: str, drive: str, right: bool,
+    variable: str, drive: str, right: bool,
 ) -> None:
     truth = {'effects': [{'name': 'drive_coupling', 'drives': ['slide_1'],
                           'parameters': {'slide_1': {'coefficient': 5.0, 'source': 4.0}}}]}
     answer = said('unknown', depends_on=[{'drive': drive, 'variable': variable,
                                           'share_of_error': 0.5}])
-    judged = benchmarks['score_table'].judge({'truth': truth, 'said': answer, 'row': 'unknown'})
+    judged = diagnosis_table.judge({'truth': truth, 'said': answer, 'row': 'unknown'})
     assert judged['good'] is right

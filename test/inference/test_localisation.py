@@ -3,40 +3,22 @@
 
 """Where the model fails: nothing is said of noise, and a planted error is named first.
 
-A smaller version of benchmarks/localisation.py, on its own recordings.
+A smaller version of benchmarks/scores/localisation.py, on its own recordings.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
+from benchmarks.scores import localisation as benchmark
 from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 
-FILE = Path(__file__).parents[2] / 'benchmarks' / 'localisation.py'
 FIRST_SEED = 40_000  # none of the benchmark's
 FAST_ENOUGH = 3.0  # [s] of processor time for 40 s of six drives at 100 Hz
-
-
-def load_benchmark() -> ModuleType:
-    """Import the benchmark, which is a script and in no package."""
-    spec = importlib.util.spec_from_file_location('benchmark_localisation', FILE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-benchmark = load_benchmark()
 
 
 def noisy(seed: int, kind: float | str = 0.9) -> Residuals:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import subprocess
 import sys
@@ -16,7 +15,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 from ros_processes import executable
+from short_recordings import short_recordings
 
+from benchmarks.hidden import recordings
 from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
@@ -28,7 +29,7 @@ from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
 
 ROOT = Path(__file__).parents[2]
-BENCHMARKS, DOCS = ROOT / 'benchmarks', ROOT / 'docs'
+DOCS = ROOT / 'docs'
 MODEL = DriveModel.load()
 AXIS = AxisModel.load()
 RATE, DURATION = 250.0, 10.0
@@ -149,12 +150,8 @@ def test_nothing_is_said_of_what_is_right(seed: int, path: str) -> None:
 @pytest.fixture(scope='module')
 def benchmark() -> Iterator[ModuleType]:
     """The script that makes recordings with hidden effects, with short ones."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        module = importlib.import_module('hidden_recordings')
-        patch.setattr(module, 'DURATION', 6.0)
-        yield module
-    sys.modules.pop('hidden_recordings')
+    with short_recordings(6.0):
+        yield recordings
 
 
 @pytest.mark.parametrize('name', HIDDEN_EFFECTS)

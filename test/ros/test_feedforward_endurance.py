@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
-import fuzz
-import parameter_storm
 import pytest
-import soak
+
+from benchmarks.node import fuzz, parameter_storm, soak
 
 pytestmark = pytest.mark.nodes
 

@@ -9,8 +9,6 @@ replayed as joint_states, and the monitor and the feedforward node take what `ad
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -25,8 +23,10 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
+from short_recordings import short_recordings
 from std_msgs.msg import Float64MultiArray
 
+from benchmarks.scores import adoption
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.measurement.files.recording import Recording
@@ -37,8 +37,6 @@ from pprs_dynamics.ros import conversions
 
 pytestmark = pytest.mark.nodes
 
-BENCHMARKS = Path(__file__).parents[2] / 'benchmarks'
-MODULES = ('hidden_motions', 'hidden_strength', 'hidden_recordings', 'adoption_score')
 HIDDEN = 'coulomb_friction'
 START = 1_700_000_000_000_000_000  # [ns]
 STEP = 2_000_000  # [ns]
@@ -67,13 +65,8 @@ class Robot:
 
 @pytest.fixture(scope='module')
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(BENCHMARKS)
-        modules = {name: importlib.import_module(name) for name in MODULES}
-        patch.setattr(modules['hidden_recordings'], 'DURATION', 15.0)
-        yield Robot(modules['adoption_score'], tmp_path_factory.mktemp('live'))
-    for name in MODULES:
-        sys.modules.pop(name, None)
+    with short_recordings(15.0):
+        yield Robot(adoption, tmp_path_factory.mktemp('live'))
 
 
 class Live:

@@ -3,7 +3,7 @@
 
 """How fast the workbench answers, in a real browser.
 
-    python benchmarks/workbench.py [ROUNDS [PICTURE.png]]
+    python -m benchmarks.speed.workbench [ROUNDS [PICTURE.png]]
 
 A recording of 40 s of the simulated robot with two hidden effects; the server as a process,
 Chromium without a graphics card beside it. From the event of a click to the frame that shows its
@@ -21,9 +21,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from browser import chromium
+from ros_processes import executable
+from workbench_server import workbench
 
-TESTS = Path(__file__).parents[1] / 'test' / 'support'
-DEMO = Path(__file__).parents[1] / 'demo'
 ROUNDS = 30
 PATIENCE = 300_000  # [ms]
 TICKED = ('payload_mass', 'stribeck_friction', 'viscous_friction', 'effort_offset', 'hysteresis')
@@ -34,11 +35,6 @@ GOALS = {'tick to paint': '60 / 100', 'evidence with its own noise': '300',
 
 def main() -> None:
     """Measure and print a table."""
-    sys.path[:0] = [str(TESTS), str(DEMO)]
-    from browser import chromium
-    from ros_processes import executable
-    from workbench_server import workbench
-
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS
     with TemporaryDirectory() as folder, chromium() as browser:
         recording = Path(folder) / 'run.mcap'

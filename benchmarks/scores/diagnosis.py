@@ -3,8 +3,8 @@
 
 """How often `diagnose` is right about physics hidden in recordings.
 
-    python benchmarks/score.py --quick
-    python benchmarks/score.py --seeds 20 --nothing 200 --table docs/diagnosis_table.md
+    python -m benchmarks.scores.diagnosis --quick
+    python -m benchmarks.scores.diagnosis --seeds 20 --nothing 200 --table docs/diagnosis_table.md
 
 Every case's outcome is appended to FILE at once, and cases that are there are not run again: the
 run can be stopped and continued, and `--seeds` raised later. The table is made from that file.
@@ -14,7 +14,6 @@ run can be stopped and continued, and `--seeds` raised later. The table is made 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 import traceback
@@ -24,18 +23,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-# The arrays are small: threads of the linear algebra would only wait for one another.
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import numpy as np
-from cases_on_dask import Each, add_options, engine, read_outcomes, run_missing
-from hidden_recordings import PINK, Case, load_case, make_case, save_case
-from oracle import consult
-from score_table import judge, make_table
 
+from benchmarks import OUTPUT
+from benchmarks.hidden.recordings import PINK, Case, load_case, make_case, save_case
+from benchmarks.scores.cases import Each, engine, read_outcomes, run_missing, scoring_parser
+from benchmarks.scores.diagnosis_table import judge, make_table
+from benchmarks.scores.oracle import consult
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
 
-OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 SNRS = (0.25, 0.5, 1.0, 3.0)
 NOISES: tuple[float | str, ...] = (0.0, 0.9, 0.98, 0.997, 0.999, PINK)
 SLOW_NOISES = (0.98, 0.997)
@@ -152,8 +148,7 @@ def _sets(seed: int) -> Iterator[tuple[str, ...]]:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = scoring_parser(__doc__, 'score.jsonl')
     parser.add_argument('--quick', action='store_true',
                         help='one seed of every effect at SNR 1 and a few of nothing, afresh')
     parser.add_argument('--development', action='store_true',
@@ -166,8 +161,6 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument('--snr', type=float, nargs='+', default=SNRS)
     parser.add_argument('--only', choices=ROWS, nargs='+', default=ROWS)
     parser.add_argument('--effect', action='append', help='only cases with this one')
-    add_options(parser)
-    parser.add_argument('--file', type=Path, default=OUTPUT / 'score.jsonl')
     parser.add_argument('--recordings', type=Path,
                         help='folder that keeps the recordings (default: of --quick and '
                         '--development output/recordings, else none)')

@@ -3,8 +3,8 @@
 
 """How often live diagnosis is right: streams in which an effect sets in, and streams without.
 
-    python benchmarks/live_diagnosis.py changes SEEDS [EFFECT ...]
-    python benchmarks/live_diagnosis.py nothing WINDOWS
+    python -m benchmarks.scores.live_diagnosis changes SEEDS [EFFECT ...]
+    python -m benchmarks.scores.live_diagnosis nothing WINDOWS
 
 A stream is a row of windows of 40 s of one robot, each along a random motion of its own. In
 `changes` an effect of SNR 1 to 3 sets in at a random moment of the second window and ends with
@@ -18,12 +18,22 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hidden_recordings import LEAD, NOISE, PINK, RATE, Case, Scene, _draw, _motion, noise_settings
 
+from benchmarks import OUTPUT
+from benchmarks.hidden.recordings import (
+    LEAD,
+    NOISE,
+    PINK,
+    RATE,
+    Case,
+    Scene,
+    _draw,
+    _motion,
+    noise_settings,
+)
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
 from pprs_dynamics.measurement.files.recording import Recording
@@ -31,7 +41,6 @@ from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS
 from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.sensors import EffortNoise
 
-OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 STEPS = ('plain', 'change', 'hidden', 'hidden', 'plain', 'plain')
 NOISES: tuple[float | str, ...] = (0.9, 0.98, 0.997, PINK)
 

@@ -3,7 +3,7 @@
 
 """How well a survey and its trends find what changes in a fleet of the physics engine.
 
-Run `python benchmarks/fleet.py [--fleets 5] [--robots 20] [--days 30] [--first 0]
+Run `python -m benchmarks.fleets.fleet [--fleets 5] [--robots 20] [--days 30] [--first 0]
 [--folder output/fleets] [--workers N | --scheduler ADDRESS] [--quiet]`. Each robot is recorded once
 a day, 20 s of the same motion, and has its own masses and friction within tolerances and its own
 noise; friction falls as the robot warms up, by the hour of the recording. On three robots the
@@ -14,10 +14,6 @@ are kept, and the survey's store too, so that what was interrupted goes on.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import argparse
 import csv
 import json
@@ -27,10 +23,10 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from hidden_motions import draw_motion
-from hidden_recordings import tolerant_model
-from hidden_strength import tolerated_numbers
 
+from benchmarks.hidden.motions import draw_motion
+from benchmarks.hidden.recordings import tolerant_model
+from benchmarks.hidden.strength import tolerated_numbers
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import read_manifest
 from pprs_dynamics.app.fleet.store import Store

@@ -3,7 +3,7 @@
 
 """How good a model gets when what `pprs` finds is added to it, from files to files.
 
-    python benchmarks/adoption_score.py 24
+    python -m benchmarks.scores.adoption 24
 
 Each case hides a random effect in the simulated robot and records two motions. `pprs diagnose
 --adopt-all` sees the first recording; the error of the model it writes is taken on the second,
@@ -15,10 +15,8 @@ cases that are there are not run again. `--workers` and `--scheduler` say where 
 
 from __future__ import annotations
 
-import argparse
 import copy
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -27,14 +25,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
-import hidden_recordings
 import numpy as np
-from cases_on_dask import add_options, engine, read_outcomes, run_missing
-from hidden_recordings import LEAD, Case, Scene, noise_settings
-from hidden_strength import Whitening
 
+from benchmarks.hidden import recordings as hidden_recordings
+from benchmarks.hidden.recordings import LEAD, Case, Scene, noise_settings
+from benchmarks.hidden.strength import Whitening
+from benchmarks.scores.cases import outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.measurement.motion.reconstruction import reconstruct
@@ -47,7 +43,6 @@ from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.sensors import EffortNoise
 
-OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 OTHER_MOTION = 1000  # between the seeds of the two motions
 GOOD = 1.1  # error over that of the best fit of the effect's own form
 WANTED = 0.95  # of the cases
@@ -219,20 +214,15 @@ def summary(outcomes: Sequence[dict[str, Any]]) -> str:
 
 def main() -> int:
     """Run cases that are not in the file yet, and print the shares."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = scoring_parser(__doc__, 'adoption.jsonl')
     parser.add_argument('cases', type=int, nargs='?', default=24)
     parser.add_argument('--first', type=int, default=500, help='first seed')
     parser.add_argument('--snr', type=float, default=1.0)
     parser.add_argument('--duration', type=float, default=40.0, help='of recordings [s]')
-    parser.add_argument('--file', type=Path, default=OUTPUT / 'adoption.jsonl')
-    add_options(parser)
     options = parser.parse_args()
     cases = {one[0].name: one for one in draw_cases(options.cases, options.first, options.snr)}
-    with engine(options) as each:
-        run_missing(each, partial(outcome_of, duration=options.duration), cases, options.file,
-                    lambda outcome: outcome['name'], one_line)
-    print(summary(read_outcomes(options.file)))
+    print(summary(outcomes_of(options, partial(outcome_of, duration=options.duration), cases,
+                              lambda outcome: outcome['name'], one_line)))
     return 0
 
 

@@ -3,7 +3,7 @@
 
 """A scheduler, workers and a client as processes over TCP, each killed in the midst of a survey.
 
-Run `python benchmarks/cluster_kills.py [--recordings 400] [--rounds 10]`. Small
+Run `python -m benchmarks.fleets.cluster_kills [--recordings 400] [--rounds 10]`. Small
 recordings of a single axis are surveyed once on a cluster of its own, without an accident: the
 reference. Then, in each round, a worker is killed (SIGKILL) when a drawn share is done, then the
 scheduler, then the client, with the same command run again after each; the store must come out the
@@ -25,13 +25,11 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import numpy as np
 
+from benchmarks import ROOT
 from pprs_dynamics.app.fleet.store import DONE, FAILED, Store
 
-ROOT = Path(__file__).resolve().parents[1]
 MODEL, EFFECTS = str(ROOT / 'config' / 'single_axis.yaml'), 'coulomb_friction'
 NOISE = 0.5  # [N]
 PATIENCE = 120.0  # [s], for a process on a busy machine

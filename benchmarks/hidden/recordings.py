@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hidden_motions import draw_motion
-from hidden_strength import Refit, Whitening, sensitivities, tolerated_numbers
 
+from benchmarks.hidden.motions import draw_motion
+from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length

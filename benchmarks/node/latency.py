@@ -3,7 +3,7 @@
 
 """Round trips of the feedforward node against an echo node, in one run.
 
-    python benchmarks/latency.py [SECONDS]
+    python -m benchmarks.node.latency [SECONDS]
 
 Both nodes are processes of their own; which one is measured alternates, so that a machine that
 is busy for a while is busy for both. Prints a table and a JSON line.
@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from rclpy.serialization import serialize_message
-from stream import Stream, feedforward, node_process, served
 from trajectory_msgs.msg import JointTrajectory
 
+from benchmarks.node import echo_node
+from benchmarks.node.stream import Stream, feedforward, node_process, served
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.conversions import write_trajectory
 
@@ -51,7 +52,7 @@ def main() -> int:
 
 def run(seconds: float) -> dict[str, Any]:
     """Stream for that long at each rate and return what was measured."""
-    echo = [sys.executable, str(Path(__file__).with_name('echo_node.py'))]
+    echo = [sys.executable, echo_node.__file__]
     one, found = trajectory(1), dict[str, Any]()
     with served(echo, '/echo', has_status=False) as (floor, _):
         domain = int(os.environ['ROS_DOMAIN_ID'])

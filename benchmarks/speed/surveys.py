@@ -3,9 +3,9 @@
 
 """What a survey costs: a recording, two workers against one, and the client's memory.
 
-Run `python benchmarks/survey_speed.py cost|workers|memory [--recordings N]`. The first two take
-recordings of 20 s of the six drives by the physics engine, as benchmarks/fleet.py makes them;
-`memory` takes small ones of the single axis. `workers` runs one, two, one, two, so that other
+Run `python -m benchmarks.speed.surveys cost|workers|memory [--recordings N]`. The first two take
+recordings of 20 s of the six drives by the physics engine, as `benchmarks.fleets.fleet` makes
+them; `memory` takes small ones of the single axis. `workers` runs one, two, one, two, so that other
 work on the machine meets both.
 """
 
@@ -20,12 +20,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter, process_time
 
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
-import fleet
 import numpy as np
-from cluster_kills import EFFECTS, MODEL, write_axis
 
+from benchmarks.fleets import fleet
+from benchmarks.fleets.cluster_kills import EFFECTS, MODEL, write_axis
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import Entry
 from pprs_dynamics.app.fleet.store import Store

@@ -3,7 +3,7 @@
 
 """A running feedforward node under messages of every kind of damage.
 
-    python benchmarks/fuzz.py [MESSAGES] [SEED]
+    python -m benchmarks.node.reliability fuzz
 
 Valid messages are mixed with NaN, infinities, 1e308, denormals, bad quaternions, wrong counts,
 10 000 points, names in any script, and truncated bytes. Afterwards the node must live, must have
@@ -13,7 +13,6 @@ its limit, may have left it on any topic.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -24,10 +23,10 @@ from builtin_interfaces.msg import Time
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from stream import feedforward, resident_memory, served
-from trajectory_damage import VALID, damaged, valid_motion
 from trajectory_msgs.msg import JointTrajectory
 
+from benchmarks.node.damage import VALID, damaged, valid_motion
+from benchmarks.node.stream import feedforward, resident_memory, served
 from pprs_dynamics import DriveModel
 from pprs_dynamics.ros.conversions import write_trajectory
 
@@ -132,16 +131,3 @@ def passed(found: dict[str, Any]) -> bool:
     return bool(found['alive'] and not found['bad_numbers'] and not found['miscounted']
                 and not found['wrong_answers_after_damage']
                 and found['accepted'] == found['accepted_expected'])
-
-
-def main() -> int:
-    """Run and print."""
-    found = run(*(int(word) for word in sys.argv[1:3] or ('100000',)))
-    for key, value in found.items():
-        print(f'{key}: {value}')
-    print('passed' if passed(found) else 'FAILED')
-    return 0 if passed(found) else 1
-
-
-if __name__ == '__main__':
-    sys.exit(main())

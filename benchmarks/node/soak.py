@@ -5,19 +5,18 @@
 
 Usage:
 
-    python benchmarks/soak.py [MINUTES] [RATE]
+    python -m benchmarks.node.reliability soak
 """
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from typing import Any
 
 import numpy as np
-from latency import trajectory
-from stream import feedforward, resident_memory, served
+
+from benchmarks.node.latency import trajectory
+from benchmarks.node.stream import feedforward, resident_memory, served
 
 SETTLING = 60.0  # [s] that memory may grow in
 BEHIND = 0.05  # [s] that this client makes up for
@@ -62,14 +61,6 @@ def run(
         'lag': status['lag'], 'compute_time': status['compute_time']}
 
 
-def main() -> int:
-    """Run and print."""
-    found = run(*(float(word) for word in sys.argv[1:3] or ('20',)))
-    print(json.dumps(found, indent=2))
-    good = found['answered'] == found['sent'] and (found['growth_mb'] or 0) < 2
-    print('passed' if good else 'FAILED')
-    return 0 if good else 1
-
-
-if __name__ == '__main__':
-    sys.exit(main())
+def passed(found: dict[str, Any]) -> bool:
+    """Return whether all was answered, and memory grew by less than 2 MB."""
+    return found['answered'] == found['sent'] and (found['growth_mb'] or 0) < 2

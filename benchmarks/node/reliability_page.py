@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import latency
+from benchmarks.node import latency
 
 HEAD = """# How far the feedforward node can be relied on
 

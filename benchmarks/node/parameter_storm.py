@@ -3,7 +3,7 @@
 
 """Random parameters, valid or not, set on a feedforward node that is streaming.
 
-    python benchmarks/parameter_storm.py [SETS] [SEED]
+    python -m benchmarks.node.reliability storm
 
 Between any two sets the node must answer with the forces of the model that the accepted ones
 make, computed here from scratch; and it must accept exactly what a model file may hold.
@@ -11,7 +11,6 @@ make, computed here from scratch; and it must accept exactly what a model file m
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -23,9 +22,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64MultiArray
-from stream import feedforward, served
-from trajectory_damage import valid_motion
 
+from benchmarks.node.damage import valid_motion
+from benchmarks.node.stream import feedforward, served
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
@@ -158,16 +157,3 @@ def passed(found: dict[str, Any]) -> bool:
     """Return whether nothing is wrong with what `run` found."""
     wrong = ('wrongly_accepted', 'wrongly_refused', 'refused_without_reason', 'wrong_answers')
     return bool(found['alive'] and found['answers'] and not any(found[key] for key in wrong))
-
-
-def main() -> int:
-    """Run and print."""
-    found = run(*(int(word) for word in sys.argv[1:3] or ('10000',)))
-    for key, value in found.items():
-        print(f'{key}: {value}')
-    print('passed' if passed(found) else 'FAILED')
-    return 0 if passed(found) else 1
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -3,7 +3,7 @@
 
 """What the score of `diagnose` owes to each number that was chosen: halved, and doubled.
 
-    python benchmarks/decision_scores.py --workers 2
+    python -m benchmarks.scores.decisions --workers 2
 
 A result that one number makes or breaks would be tuned, not found. Outcomes are appended to a
 file as they come, and cases that are there are not run again.
@@ -11,7 +11,6 @@ file as they come, and cases that are there are not run again.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
@@ -19,10 +18,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cases_on_dask import Outcome, add_options, engine, read_outcomes, run_missing
-from hidden_recordings import Case
-from score import OUTPUT, cases, diagnose_case, one_line
-
+from benchmarks import OUTPUT
+from benchmarks.hidden.recordings import Case
+from benchmarks.scores.cases import Outcome, outcomes_of, scoring_parser
+from benchmarks.scores.diagnosis import cases, diagnose_case, one_line
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 
@@ -82,24 +81,20 @@ def _counts(outcomes: Sequence[dict[str, Any]]) -> str:
 
 def main() -> int:
     """Run what is missing, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = scoring_parser(__doc__, 'decisions.jsonl')
     parser.add_argument('--seeds', type=int, default=1)
     parser.add_argument('--first', type=int, default=60)
-    parser.add_argument('--file', type=Path, default=OUTPUT / 'decisions.jsonl')
     parser.add_argument('--recordings', type=Path, default=OUTPUT / 'recordings')
-    add_options(parser)
     options = parser.parse_args()
     todo = {f'{case.name} {number} {factor}': (case, number, factor)
             for case in chosen_cases(options.first, options.seeds)
             for number, factor in changes()}
-    with engine(options) as each:
-        run_missing(each, partial(run_changed, recordings=options.recordings), todo, options.file,
-                    lambda one: f'{one["name"]} {one["number"]} {one["factor"]}',
-                    lambda one: f'{one["number"]} x {one["factor"]:g}: {one_line(one)}')
+    found = outcomes_of(options, partial(run_changed, recordings=options.recordings), todo,
+                        lambda one: f'{one["name"]} {one["number"]} {one["factor"]}',
+                        lambda one: f'{one["number"]} x {one["factor"]:g}: {one_line(one)}')
     print('Right of effects, of sets of two and three, of what is in no catalogue, and of nothing '
           'missing:\n')
-    print(make_table(read_outcomes(options.file)))
+    print(make_table(found))
     return 0
 
 

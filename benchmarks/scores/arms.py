@@ -3,7 +3,7 @@
 
 """How often `diagnose` is right about physics hidden in recordings of a simulated arm.
 
-    python benchmarks/arm_score.py --model base.yaml --seeds 2 --nothing 10 --table arm_score.md
+    python -m benchmarks.scores.arms --model base.yaml --seeds 2 --nothing 10 --table arm_score.md
 
 By the commands alone: `pprs simulate --model … --effect …`, then `pprs diagnose` of one recording.
 Outcomes are appended to FILE as they come, and what is there is not run again. Each seed has a
@@ -13,11 +13,9 @@ cases run, as for `pprs survey`.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
-import os
 import sys
 import tempfile
 import time
@@ -25,15 +23,16 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-# The arrays are small: threads of the linear algebra would only wait for one another.
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
-from cases_on_dask import Each, Outcome, add_options, engine, read_outcomes, run_missing
-
+from benchmarks.scores.cases import (
+    Each,
+    Outcome,
+    engine,
+    read_outcomes,
+    run_missing,
+    scoring_parser,
+)
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.simulation.arm_forms import NAMES
-
-OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 
 
 def run_case(case: tuple[str, int], model: Path, duration: float) -> Outcome:
@@ -133,15 +132,12 @@ def run(model: Path, seeds: int, nothing: int, duration: float, file: Path, each
 
 def main() -> int:
     """Run what is asked for, and print or write the table."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = scoring_parser(__doc__, 'arm_score.jsonl')
     parser.add_argument('--model', type=Path, required=True, help='model file of an arm')
     parser.add_argument('--seeds', type=int, default=2, help='per effect (default 2)')
     parser.add_argument('--nothing', type=int, default=10, help='recordings without (default 10)')
     parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
-    parser.add_argument('--file', type=Path, default=OUTPUT / 'arm_score.jsonl')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
-    add_options(parser)
     options = parser.parse_args()
     with engine(options) as each:
         run(options.model, options.seeds, options.nothing, options.duration, options.file, each)

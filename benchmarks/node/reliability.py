@@ -3,7 +3,7 @@
 
 """Runs the feedforward node's benchmarks and writes docs/reliability.md from what they found.
 
-    python benchmarks/reliability.py [--full] [PART ...]
+    python -m benchmarks.node.reliability [--full] [PART ...]
 
 PARTs are latency, storm, restart, soak, fuzz; all by default. What each found is kept in
 output/reliability, also while it runs, so that parts can be run one by one and a run that is ended
@@ -17,28 +17,23 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-import fuzz
-import latency
-import parameter_storm
-import restart
-import soak
-from reliability_page import HEAD, RELEASES, SECTIONS
+from benchmarks import ROOT
+from benchmarks.node import fuzz, latency, parameter_storm, restart, soak
+from benchmarks.node.reliability_page import HEAD, RELEASES, SECTIONS
 
-ROOT = Path(__file__).parents[1]
 KEPT = ROOT / 'output' / 'reliability'
 PAGE = ROOT / 'docs' / 'reliability.md'
-# Part: how to run it, and its size in short and in full.
-PARTS: dict[str, tuple[Callable[..., dict[str, Any]], float, float]] = {
-    'latency': (latency.run, 10.0, 60.0),
-    'storm': (parameter_storm.run, 2_000, 10_000),
-    'restart': (restart.run, 5, 20),
-    'soak': (soak.run, 5.0, 20.0),
-    'fuzz': (fuzz.run, 100_000, 1_000_000),
+# Part: its module, and its size in short and in full.
+PARTS: dict[str, tuple[ModuleType, float, float]] = {
+    'latency': (latency, 10.0, 60.0),
+    'storm': (parameter_storm, 2_000, 10_000),
+    'restart': (restart, 5, 20),
+    'soak': (soak, 5.0, 20.0),
+    'fuzz': (fuzz, 100_000, 1_000_000),
 }
 KEPT_AS_THEY_GROW = ('storm', 'restart', 'fuzz')
 
@@ -48,6 +43,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('parts', nargs='*', metavar='PART', help=', '.join(PARTS))
     parser.add_argument('--full', action='store_true', help='the sizes that were asked for')
+    parser.add_argument('--size', type=float, help='of every part, in place of those')
     parser.add_argument('--write', action='store_true', help='run nothing')
     parser.add_argument('--resume', action='store_true', help='leave out what has been run')
     arguments = parser.parse_args()
@@ -55,17 +51,21 @@ def main() -> int:
     if unknown:
         parser.error(f'no such part: {", ".join(sorted(unknown))}')
     KEPT.mkdir(parents=True, exist_ok=True)
+    good = True
     for name in () if arguments.write else arguments.parts or PARTS:
-        run, short, full = PARTS[name]
-        size = full if arguments.full else short
+        part, short, full = PARTS[name]
+        size = type(short)(arguments.size or (full if arguments.full else short))
         if arguments.resume and kept_size(name) >= size:
             continue
         growing = {'keep': partial(keep, name)} if name in KEPT_AS_THEY_GROW else {}
-        found = run(size, **growing)
+        found = part.run(size, **growing)
         keep(name, size, found)
         print(f'{name}: {json.dumps(found)}', flush=True)
+        if hasattr(part, 'passed') and not part.passed(found):
+            print(f'{name}: FAILED')
+            good = False
     PAGE.write_text(page())
-    return 0
+    return 0 if good else 1
 
 
 def keep(name: str, size: float, found: dict[str, Any]) -> None:
@@ -89,13 +89,13 @@ def page() -> str:
         title, words = SECTIONS[name]
         text.append(f'## {title}\n')
         if not file.is_file():
-            text.append(f'Not run yet: `python benchmarks/reliability.py {name}`.\n')
+            text.append(f'Not run yet: `python -m benchmarks.node.reliability {name}`.\n')
             continue
         kept = json.loads(file.read_text())
         size = 'Full size'
         if kept['size'] < full:
             size = (f'Size {kept["size"]:,.0f} of {full:,.0f} '
-                    f'(`python benchmarks/reliability.py --full {name}`)')
+                    f'(`python -m benchmarks.node.reliability --full {name}`)')
         text.append(words(kept['found']))
         text.append(f'{size}; {kept["cores"]} cores, load of the machine over the last five '
                     f'minutes {kept["load"]}.\n')

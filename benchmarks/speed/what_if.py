@@ -3,7 +3,7 @@
 
 """From a click on a tick box of a diagnosis's page until the curves are painted.
 
-    pprs diagnose run.mcap --report why.html && python benchmarks/what_if.py why.html
+    pprs diagnose run.mcap --report why.html && python -m benchmarks.speed.what_if why.html
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 
 """A feedforward node that is killed with SIGKILL in mid-stream and started again.
 
-    python benchmarks/restart.py [TIMES]
+    python -m benchmarks.node.reliability restart
 
 A new node must answer every message that reaches it, from the first one on.
 """
@@ -11,15 +11,14 @@ A new node must answer every message that reaches it, from the first one on.
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from latency import trajectory
-from stream import Stream, environment, feedforward, node_process, reserve_domain
+from benchmarks.node.latency import trajectory
+from benchmarks.node.stream import Stream, environment, feedforward, node_process, reserve_domain
 
 RATE = 100.0  # [Hz]
 ENOUGH = 50  # answers before the next kill
@@ -71,12 +70,6 @@ def _found(kills: int, unanswered: int, starts: list[float]) -> dict[str, Any]:
             'start_to_first_command_s': [round(each, 2) for each in starts]}
 
 
-def main() -> int:
-    """Run and print."""
-    found = run(*(int(word) for word in sys.argv[1:2] or ('10',)))
-    print(found)
-    return 1 if found['unanswered'] else 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())
+def passed(found: dict[str, Any]) -> bool:
+    """Return whether every message that reached a new node was answered."""
+    return not found['unanswered']

@@ -3,8 +3,10 @@
 
 """How often `localise` says something about noise, and how often it finds a planted error.
 
-Run `python benchmarks/localisation.py [RECORDINGS] [FIRST_SEED] [WHAT] [--file FILE]`. It prints
-the share of recordings with a perfect model in which anything is stated, per sort of noise, and
+    python -m benchmarks.scores.localisation [RECORDINGS] [FIRST_SEED] [WHAT] [--file FILE]
+
+It prints the share of recordings with a perfect model in which anything is stated, per sort of
+noise, and
 that in which a planted error is named first with drive and variable, per error and sort of noise.
 WHAT is `noise`, `planted`, part of a planted error's name, or absent for all. What was said is
 appended to FILE as it comes, and recordings that are there are not made again; `--workers` and
@@ -16,27 +18,20 @@ independent between the drives; planted errors of 0.3 N at most, on one drive.
 
 from __future__ import annotations
 
-import argparse
-import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-
-# The arrays are small: threads of the linear algebra would only wait for one another.
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
-from cases_on_dask import Outcome, add_options, engine, read_outcomes, run_missing
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from benchmarks.scores.cases import Outcome, outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
-OUTPUT = Path(__file__).resolve().parents[1] / 'output'
 DURATION, RATE = 40.0, 100.0  # [s, Hz]
 NOISE, ERROR = 0.08, 0.3  # [N]
 NOISES: tuple[float | str, ...] = (0.0, 0.9, 0.97, 0.99, 0.998, 'mixed', '1/f')
@@ -203,22 +198,19 @@ def name_of(outcome: Outcome) -> tuple[str, float | str, int]:
 
 def main() -> None:
     """Run what is missing, and print the table with what went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = scoring_parser(__doc__, 'localisation.jsonl')
     parser.add_argument('recordings', type=int, nargs='?', default=100)
     parser.add_argument('first_seed', type=int, nargs='?', default=100_000)
     parser.add_argument('what', nargs='?', default='')
-    parser.add_argument('--file', type=Path, default=OUTPUT / 'localisation.jsonl')
-    add_options(parser)
     options = parser.parse_args()
     rows = [('noise', kind) for kind in NOISES if options.what in ('', 'noise')]
     rows += [(name, kind) for name in PLANTS for kind in PLANTED_NOISES
              if options.what in ('', 'planted') or options.what in name]
     seeds = range(options.first_seed, options.first_seed + options.recordings)
     cases = {(*row, seed): (*row, seed) for row in rows for seed in seeds}
-    with engine(options) as each:
-        run_missing(each, outcome_of, cases, options.file, name_of,
-                    lambda one: ' '.join(map(str, one.values())))
-    said = {name_of(one): one['said'] for one in read_outcomes(options.file)}
+    found = outcomes_of(options, outcome_of, cases, name_of,
+                        lambda one: ' '.join(map(str, one.values())))
+    said = {name_of(one): one['said'] for one in found}
     for name, kind in rows:
         every = [said[name, kind, seed] for seed in seeds if (name, kind, seed) in said]
         texts = [text for text in every if text]

@@ -3,8 +3,8 @@
 
 """Does the designed motion settle what a recording leaves open? Beside a random one and a repeat.
 
-    python benchmarks/experiments_score.py --seeds 10 --file experiments.jsonl
-    python benchmarks/experiments_score.py --table experiments.jsonl
+    python -m benchmarks.scores.experiments --seeds 10 --file experiments.jsonl
+    python -m benchmarks.scores.experiments --table experiments.jsonl
 
 Outcomes are appended to FILE as they come, and cases that are there are not run again.
 `--workers` and `--scheduler` say where cases run, as for `pprs survey`.
@@ -19,7 +19,6 @@ nothing against it; open one that holds a rival, or names nothing.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,10 +27,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases_on_dask import add_options, engine, read_outcomes, run_missing
-from hidden_recordings import noise_settings, tolerant_model
-from hidden_strength import changed_values, tolerated_numbers
 
+from benchmarks.hidden.recordings import noise_settings, tolerant_model
+from benchmarks.hidden.strength import changed_values, tolerated_numbers
+from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -249,25 +248,23 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
 
 def main() -> None:
     """Run cases, or show the table of those that were run."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = scoring_parser(__doc__, 'experiments.jsonl')
     parser.add_argument('--effects', default=','.join(EFFECTS))
     parser.add_argument('--seeds', type=int, default=10)
     parser.add_argument('--first-seed', type=int, default=0)
-    parser.add_argument('--file', type=Path, default=Path('experiments.jsonl'))
     parser.add_argument('--follow', action='store_true', help='let the simulated robot follow')
     parser.add_argument('--table', type=Path, help='only show what is in a file')
-    add_options(parser)
     options = parser.parse_args()
-    file = options.table or options.file
-    if not options.table:
+    if options.table:
+        rows = read_outcomes(options.table)
+    else:
         cases = {(name, seed): (name, seed)
                  for seed in range(options.first_seed, options.first_seed + options.seeds)
                  for name in options.effects.split(',')}
-        with engine(options) as each:
-            run_missing(each, partial(outcome_of, follow=options.follow), cases, file,
-                        lambda row: (row['effect'], row['seed']), str)
+        rows = outcomes_of(options, partial(outcome_of, follow=options.follow), cases,
+                           lambda row: (row['effect'], row['seed']), str)
     # Of what was not ambiguous there is nothing to settle.
-    print('\n'.join(table([row for row in read_outcomes(file) if 'designed' in row])))
+    print('\n'.join(table([row for row in rows if 'designed' in row])))
 
 
 if __name__ == '__main__':

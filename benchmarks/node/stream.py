@@ -24,13 +24,11 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
+from ros_processes import environment, executable, node_process, reserve_domain
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ('test/support', 'demo')]
-from ros_processes import environment, executable, node_process, reserve_domain  # noqa: E402
-
-from pprs_dynamics.ros.rclpy_internals import WaitSet, take  # noqa: E402
+from pprs_dynamics.ros.rclpy_internals import WaitSet, take
 
 RELIABLE = QoSProfile(depth=1000)
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)

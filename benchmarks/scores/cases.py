@@ -4,7 +4,7 @@
 """Cases of a benchmark on all cores or a Dask cluster, their outcomes in a file of lines.
 
 Outcomes are appended as they come, and cases that are in the file are not run again: a run can be
-stopped and continued. Workers of a cluster need this folder on their PYTHONPATH.
+stopped and continued. Workers of a cluster need the project's folder on their PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -16,11 +16,31 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks import OUTPUT
 from pprs_dynamics.app.fleet.engine import cluster, run_each
 
 Outcome = dict[str, Any]
 # Takes work and items; yields item, result and what went wrong, as they come.
 Each = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[tuple[Any, Any, str | None]]]
+
+
+def scoring_parser(description: str, file: str) -> argparse.ArgumentParser:
+    """Return the parser of a score: where work is done, and the file of outcomes in output/."""
+    parser = argparse.ArgumentParser(description=description,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--file', type=Path, default=OUTPUT / file,
+                        help=f'outcomes, one a line (default: output/{file})')
+    add_options(parser)
+    return parser
+
+
+def outcomes_of(options: argparse.Namespace, work: Callable[[Any], Outcome],
+                cases: Mapping[Any, Any], name: Callable[[Outcome], Any],
+                shown: Callable[[Outcome], str]) -> list[Outcome]:
+    """Run the cases that `options.file` does not have, see `run_missing`; return all in it."""
+    with engine(options) as each:
+        run_missing(each, work, cases, options.file, name, shown)
+    return read_outcomes(options.file)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

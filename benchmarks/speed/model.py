@@ -7,12 +7,11 @@ Every figure is taken in rounds, all of a table in turn, so that a busy machine 
 Times are those of the processor, but for what runs on two cores. A ratio is that of one round;
 given are the median over the rounds, the middle half of them, and the ratio of the best times.
 
-    python benchmarks/speed.py [rounds]
+    python -m benchmarks.speed.model [rounds]
 """
 
 from __future__ import annotations
 
-import os
 import resource
 import subprocess
 import sys
@@ -20,25 +19,20 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any, ClassVar
 
-for library in ('OPENBLAS', 'OMP', 'MKL'):
-    os.environ.setdefault(f'{library}_NUM_THREADS', '1')
-ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / 'test'), str(ROOT / 'test/support')]
+import numpy as np
+from random_states import random_motion
 
-import numpy as np  # noqa: E402
-from random_states import random_motion  # noqa: E402
-from speed_peers import MujocoPeer, PinocchioPeer  # noqa: E402
-
-from pprs_dynamics import DriveModel, PlatformMotion  # noqa: E402
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE  # noqa: E402
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect  # noqa: E402
-from pprs_dynamics.physics.model.one_pass import forces_kernel  # noqa: E402
-from pprs_dynamics.physics.three_pprs.evaluation import PLAIN, is_compiled  # noqa: E402
-from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics  # noqa: E402
-from pprs_dynamics.physics.three_pprs.state import MechanismState  # noqa: E402
+from benchmarks import ROOT
+from benchmarks.speed.peers import MujocoPeer, PinocchioPeer
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
+from pprs_dynamics.physics.model.one_pass import forces_kernel
+from pprs_dynamics.physics.three_pprs.evaluation import PLAIN, is_compiled
+from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
