@@ -46,9 +46,12 @@ def environment(domain: int) -> dict[str, str]:
 
 
 def executable(name: str) -> str:
-    """Return the installed executable of that name, beside this Python or on PATH."""
-    beside = Path(sys.executable).parent / name
-    found = str(beside) if beside.exists() else shutil.which(name)
+    """Return the installed executable: beside this Python, where colcon put it, or on PATH."""
+    prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    places = (Path(sys.executable).parent,
+              *(Path(prefix) / 'lib' / 'pprs_dynamics' for prefix in prefixes))
+    found = next((str(place / name) for place in places if (place / name).exists()),
+                 shutil.which(name))
     if not found:
         raise FileNotFoundError(f'{name} is not installed')
     return found

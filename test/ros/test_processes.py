@@ -15,13 +15,10 @@ import numpy as np
 import pytest
 from node_bench import Bench, bench
 from ros_processes import environment, executable, node_process
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.files.pose_files import read_poses, write_poses
-from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.trajectory_request import read_trajectory
 
 pytestmark = pytest.mark.nodes
@@ -40,29 +37,6 @@ def play(domain: int, *parameters: str) -> subprocess.CompletedProcess[str]:
     arguments = [word for parameter in parameters for word in ('-p', parameter)]
     return subprocess.run([executable('play_trajectory'), '--ros-args', *arguments],
                           env=environment(domain), capture_output=True, text=True, timeout=30)
-
-
-def test_the_papers_path_goes_in_and_its_forces_come_out(
-    running: Bench, ros_domain: int, tmp_path: Path,
-) -> None:
-    commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
-    stamped = running.listen(JointState, '/feedforward/joint_command', 1000)
-    # No timeout: a player that stalls on a busy machine must not add a command.
-    server = [executable('feedforward'), '--ros-args', '--params-file', str(PAPER),
-              '-p', 'command_timeout:=0.0', '-p', 'timeout_action:=silent']
-    player = [executable('play_trajectory'), '--ros-args', '-p', 'rate:=100.0']
-    times = np.arange(0.0, HelicalPath.duration + 0.01, 0.01)
-    with node_process(server, ros_domain, tmp_path / 'server.log') as feedforward:
-        assert running.connected()
-        with node_process(player, ros_domain, tmp_path / 'player.log') as playing:
-            assert running.spin_until(lambda: len(stamped) == len(commands) == len(times), 20)
-            assert playing.wait(5) == 0
-        feedforward.send_signal(signal.SIGTERM)
-        assert feedforward.wait(2) == 0
-    expected = DriveModel.load(PAPER).drive_forces(HelicalPath().motion(times))
-    np.testing.assert_allclose([c.data for c in commands], expected.total, rtol=0, atol=EQUAL)
-    np.testing.assert_allclose([c.position for c in stamped], expected.mechanism.position,
-                               rtol=0, atol=EQUAL)
 
 
 def test_a_csv_of_poses_is_played_as_the_motion_that_it_is(
