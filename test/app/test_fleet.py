@@ -177,7 +177,7 @@ def test_a_manifest_that_says_something_impossible_is_refused(
 
 
 @pytest.mark.parametrize(('arguments', 'said'), [
-    (['--output', 'file'], '--output file: is a file, must be a folder'),
+    (['--output', 'file'], 'file: is no folder, must be one'),
     (['--output', 'file/store'], 'file/store: Not a directory'),
     (['--output', 'foo://store'], 'foo://store: Protocol not known: foo'),
     (['--output', 's', '--effects', ''], "--effects '': must be auto or names of effects"),

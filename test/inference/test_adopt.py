@@ -230,7 +230,7 @@ MISTAKES = {
     ('coulomb_frictoin', '{first}', '--output', '{tmp}/x.yaml'): 'did you mean coulomb_friction',
     ('coulomb_friction:lift_7', '{first}', '--output', '{tmp}/x.yaml'): "unknown drive 'lift_7'",
     ('payload_mass:lift_1', '{first}', '--output', '{tmp}/x.yaml'): 'must stand alone',
-    ('payload_mass', '{first}', '--output', '{model}'): 'another file than the model',
+    ('payload_mass', '{first}', '--output', '{model}'): '--output and the model at once',
     ('payload_mass', '{first}', '--output', '{tmp}/none/x.yaml'): 'its folder does not exist',
     ('payload_mass', '{first}', '--validate', '{first}', '--output', '{tmp}/x.yaml'):
         'what is held out must be another recording',

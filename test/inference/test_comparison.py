@@ -154,7 +154,7 @@ def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:
     right = recording(np.zeros((50, 2)), np.ones((50, 2)))
     for change, words in [
             ({'model': np.zeros((50, 3))}, 'model: its shape is'),
-            ({'measured': np.full((50, 2), np.nan)}, 'no effort was measured'),
+            ({'measured': np.full((50, 2), np.nan)}, 'none was measured on any drive'),
             ({'variables': {'position': np.zeros(49)}}, "variables['position']"),
             ({'model': np.full((50, 2), np.inf)}, 'not finite')]:
         with pytest.raises(ResidualsError, match=words.replace('[', r'\[')):

@@ -143,7 +143,7 @@ def test_the_command_shows_draws_and_takes_back(
 MISTAKES = {
     ('--undo',): 'be given with --undo, and only then',
     ('--output', 'x.yaml'): 'be given with --undo, and only then',
-    ('--undo', '--output', '{file}'): 'be another file than the model',
+    ('--undo', '--output', '{file}'): '--output and the model at once, must be another file',
     ('--undo', '--output', '{folder}/none/x.yaml'): 'its folder does not exist',
     ('--undo', '--output', '{folder}'): 'it is a folder',
     ('--report', 'x.pdf'): 'end in .html or .png',

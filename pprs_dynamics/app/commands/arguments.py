@@ -80,15 +80,17 @@ def output_file(*endings: str) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         path = Path(text)
-        if path.suffix not in endings:
-            raise argparse.ArgumentTypeError(f'{displayed(text)!r} must end in {known}')
         try:
+            if path.suffix not in endings and not path.is_dir():
+                raise argparse.ArgumentTypeError(f'{displayed(text)!r} must end in {known}')
             if not path.suffix and os.path.lexists(path):
                 raise UnreadableFileError(
                     path, 'it exists already, and bags are never overwritten')
             writable_file(path)
         except UnreadableFileError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
+        except OSError as error:
+            raise argparse.ArgumentTypeError(f'{displayed(text)}: {error.strerror}') from None
         return text
     return read
 
