@@ -18,8 +18,14 @@ from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, 
 from pprs_dynamics.measurement.files.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.samples import Finding, Progress, Samples, counted
+from pprs_dynamics.measurement.files.table_files import read_table
 from pprs_dynamics.physics.mechanism.units import DriveUnits
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.recorded_names import (
+    RecordedColumns,
+    joint_names,
+    recorded_columns,
+)
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.system.plain_text import displayed
 
@@ -188,7 +194,7 @@ def read_recording(
     path: str | PathLike[str], drives: tuple[str, ...] = DRIVES, topic: str | None = None,
     progress: Progress | None = None, gain: Sequence[float] | None = None,
     in_amperes: bool = False, units: tuple[DriveUnits, ...] = (),
-    effort_limits: Sequence[float] = (),
+    effort_limits: Sequence[float] = (), columns: RecordedColumns | None = None,
 ) -> Recording:
     """Read a rosbag2 directory, a bare .mcap or .db3 file, or a CSV: the content decides.
 
@@ -209,6 +215,8 @@ def read_recording(
         For what is found wrong; of drives that push by default.
     effort_limits : (D,) sequence, optional
         Largest absolute efforts that the drives can apply: what is there is left out.
+    columns : RecordedColumns, optional
+        Of tables that are no recordings by their header.
 
     Raises
     ------
@@ -224,8 +232,11 @@ def read_recording(
         is_bag = path.is_dir() or storage_suffix(path) or path.suffix in ('.mcap', '.db3')
         if not path.is_dir() and not path.stat().st_size:
             raise UnreadableFileError(path, 'the file is empty')
-        reader = read_bag if is_bag else read_csv
-        samples = reader(path, tuple(drives), topic, progress)
+        if columns is not None and not is_bag:
+            samples = read_table(path, tuple(drives), columns)
+        else:
+            reader = read_bag if is_bag else read_csv
+            samples = reader(path, tuple(drives), topic, progress)
     except OSError as error:
         if isinstance(error, UnreadableFileError):
             raise
@@ -242,10 +253,16 @@ def read_recording(
 
 def read_for(model: ForceModel, path: str | PathLike[str], topic: str | None = None,
              progress: Progress | None = None) -> Recording:
-    """Read a recording of a model's drives, efforts by its gains; see `read_recording`."""
-    return read_recording(path, model.drives, topic, progress, model.gain,
-                          model.efforts_in_amperes, model.units,
-                          model.effort_limits.tolist())
+    """Read a recording of a model's drives, efforts by its gains; see `read_recording`.
+
+    The drives are looked for by the names that the model file says, and have the model's then.
+    """
+    columns = recorded_columns(model.values, model.drives)
+    names = model.drives if columns is not None else joint_names(model.values, model.drives)
+    recording = read_recording(path, names, topic, progress, model.gain,
+                               model.efforts_in_amperes, model.units,
+                               model.effort_limits.tolist(), columns)
+    return replace(recording, drives=model.drives)
 
 
 def _as_efforts(path: Path, samples: Samples, gain: Sequence[float] | None, in_amperes: bool,

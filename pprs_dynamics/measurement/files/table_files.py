@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables of any program, CSV, Parquet or MAT, by the columns that a model file names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.measurement.files.samples import Samples
+from pprs_dynamics.physics.model.recorded_names import RecordedColumns
+
+PARQUET, MAT = ('.parquet', '.pq'), ('.mat',)
+
+
+def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns) -> Samples:
+    """Read a table by its own names.
+
+    Parameters
+    ----------
+    path : Path
+        .parquet, .mat (up to version 7.2), or anything else as CSV.
+    drives : tuple of D str
+    columns : RecordedColumns
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it is no such table, or lacks a column.
+    MissingLibraryError
+        For Parquet without pyarrow, CSV without pandas.
+    """
+    reader: Callable[[Path, list[str]], Mapping[str, Any]] = (
+        _parquet if path.suffix in PARQUET else _mat if path.suffix in MAT else _csv)
+    wanted = [columns.time, *(name for drive in drives
+                              for name in columns.drives[drive].names.values())]
+    table = reader(path, wanted)
+    missing = [name for name in wanted if name not in table]
+    if missing:
+        known = ', '.join(sorted(map(str, table))[:12])
+        raise UnreadableFileError(path, f'no column {missing[0]!r}; it holds {known or "none"}')
+    arrays = {name: _numbers(path, name, table[name]) for name in wanted}
+    lengths = {len(values) for values in arrays.values()}
+    if len(lengths) > 1:
+        short = min(arrays, key=lambda name: len(arrays[name]))
+        raise UnreadableFileError(path, f'column {short!r} has {len(arrays[short])} rows, '
+                                  f'must have {max(lengths)}, as others')
+    time = arrays[columns.time]
+
+    def of(quantity: str) -> Array | None:
+        if not any(quantity in columns.drives[drive].names for drive in drives):
+            return None
+        return np.stack([
+            arrays[columns.drives[drive].names[quantity]]
+            if quantity in columns.drives[drive].names else np.full(len(time), np.nan)
+            for drive in drives], axis=1)
+
+    scale = np.array([columns.drives[drive].position_scale for drive in drives])
+    efforts = np.array([columns.drives[drive].effort_scale for drive in drives])
+    position, velocity, effort = (of(name) for name in ('position', 'velocity', 'effort'))
+    assert position is not None
+    none = np.full(position.shape, np.nan)
+    return Samples(drives, time, position * scale, None if velocity is None else velocity * scale,
+                   none if effort is None else effort * efforts,
+                   source=f'{path.suffix.lstrip(".") or "table"} by columns of the model file')
+
+
+def _numbers(path: Path, name: str, values: Any) -> Array:
+    try:
+        array: Array = np.asarray(values, dtype=float).ravel()
+    except (TypeError, ValueError):
+        raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'
+                                  ) from None
+    return array
+
+
+def _parquet(path: Path, wanted: list[str]) -> Mapping[str, Any]:
+    try:
+        from pyarrow import ArrowException
+        from pyarrow.parquet import ParquetFile
+    except ImportError:
+        raise MissingLibraryError('pyarrow', 'reading Parquet files', 'fleet') from None
+    try:
+        file = ParquetFile(path)
+        names = file.schema_arrow.names
+        table = file.read([name for name in wanted if name in names])
+    except (ArrowException, OSError) as error:
+        raise UnreadableFileError(path, f'no Parquet file ({str(error).splitlines()[0][:120]})'
+                                  ) from None
+    return {name: table[name].to_numpy() if name in table.column_names else ()
+            for name in (names if len(table.column_names) < len(set(wanted)) else
+                         table.column_names)}
+
+
+def _mat(path: Path, wanted: list[str]) -> Mapping[str, Any]:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        content = loadmat(path, squeeze_me=True)
+    except NotImplementedError:
+        raise UnreadableFileError(path, 'a MAT file of version 7.3, must be saved with -v7'
+                                  ) from None
+    except (MatReadError, ValueError, TypeError, OSError, EOFError, IndexError) as error:
+        raise UnreadableFileError(path, f'no MAT file ({str(error).splitlines()[0][:120]})'
+                                  ) from None
+    return {name: value for name, value in content.items() if not name.startswith('__')}
+
+
+def _csv(path: Path, wanted: list[str]) -> Mapping[str, Any]:
+    try:
+        import pandas as pd
+    except ImportError:
+        raise MissingLibraryError('pandas', 'reading a CSV by its own names', 'tables') from None
+    try:
+        table = pd.read_csv(path, sep=None, engine='python', skipinitialspace=True)
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError, ValueError,
+            OSError) as error:
+        raise UnreadableFileError(path, f'no table ({str(error).splitlines()[0][:120]})'
+                                  ) from None
+    return {str(name).strip(): table[name].to_numpy() for name in table.columns}
