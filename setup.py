@@ -57,6 +57,8 @@ setup(
         'bags': ['rosbags>=0.11'],
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
+        # Tables by columns of the model file: pandas finds separators, pyarrow reads Parquet.
+        'tables': ['pandas>=2', 'pyarrow>=17'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
         # The site of the documentation: Markdown and notebooks, in a theme that reads on a phone.
         'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8'],

@@ -15,6 +15,12 @@ import numpy as np
 
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.joint_state_cdr import serialised
+from pprs_dynamics.measurement.files.merged_states import (
+    CONTROLLER,
+    DYNAMIC,
+    JOINT_STATE,
+    read_merged,
+)
 from pprs_dynamics.measurement.files.message_blocks import JointStateBlocks
 from pprs_dynamics.measurement.files.samples import (
     Finding,
@@ -31,7 +37,8 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.rosbag2 import Reader
 
-MESSAGE_TYPE = 'sensor_msgs/msg/JointState'
+MESSAGE_TYPE = JOINT_STATE
+CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
 # First bytes of a bare storage file, and the suffix by which rosbags knows it.
 MAGIC = {b'\x89MCAP': '.mcap', b'SQLite format 3\x00': '.db3'}
@@ -66,6 +73,8 @@ def read_bag(
     with _opened(path, storage) as reader:
         connections = _chosen(path, reader, topic)
         name = connections[0].topic
+        if connections[0].msgtype != MESSAGE_TYPE:
+            return _merged(path, reader, connections, drives, findings)
         blocks = JointStateBlocks(drives)
         total = sum(connection.msgcount for connection in connections)
         messages, done = _messages(path, reader, connections), 0
@@ -77,8 +86,19 @@ def read_bag(
     if not done:
         raise UnreadableFileError(path, f'{name} holds no messages')
     if not blocks.samples:
+        if set(drives) <= blocks.names:  # spread over several messages
+            with _opened(path, storage) as reader:
+                return _merged(path, reader, _chosen(path, reader, topic), drives, findings)
         _tell_missing(path, name, drives, blocks)
     stamps, received, position, velocity, effort = blocks.arrays()
+    if topic is None and np.all(np.isnan(effort)):
+        with _opened(path, storage) as reader:
+            if others := [one for one in reader.connections
+                          if one.msgtype == MESSAGE_TYPE and one.topic != name]:
+                merged = _merged(path, reader, [*_chosen(path, reader, topic), *others], drives,
+                                 findings)
+                if np.any(np.isfinite(merged.effort)):
+                    return merged
     if not np.any(stamps):
         findings.append(Finding(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
@@ -89,6 +109,24 @@ def read_bag(
         drives, (stamps - epoch * 10**9) / 1e9, position,
         None if np.all(np.isnan(velocity)) else velocity, effort, epoch,
         f'rosbag2, {name}', tuple(findings))
+
+
+def _merged(path: Path, reader: Reader, connections: list[Connection], drives: tuple[str, ...],
+            findings: list[Finding]) -> Samples:
+    """Read states that stand in several messages or in those of controllers."""
+    try:
+        merged = read_merged(reader, connections, drives)
+    except Exception as error:
+        raise UnreadableFileError(path, _damaged(error)) from None
+    topics = ', '.join(sorted({one.topic for one in connections}))
+    if merged is None or not len(merged.stamps):
+        raise UnreadableFileError(path, f'{topics} holds no positions of all of '
+                                  f'{", ".join(drives)} at the same times')
+    epoch = whole_epoch(merged.stamps / 1e9)
+    return Samples(
+        drives, (merged.stamps - epoch * 10**9) / 1e9, merged.position,
+        None if np.all(np.isnan(merged.velocity)) else merged.velocity, merged.effort, epoch,
+        f'rosbag2, {topics}', (*findings, *merged.findings))
 
 
 def write_bag(path: Path, samples: Samples, topic: str) -> None:
@@ -218,7 +256,13 @@ def _damaged(error: Exception) -> str:
 def _chosen(path: Path, reader: Reader, topic: str | None) -> list[Connection]:
     """Return the connections of the one topic to be read."""
     states = [item for item in reader.connections if item.msgtype == MESSAGE_TYPE]
-    topics = sorted({item.topic for item in states})
+    controllers = [item for item in reader.connections
+                   if item.msgtype in CONTROLLER_TYPES and item.msgcount]
+    if topic is not None:
+        states += controllers
+    elif not states and len({item.topic for item in controllers}) == 1:
+        return controllers
+    topics = sorted({item.topic for item in states or controllers})
     if topic is not None:
         matching = [name for name in topics if name.strip('/') == topic.strip('/')]
         if not matching:

@@ -35,6 +35,8 @@ POLICY = {
     'ignored_columns': 'they are ignored',
     'ignored_joints': 'they are ignored',
     'incomplete_messages': 'those messages are ignored',
+    'merged': 'samples are those of the first drive, the others lie between their neighbours',
+    'commanded_efforts': 'they stand for the efforts',
     'receive_times': 'the times at which the messages were recorded are used',
     'non_finite_time': 'those samples are dropped',
     'non_finite_position': 'those samples are dropped',

@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings by the machine's own names: mapped joints, columns, several messages, controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.io import savemat
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, JOINT_STATE
+from pprs_dynamics.measurement.files.recording import Recording, read_for
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
+from pprs_dynamics.physics.three_pprs.robot import DRIVES
+
+RATE, EPOCH = 100, 1_700_000_000
+POINT = """float64[] positions
+float64[] velocities
+float64[] accelerations
+float64[] effort
+builtin_interfaces/Duration time_from_start
+"""
+BREAK = '=' * 80 + '\n'
+# The interface definitions as a bag carries them.
+DEFINITIONS = {
+    DYNAMIC: f"""std_msgs/Header header
+string[] joint_names
+control_msgs/InterfaceValue[] interface_values
+{BREAK}MSG: control_msgs/InterfaceValue
+string[] interface_names
+float64[] values
+""",
+    CONTROLLER: f"""std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint reference
+trajectory_msgs/JointTrajectoryPoint feedback
+trajectory_msgs/JointTrajectoryPoint error
+trajectory_msgs/JointTrajectoryPoint output
+{BREAK}MSG: trajectory_msgs/JointTrajectoryPoint
+{POINT}"""}
+
+
+@pytest.fixture(scope='module')
+def run() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return time, positions and efforts."""
+    motion = Excitation(4.0, seed=2).motion(np.arange(0, 4.0, 1 / RATE))
+    forces = DriveModel.load().drive_forces(motion)
+    return np.arange(len(motion)) / RATE, forces.mechanism.position, forces.total
+
+
+def with_keys(**keys: Any) -> DriveModel:
+    """Return the paper's robot with keys in its file."""
+    return DriveModel.from_parameters({**DriveModel.load().values, **keys})
+
+
+class Bag:
+    """A bag, written message by message."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.store = path, get_typestore(Stores.ROS2_KILTED)
+        for name, text in DEFINITIONS.items():
+            self.store.register({key: fields for key, fields in get_types_from_msg(
+                text, name).items() if key not in self.store.types})
+        self.writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        self.writer.open()
+        self.topics: dict[str, Any] = {}
+
+    def type(self, name: str) -> Any:
+        return self.store.types[name]
+
+    def header(self, time: float) -> Any:
+        stamp = round(time * 1e9)
+        return self.type('std_msgs/msg/Header')(
+            self.type('builtin_interfaces/msg/Time')(EPOCH + stamp // 10**9, stamp % 10**9), '')
+
+    def write(self, topic: str, kind: str, time: float, message: Any) -> None:
+        if topic not in self.topics:
+            self.topics[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
+        self.writer.write(self.topics[topic], EPOCH * 10**9 + round(time * 1e9),
+                          self.store.serialize_cdr(message, kind))
+
+    def state(self, topic: str, time: float, names: tuple[str, ...], position: Any = (),
+              effort: Any = ()) -> None:
+        numbers = (np.array(values, dtype=float) for values in (position, (), effort))
+        self.write(topic, JOINT_STATE, time, self.type(JOINT_STATE)(
+            self.header(time), list(names), *numbers))
+
+    def point(self, position: Any = (), effort: Any = ()) -> Any:
+        numbers = (np.array(values, dtype=float) for values in (position, (), (), effort))
+        return self.type('trajectory_msgs/msg/JointTrajectoryPoint')(
+            *numbers, self.type('builtin_interfaces/msg/Duration')(0, 0))
+
+
+def spread(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
+    for part in (slice(0, 3), slice(3, 6)):
+        bag.state('/joint_states', time, DRIVES[part], q[part], tau[part])
+
+
+def efforts_apart(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
+    bag.state('/joint_states', time, DRIVES, q)
+    bag.state('/forces', time, DRIVES, (), tau)
+
+
+def dynamic(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
+    value = bag.type('control_msgs/msg/InterfaceValue')
+    bag.write('/dynamic_joint_states', DYNAMIC, time, bag.type(DYNAMIC)(
+        bag.header(time), list(DRIVES), [
+            value(['effort', 'position'], np.array([tau[k], q[k]])) for k in range(6)]))
+
+
+def controller(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
+    bag.write('/arm_controller/controller_state', CONTROLLER, time, bag.type(CONTROLLER)(
+        bag.header(time), list(DRIVES), bag.point(), bag.point(q), bag.point(),
+        bag.point((), tau)))
+
+
+@pytest.mark.parametrize(('write', 'said'), [
+    (spread, 'merged'), (efforts_apart, 'merged'), (dynamic, 'merged'),
+    (controller, 'commanded_efforts')])
+def test_states_of_other_messages_are_read(
+    run: Any, tmp_path: Path, write: Callable[..., None], said: str,
+) -> None:
+    time, position, effort = run
+    bag = Bag(tmp_path / 'bag')
+    for k, moment in enumerate(time):
+        write(bag, float(moment), position[k], effort[k])
+    bag.writer.close()
+    recording = read_for(DriveModel.load(), bag.path)
+    np.testing.assert_allclose(recording.position, position, atol=1e-12)
+    np.testing.assert_allclose(recording.effort, effort, atol=1e-12)
+    np.testing.assert_allclose(recording.time - recording.time[0], time, atol=1e-9)
+    assert said in {finding.kind for finding in recording.findings}
+
+
+def test_a_slower_message_lies_between_its_neighbours(run: Any, tmp_path: Path) -> None:
+    time, position, effort = run
+    bag = Bag(tmp_path / 'bag')
+    for k, moment in enumerate(time):
+        bag.state('/joint_states', float(moment), DRIVES[:3], position[k, :3], effort[k, :3])
+        if k % 2 == 0:
+            bag.state('/joint_states', float(moment), DRIVES[3:], position[k, 3:], effort[k, 3:])
+    bag.writer.close()
+    recording = read_for(DriveModel.load(), bag.path)
+    between = (position[:-2:2, 3:] + position[2::2, 3:]) / 2
+    np.testing.assert_allclose(recording.position[1:len(between) * 2:2, 3:], between, atol=1e-9)
+
+
+def test_joints_have_the_names_of_the_machine(run: Any, tmp_path: Path) -> None:
+    time, position, effort = run
+    model = with_keys(joint_prefix='left_', **{'joint_map.slide_1': 'x_axis'})
+    names = joint_names(model.values, DRIVES)
+    assert names == ('x_axis', 'left_slide_2', 'left_slide_3', 'left_lift_1', 'left_lift_2',
+                     'left_lift_3')
+    bag = Bag(tmp_path / 'bag')
+    for k, moment in enumerate(time):
+        bag.state('/joint_states', float(moment), names, position[k], effort[k])
+    bag.writer.close()
+    recording = read_for(model, bag.path)
+    assert recording.drives == DRIVES
+    np.testing.assert_array_equal(recording.effort, effort)
+    with pytest.raises(UnreadableFileError, match='slide_1'):
+        read_for(DriveModel.load(), bag.path)
+
+
+COLUMNS = {'columns.time': 't', **{
+    f'columns.{drive}.{quantity}': f'{short}{k}' for k, drive in enumerate(DRIVES)
+    for quantity, short in (('position', 'q'), ('effort', 'tau'))}}
+
+
+def written(path: Path, time: np.ndarray, position: np.ndarray, effort: np.ndarray) -> Path:
+    """Write a table by its suffix."""
+    table = {'t': time, **{f'q{k}': position[:, k] for k in range(6)},
+             **{f'tau{k}': effort[:, k] for k in range(6)}, 'other': np.ones(len(time))}
+    if path.suffix == '.mat':
+        savemat(path, table)
+    elif path.suffix == '.parquet':
+        pd.DataFrame(table).to_parquet(path)
+    else:
+        pd.DataFrame(table).to_csv(path, index=False, sep=';')
+    return path
+
+
+def read_with(model: DriveModel, path: Path) -> Recording:
+    return read_for(model, path)
+
+
+@pytest.mark.parametrize('suffix', ['.csv', '.parquet', '.mat', '.log'])
+def test_tables_by_their_own_columns(run: Any, tmp_path: Path, suffix: str) -> None:
+    time, position, effort = run
+    path = written(tmp_path / f'run{suffix}', time, 1e3 * position, effort)
+    scales = {f'columns.{drive}.position_scale': 1e-3 for drive in DRIVES}
+    recording = read_with(with_keys(**COLUMNS, **scales, **{'columns.lift_3.scale': 2.0}), path)
+    np.testing.assert_allclose(recording.position, position, rtol=1e-12)
+    np.testing.assert_allclose(recording.effort[:, :5], effort[:, :5], rtol=1e-12)
+    np.testing.assert_allclose(recording.effort[:, 5], 2 * effort[:, 5], rtol=1e-12)
+
+
+@pytest.mark.parametrize('suffix', ['.csv', '.parquet', '.mat'])
+@pytest.mark.parametrize('damage', ['column', 'bytes'])
+def test_what_is_no_such_table_is_one_sentence(
+    run: Any, tmp_path: Path, suffix: str, damage: str,
+) -> None:
+    path = written(tmp_path / f'run{suffix}', *run)
+    model = with_keys(**{**COLUMNS, 'columns.lift_1.effort': 'missing'})
+    if damage == 'bytes':
+        path.write_bytes(b'\x00\xff' * 400)
+        model = with_keys(**COLUMNS)
+    with pytest.raises(PprsError) as caught:
+        read_for(model, path)
+    assert '\n' not in str(caught.value)
+    assert damage == 'bytes' or 'missing' in str(caught.value)
+
+
+@pytest.mark.parametrize('keys', [
+    {'joint_map.slide_9': 'x'}, {'joint_map.slide_1': ''}, {'joint_prefix': 3},
+    {'joint_map.slide_1': 'lift_1'}, {'columns.time': 't'}, {'columns.slide_1.position': 'q'},
+    {**COLUMNS, 'columns.slide_1.colour': 'c'}, {**COLUMNS, 'columns.slide_1.scale': 0.0}])
+def test_names_that_are_none_are_refused(keys: dict[str, Any]) -> None:
+    values = {**DriveModel.load().values, **keys}
+    read = joint_names if any(key.startswith('joint') for key in keys) else recorded_columns
+    with pytest.raises(ModelError):
+        read(values, DRIVES)
