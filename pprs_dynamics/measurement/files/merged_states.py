@@ -75,8 +75,8 @@ def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str
         findings.append(Finding(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
-    return MergedStates(stamps[kept], *(arrays[quantity][kept] for quantity in QUANTITIES),
-                        findings)
+    position, velocity, effort = (arrays[quantity][kept] for quantity in QUANTITIES)
+    return MergedStates(stamps[kept], position, velocity, effort, findings)
 
 
 def _typestore(connections: list[Connection]) -> Any:
