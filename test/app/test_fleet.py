@@ -252,6 +252,14 @@ def test_what_is_refused_is_a_row_with_the_reason(tmp_path: Path) -> None:
     assert gone.failed  # it may be there the next time
 
 
+def test_no_row_of_a_store_is_ever_non_finite(tmp_path: Path) -> None:
+    store = Store(str(tmp_path / 'store'))
+    store.write('r', 'k', [{'recording': 'x', 'sha256': 'y', 'rms': np.inf, 'value': np.nan,
+                            'noise': 0.5}])
+    (row,) = store.read(['rms', 'value', 'noise']).to_pylist()
+    assert row == {'rms': None, 'value': None, 'noise': 0.5}
+
+
 def test_a_store_holds_whole_files_of_the_documented_schema(tmp_path: Path) -> None:
     store = Store(str(tmp_path / 'store'))
     store.write('r 1', 'k', [{'recording': 'x', 'error': 'no'}], failed=True)

@@ -196,3 +196,15 @@ def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: f
         _, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
         beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
     assert np.mean(beyond) <= most
+
+
+def test_a_drive_without_any_noise_has_finite_noise() -> None:
+    shapes = NoiseShapes.of(FrequencyBands.of(20.0, PERIOD))
+    bands = shapes.at_bands.shape[1]
+    nothing, counts = np.zeros((1, bands)), np.full((1, bands), 10.0)
+    with np.errstate(all='raise'):
+        found = shapes.improved(shapes.start(nothing, counts), nothing, counts,
+                                np.ones((1, bands)), steps=20)
+        weights = 1 / (found @ shapes.at_bands) ** 2
+    assert np.isfinite(weights).all()
+    assert (found > 0).all()

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -131,7 +132,10 @@ class Store:
             Where it cannot be written.
         """
         pa = arrow()
-        table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema())
+        # A value that could not be computed is null, as one that is not known.
+        table = pa.Table.from_pylist(
+            [{name: None if isinstance(value, float) and not math.isfinite(value) else value
+              for name, value in row.items()} for row in rows], schema=schema())
         buffer = BytesIO()
         pa.parquet.write_table(table, buffer, compression='zstd')
         place = self.place(robot, key, FAILED if failed else DONE)
