@@ -14,7 +14,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.model.force_model import Forces
 from pprs_dynamics.ros.conversions import LATEST_SECOND, NANOSECONDS, frame_of
-from pprs_dynamics.ros.trajectory_cdr import LITTLE_ENDIAN, STAMP, WORD
+from pprs_dynamics.system.cdr import LITTLE_ENDIAN, STAMP, WORD, padded, with_text
 
 
 class AnswerBytes:
@@ -33,7 +33,7 @@ class AnswerBytes:
               for name in ('positions', 'velocities', 'accelerations', 'effort')),
             ('sec', '<i4'), ('nanosec', '<u4')])
         # No dimensions, no offset, the numbers, and what aligns them.
-        self._commands = _padded(LITTLE_ENDIAN + WORD.pack(0) + WORD.pack(0) + WORD.pack(count), 8)
+        self._commands = padded(LITTLE_ENDIAN + WORD.pack(0) + WORD.pack(0) + WORD.pack(count), 8)
         self._names = _names(drives)
 
     def commands(self, effort: Array) -> bytes:
@@ -46,9 +46,9 @@ class AnswerBytes:
         message = LITTLE_ENDIAN + _stamp(stamp) + self._names
         for values in (position, velocity, effort):
             if values is None:
-                message = _padded(message, 4) + WORD.pack(0)
+                message = padded(message, 4) + WORD.pack(0)
             else:
-                message = (_padded(_padded(message, 4) + WORD.pack(self._count), 8)
+                message = (padded(padded(message, 4) + WORD.pack(self._count), 8)
                            + self._values.pack(*values.tolist()))
         return message
 
@@ -76,9 +76,9 @@ class AnswerBytes:
         seconds, nanoseconds = np.divmod(offsets, NANOSECONDS)
         points['sec'] = np.minimum(seconds, LATEST_SECOND)
         points['nanosec'] = nanoseconds
-        head = _padded(LITTLE_ENDIAN + _stamp(start) + self._names, 4) + WORD.pack(len(points))
+        head = padded(LITTLE_ENDIAN + _stamp(start) + self._names, 4) + WORD.pack(len(points))
         # The first point's first length word may stand where its padding would be.
-        first = _padded(head + WORD.pack(self._count), 8)
+        first = padded(head + WORD.pack(self._count), 8)
         return first + points.tobytes()[8:]
 
 
@@ -87,20 +87,10 @@ def _stamp(moment: int) -> bytes:
     return STAMP.pack(min(seconds, LATEST_SECOND), rest)
 
 
-def _text(word: str) -> bytes:
-    data = word.encode() + b'\x00'
-    return WORD.pack(len(data)) + data
-
-
-def _padded(data: bytes, size: int) -> bytes:
-    """Return data filled up to a multiple of the size, counted after the encapsulation."""
-    return data + bytes(-(len(data) - len(LITTLE_ENDIAN)) % size)
-
-
 def _names(drives: Sequence[str]) -> bytes:
     """Return frame and names of the drives, as they follow a stamp."""
     start = LITTLE_ENDIAN + bytes(STAMP.size)
-    message = _padded(start + _text(frame_of(drives)), 4) + WORD.pack(len(drives))
+    message = padded(with_text(start, frame_of(drives)), 4) + WORD.pack(len(drives))
     for drive in drives:
-        message = _padded(message, 4) + _text(drive)
+        message = with_text(message, drive)
     return message[len(start):]

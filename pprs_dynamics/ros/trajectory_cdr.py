@@ -16,12 +16,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD
 
-# Encapsulation: plain CDR, version 1, little endian, without options.
-LITTLE_ENDIAN = b'\x00\x01\x00\x00'
-HEADER = 4
-STAMP = struct.Struct('<iI')
-WORD = struct.Struct('<I')
 NANOSECONDS = 1_000_000_000
 NUMBERS = 19  # position, quaternion, two twists
 

@@ -19,9 +19,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.system.cdr import HEADER, STAMP, aligned
 
-HEADER = 4  # bytes of the encapsulation
-STAMP = 8  # of a time or a duration
 TWO_WORDS = 8
 
 
@@ -72,7 +71,7 @@ class _Walk:
 
     def aligned(self, size: int) -> None:
         """Go to the next place that values of a size may start at, counted after the header."""
-        self.at += (HEADER - self.at) % size
+        self.at = aligned(self.at, size)
 
     def over(self, size: int, alignment: int = 4) -> None:
         """Go over that many bytes of values."""
@@ -106,27 +105,27 @@ class _Walk:
 
 
 def _trajectory(walk: _Walk) -> None:
-    walk.over(STAMP)
+    walk.over(STAMP.size)
     walk.text()
     walk.texts()
     for _ in range(walk.count()):
         for numbers in (7, 6, 6):
             walk.numbers(numbers)
-        walk.over(STAMP)
+        walk.over(STAMP.size)
 
 
 def _joint_trajectory(walk: _Walk) -> None:
-    walk.over(STAMP)
+    walk.over(STAMP.size)
     walk.text()
     walk.texts()
     for _ in range(walk.count()):
         for _ in range(4):
             walk.numbers()
-        walk.over(STAMP)
+        walk.over(STAMP.size)
 
 
 def _joint_state(walk: _Walk) -> None:
-    walk.over(STAMP)
+    walk.over(STAMP.size)
     walk.text()
     walk.texts()
     for _ in range(3):

@@ -19,11 +19,15 @@ from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices, Mask
-
-# Encapsulation: plain CDR, version 1, little endian; the two bytes after it are options.
-LITTLE_ENDIAN = b'\x00\x01'
-HEADER = 4
-STAMP = 8
+from pprs_dynamics.system.cdr import (
+    HEADER,
+    LITTLE_ENDIAN,
+    STAMP,
+    WORD,
+    aligned,
+    padded,
+    with_text,
+)
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,11 @@ class Layout:
     @classmethod
     def of(cls, data: bytes) -> Layout | None:
         """Return the layout of a message, None where it is not little-endian CDR of version 1."""
-        if data[:2] != LITTLE_ENDIAN:
+        if data[:2] != LITTLE_ENDIAN[:2]:
             return None
         fixed = list(range(2))
         try:
-            offset, fixed_word = _sequence(data, HEADER + STAMP)
+            offset, fixed_word = _sequence(data, HEADER + STAMP.size)
             fixed += fixed_word
             offset += _count(data, fixed_word)                       # frame_id
             offset, fixed_word = _sequence(data, offset)
@@ -78,7 +82,7 @@ class Layout:
                 fixed += fixed_word
                 count = _count(data, fixed_word)
                 if count:
-                    offset = _aligned(offset, 8)
+                    offset = aligned(offset, 8)
                 arrays.append((offset, count))
                 offset += 8 * count
         except (struct.error, UnicodeDecodeError):
@@ -98,7 +102,7 @@ class Layout:
 
     def stamps(self, rows: NDArray[np.uint8]) -> Indices:
         """Return the header stamps [ns], (N,)."""
-        words = np.ascontiguousarray(rows[:, HEADER:HEADER + STAMP])
+        words = np.ascontiguousarray(rows[:, HEADER:HEADER + STAMP.size])
         seconds = words.view('<i4')[:, 0].astype(np.int64)
         stamps: Indices = seconds * 10**9 + words.view('<u4')[:, 1]
         return stamps
@@ -124,50 +128,38 @@ def serialised(
     position, velocity, effort : (N, D) arrays
         `velocity` may be None: an empty sequence.
     """
-    head = LITTLE_ENDIAN + bytes(2 + STAMP) + struct.pack('<I', 1) + b'\x00'
-    head = _padded(head, 4) + struct.pack('<I', len(names))
+    head = with_text(LITTLE_ENDIAN + bytes(STAMP.size), '')
+    head = padded(head, 4) + WORD.pack(len(names))
     for name in names:
-        text = name.encode() + b'\x00'
-        head = _padded(head, 4) + struct.pack('<I', len(text)) + text
+        head = with_text(head, name)
     rows = np.empty((len(stamps), 0), np.uint8)
     prefix = head
     for values in (position, velocity, effort):
         count = 0 if values is None else values.shape[1]
-        prefix = _padded(prefix, 4, rows.shape[1]) + struct.pack('<I', count)
+        prefix = padded(prefix, 4, rows.shape[1]) + WORD.pack(count)
         if values is None or not count:
             continue
-        prefix = _padded(prefix, 8, rows.shape[1])
+        prefix = padded(prefix, 8, rows.shape[1])
         constant = np.tile(np.frombuffer(prefix, np.uint8), (len(stamps), 1))
         numbers = np.ascontiguousarray(values, dtype='<f8').view(np.uint8)
         rows, prefix = np.concatenate((rows, constant, numbers), axis=1), b''
     seconds, nanoseconds = np.divmod(stamps, 10**9)
     words = np.column_stack((seconds, nanoseconds)).astype('<u4')
-    rows[:, HEADER:HEADER + STAMP] = words.view(np.uint8)
+    rows[:, HEADER:HEADER + STAMP.size] = words.view(np.uint8)
     return rows
-
-
-def _aligned(offset: int, size: int) -> int:
-    """Return the next place that values of a size may start at, counted after the header."""
-    return offset + (HEADER - offset) % size
 
 
 def _sequence(data: bytes, offset: int) -> tuple[int, list[int]]:
     """Return the place after a length word and the places of the word itself."""
-    start = _aligned(offset, 4)
+    start = aligned(offset, 4)
     if start + 4 > len(data):
         raise struct.error
     return start + 4, list(range(start, start + 4))
 
 
 def _count(data: bytes, word: list[int]) -> int:
-    count: int = struct.unpack_from('<I', data, word[0])[0]
+    count: int = WORD.unpack_from(data, word[0])[0]
     # No sequence has more elements than the message has bytes: garbage would loop for ever.
     if count > len(data):
         raise struct.error
     return count
-
-
-def _padded(data: bytes, size: int, before: int = 0) -> bytes:
-    """Return data, which follows `before` other bytes, filled up to a multiple of the size."""
-    offset = before + len(data)
-    return data + bytes(_aligned(offset, size) - offset)
