@@ -58,9 +58,9 @@ def joint_state(
     drives: Sequence[str] = DRIVES,
 ) -> JointState:
     """Return efforts, and what else is known, at a time [ns]."""
-    message = JointState(name=list(drives), effort=_doubles(effort))
+    message = JointState(name=list(drives), effort=doubles(effort))
     if position is not None and velocity is not None:
-        message.position, message.velocity = _doubles(position), _doubles(velocity)
+        message.position, message.velocity = doubles(position), doubles(velocity)
     message.header.stamp, message.header.frame_id = time(stamp), frame_of(drives)
     return message
 
@@ -128,7 +128,7 @@ def duration(moment: int) -> Duration:
     return Duration(sec=min(seconds, LATEST_SECOND), nanosec=rest)
 
 
-def _doubles(values: Array) -> array[float]:
+def doubles(values: Array) -> array[float]:
     """Return values in the form that messages take over without looking at each one."""
     return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
 

@@ -19,7 +19,6 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.ros.answer import Answer, Feedforward
-from pprs_dynamics.ros.answer_cdr import AnswerBytes
 from pprs_dynamics.ros.conversions import NANOSECONDS
 from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
 from pprs_dynamics.ros.managed_node import ManagedNode
@@ -30,6 +29,7 @@ from pprs_dynamics.ros.provenance import files_given, hardware_of
 from pprs_dynamics.ros.qos import UNANSWERED, publisher, subscription
 from pprs_dynamics.ros.rejection import CODES, Rejection
 from pprs_dynamics.ros.request_reader import reader_for
+from pprs_dynamics.ros.serialisation import answers_for
 from pprs_dynamics.ros.status import StatusReporter
 from pprs_dynamics.ros.timing import Durations
 from pprs_dynamics.ros.watchdog import CommandWatchdog
@@ -61,7 +61,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         self._reader = reader_for(self._settings.model)
-        self._bytes = AnswerBytes(self._settings.model.drives)
+        self._written = answers_for(self._settings.model.drives)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(CODES, 0)}
@@ -183,7 +183,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         except PprsError as error:
             self._reject(Rejection.of(error))
             return
-        self._commands.publish(self._bytes.commands(answer.effort[0]))
+        self._commands.publish(self._written.commands(answer.effort[0]))
         # What is left may take its time: the drives have their command.
         self._compute_time.add(time.perf_counter() - began)
         self._counters['accepted'] += 1
@@ -200,14 +200,14 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         request, forces = answer.request, answer.forces
         if self._joint_command.get_subscription_count():
             position, velocity, _ = forces.drive_motion
-            self._joint_command.publish(self._bytes.joint_state(
+            self._joint_command.publish(self._written.joint_state(
                 request.first_stamp, answer.effort[0], position[0], velocity[0]))
         if self._joint_trajectory.get_subscription_count():
-            self._joint_trajectory.publish(self._bytes.joint_trajectory(
+            self._joint_trajectory.publish(self._written.joint_trajectory(
                 request.start, request.offsets, forces, answer.effort))
         for name, each in self._parts.items():
             if each.get_subscription_count():
-                each.publish(self._bytes.joint_state(
+                each.publish(self._written.joint_state(
                     request.first_stamp, self._feedforward.part(answer, name)))
 
     def _judge(self, answer: Answer) -> None:
@@ -274,9 +274,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             held = self._feedforward.hold(gravity=action == HOLD_GRAVITY)
         except PprsError as error:
             return f'the last command stays in force, as none can be given: {error}'
-        self._commands.publish(self._bytes.commands(held.effort[0]))
+        self._commands.publish(self._written.commands(held.effort[0]))
         if self._joint_command.get_subscription_count():
-            self._joint_command.publish(self._bytes.joint_state(
+            self._joint_command.publish(self._written.joint_state(
                 self.get_clock().now().nanoseconds, held.effort[0],
                 held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
         if action != HOLD_GRAVITY:

@@ -13,7 +13,12 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.joint_request import read_joint_trajectory
-from pprs_dynamics.ros.trajectory_request import TrajectoryRequest, read_serialised
+from pprs_dynamics.ros.serialisation import trajectories_have_known_bytes
+from pprs_dynamics.ros.trajectory_request import (
+    TrajectoryRequest,
+    read_serialised,
+    read_trajectory,
+)
 from pprs_dynamics.ros.whole import message_in
 
 
@@ -36,7 +41,10 @@ class RequestReader(NamedTuple):
 def reader_for(model: ForceModel) -> RequestReader:
     """Return how trajectories for a model arrive."""
     if not isinstance(model, ArmModel):
-        return RequestReader(MultiDOFJointTrajectory, read_serialised)
+        if trajectories_have_known_bytes():
+            return RequestReader(MultiDOFJointTrajectory, read_serialised)
+        return RequestReader(MultiDOFJointTrajectory, lambda data, *rules: read_trajectory(
+            message_in(data, MultiDOFJointTrajectory), *rules))
     joints = model.drives
 
     def read(data: bytes, now: int, max_age: float, missing: str) -> TrajectoryRequest:

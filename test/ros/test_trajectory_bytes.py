@@ -19,7 +19,7 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros import conversions, feedforward, serialisation
 from pprs_dynamics.ros.answer_cdr import AnswerBytes
 from pprs_dynamics.ros.rejection import Rejection
 from pprs_dynamics.ros.trajectory_cdr import read_points
@@ -214,3 +214,35 @@ def test_an_array_with_dimensions_is_whole() -> None:
     data = bytes(serialize_message(message))
     assert message_in(data, Float64MultiArray) == message
     assert not is_whole(data[:-9], Float64MultiArray)
+
+
+def test_bytes_are_used_where_rclpy_reads_them_and_objects_where_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert isinstance(serialisation.answers_for(DRIVES), AnswerBytes)
+    assert isinstance(serialisation.answers_for(('axis',)), AnswerBytes)
+    assert serialisation.trajectories_have_known_bytes()
+    # A middleware whose messages have another length word, and one with another layout of points.
+    for name in ('commands', 'joint_state', 'joint_trajectory'):
+        with monkeypatch.context() as patch:
+            known = getattr(AnswerBytes, name)
+            patch.setattr(AnswerBytes, name, lambda *a, known=known: known(*a)[:-8])
+            assert isinstance(serialisation.answers_for(DRIVES), serialisation.AnswerObjects)
+    monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
+    assert not serialisation.trajectories_have_known_bytes()
+
+
+def test_a_node_with_objects_answers_as_one_with_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    message = message_of(random_motion(np.random.default_rng(9), 3))
+    answers = []
+    for known in (True, False):
+        if not known:
+            monkeypatch.setattr(feedforward, 'answers_for', serialisation.AnswerObjects)
+            monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
+        with feedforward_bench() as node:
+            answer = node.answer(message)
+            assert node.bench.spin_until(lambda: node.joint_command and node.joint_trajectory)
+            command, trajectory = node.joint_command[-1], node.joint_trajectory[-1]
+            command.header.stamp = trajectory.header.stamp = conversions.time(0)
+            answers.append((answer, command, trajectory))
+    assert answers[0] == answers[1]
