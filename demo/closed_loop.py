@@ -217,7 +217,7 @@ class _Listener:
         from sensor_msgs.msg import JointState
         from std_msgs.msg import String
 
-        from pprs_dynamics.ros.qos import LATCHED
+        from pprs_dynamics.ros.node.qos import LATCHED
 
         self.context = Context()
         rclpy.init(context=self.context)

@@ -36,6 +36,7 @@ FLOORS = {
     'physics': ['mechanism', 'three_pprs', 'effects', 'model'],
     'measurement': ['files', 'motion', 'residuals'],
     'inference': ['regression', 'search', 'fit', 'diagnosis', 'adoption', 'experiments'],
+    'ros': ['messages', 'node'],
     'app': ['fleet', 'report', 'workbench', 'commands'],
 }
 # The 3-PPRS' compiled motion stands behind the motion of any platform, and its spatial algebra
@@ -122,7 +123,7 @@ def test_a_circle_that_a_local_import_hides_is_found(tmp_path: Path) -> None:
     assert imported_files(hidden) == {line}
 
 
-@pytest.mark.parametrize('file', sorted((PACKAGE / 'ros').glob('*.py')), ids=lambda f: f.name)
+@pytest.mark.parametrize('file', sorted((PACKAGE / 'ros').rglob('*.py')), ids=lambda f: f.name)
 def test_nodes_hold_no_mathematics(file: Path) -> None:
     text = file.read_text()
     assert 'Eq. (' not in text

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import PlatformMotion
-from pprs_dynamics.ros.conversions import write_trajectory
+from pprs_dynamics.ros.messages.conversions import write_trajectory
 
 VALID = ''
 SCRIPTS = ('платформа', '平台', 'منصة', 'แพลตฟอร์ม', '🤖', 'Plattform', 'platform ', 'plat\tform',

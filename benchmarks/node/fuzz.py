@@ -28,7 +28,7 @@ from trajectory_msgs.msg import JointTrajectory
 from benchmarks.node.damage import VALID, damaged, valid_motion
 from benchmarks.node.stream import feedforward, resident_memory, served
 from pprs_dynamics import DriveModel
-from pprs_dynamics.ros.conversions import write_trajectory
+from pprs_dynamics.ros.messages.conversions import write_trajectory
 
 BATCH = 20  # messages between two looks at the node: fewer than its queue holds
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')

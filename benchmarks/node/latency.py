@@ -27,7 +27,7 @@ from trajectory_msgs.msg import JointTrajectory
 from benchmarks.node import echo_node
 from benchmarks.node.stream import Stream, feedforward, node_process, served
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.ros.conversions import write_trajectory
+from pprs_dynamics.ros.messages.conversions import write_trajectory
 
 RATES = (500.0, 1000.0)
 ROUNDS = 5

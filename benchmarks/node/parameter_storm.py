@@ -28,7 +28,7 @@ from benchmarks.node.stream import feedforward, served
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.ros.conversions import write_trajectory
+from pprs_dynamics.ros.messages.conversions import write_trajectory
 
 EQUAL = 1e-9
 KEPT_EVERY = 500  # sets

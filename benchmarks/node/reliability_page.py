@@ -30,7 +30,7 @@ in closed loop, nor the above |
 
 Neither was run from a distribution's packages, nor with another middleware.
 
-Names of rclpy that are not public stand in `pprs_dynamics/ros/rclpy_internals.py` and nowhere
+Names of rclpy that are not public stand in `pprs_dynamics/ros/node/rclpy_internals.py` and nowhere
 else: `rclpy_implementation.WaitSet` with what it waits for and takes, and
 `Node._parameter_overrides`. Both releases have them, and so has the source of rclpy 8.0.0. Where
 one is missing, or takes other arguments, rclpy's own executor serves the node, which says so in

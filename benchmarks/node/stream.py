@@ -28,7 +28,7 @@ from ros_processes import environment, executable, node_process, reserve_domain
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from pprs_dynamics.ros.rclpy_internals import WaitSet, take
+from pprs_dynamics.ros.node.rclpy_internals import WaitSet, take
 
 RELIABLE = QoSProfile(depth=1000)
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -18,21 +18,21 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
-from pprs_dynamics.ros.answer import Answer, Feedforward
-from pprs_dynamics.ros.conversions import NANOSECONDS
 from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
-from pprs_dynamics.ros.managed_node import ManagedNode
-from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.parameters import declare_own, drive_count
-from pprs_dynamics.ros.preparation import prepare_beside
-from pprs_dynamics.ros.provenance import files_given, hardware_of
-from pprs_dynamics.ros.qos import UNANSWERED, publisher, subscription
-from pprs_dynamics.ros.rejection import CODES, Rejection
-from pprs_dynamics.ros.request_reader import reader_for
-from pprs_dynamics.ros.serialisation import answers_for
-from pprs_dynamics.ros.status import StatusReporter
-from pprs_dynamics.ros.timing import Durations
-from pprs_dynamics.ros.watchdog import CommandWatchdog
+from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS
+from pprs_dynamics.ros.messages.rejection import CODES, Rejection
+from pprs_dynamics.ros.messages.request_reader import reader_for
+from pprs_dynamics.ros.messages.serialisation import command_writer
+from pprs_dynamics.ros.node.managed_node import ManagedNode
+from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.parameters import declare_own, drive_count
+from pprs_dynamics.ros.node.preparation import prepare_beside
+from pprs_dynamics.ros.node.provenance import files_given, hardware_of
+from pprs_dynamics.ros.node.qos import UNANSWERED, publisher, subscription
+from pprs_dynamics.ros.node.status import StatusReporter
+from pprs_dynamics.ros.node.timing import Durations
+from pprs_dynamics.ros.node.watchdog import CommandWatchdog
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
@@ -61,7 +61,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         self._reader = reader_for(self._settings.model)
-        self._written = answers_for(self._settings.model.drives)
+        self._written = command_writer(self._settings.model.drives)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(CODES, 0)}
@@ -196,7 +196,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                               - (time.perf_counter() - began)))
         self._judge(answer)
 
-    def _publish_rest(self, answer: Answer) -> None:
+    def _publish_rest(self, answer: ForceCommand) -> None:
         request, forces = answer.request, answer.forces
         if self._joint_command.get_subscription_count():
             position, velocity, _ = forces.drive_motion
@@ -210,7 +210,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 each.publish(self._written.joint_state(
                     request.first_stamp, self._feedforward.part(answer, name)))
 
-    def _judge(self, answer: Answer) -> None:
+    def _judge(self, answer: ForceCommand) -> None:
         own, report, now = self._settings.own, self._status.report, time.monotonic()
         if now > self._margins_due:
             self._margins_due = now + MARGINS_PERIOD

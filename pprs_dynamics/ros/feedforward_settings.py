@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pprs_dynamics.ros.parameters import NodeParameter
-from pprs_dynamics.ros.trajectory_request import REJECT, SPLINE
+from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE
+from pprs_dynamics.ros.node.parameters import NodeParameter
 
 CLAMP = 'clamp'
 HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'

@@ -31,9 +31,9 @@ from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.measurement.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.qos import UNANSWERED
-from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.node.qos import UNANSWERED
 
 NAME = 'workbench'
 JUDGED = 0.05  # [s] between looks at what came in

@@ -23,16 +23,16 @@ from pprs_dynamics.measurement.residuals.live import (
 )
 from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.clocks import steady_timer
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
-from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.parameters import NodeParameter, declare_own, overrides
-from pprs_dynamics.ros.preparation import prepare_beside
-from pprs_dynamics.ros.provenance import hardware_of
-from pprs_dynamics.ros.qos import LATCHED, publisher, subscription
-from pprs_dynamics.ros.rejection import CODES, Rejection
-from pprs_dynamics.ros.status import StatusReporter
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.rejection import CODES, Rejection
+from pprs_dynamics.ros.node.clocks import steady_timer
+from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides
+from pprs_dynamics.ros.node.preparation import prepare_beside
+from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.qos import LATCHED, publisher, subscription
+from pprs_dynamics.ros.node.status import StatusReporter
 
 PARAMETERS = (
     NodeParameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '

@@ -16,10 +16,10 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.files.pose_files import read_poses
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
-from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
-from pprs_dynamics.ros.parameters import NodeParameter, declare_own, refuse_unknown
-from pprs_dynamics.ros.qos import publisher
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
+from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, refuse_unknown
+from pprs_dynamics.ros.node.qos import publisher
 from pprs_dynamics.ros.run import Finished
 
 # Fast DDS asks listeners every 3 s what they have got, which none tells by itself.

@@ -15,9 +15,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.ros.executor import PromptExecutor, StopSignals
-from pprs_dynamics.ros.parameters import with_hint
-from pprs_dynamics.ros.provenance import check_files
+from pprs_dynamics.ros.node.executor import PromptExecutor, StopSignals
+from pprs_dynamics.ros.node.parameters import with_hint
+from pprs_dynamics.ros.node.provenance import check_files
 
 
 class Finished(Exception):

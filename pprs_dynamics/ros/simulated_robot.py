@@ -14,19 +14,19 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.clocks import steady_timer
-from pprs_dynamics.ros.parameters import (
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.node.clocks import steady_timer
+from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,
     declare_model,
     declare_own,
 )
-from pprs_dynamics.ros.provenance import hardware_of
-from pprs_dynamics.ros.qos import publisher, subscription
+from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.qos import publisher, subscription
+from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
-from pprs_dynamics.ros.status import StatusReporter
-from pprs_dynamics.ros.whole import message_in
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.robot import SimulatedRobot

@@ -23,17 +23,17 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.ros.answer import Feedforward
-from pprs_dynamics.ros.answer_cdr import AnswerBytes
 from pprs_dynamics.ros.feedforward_settings import parameters_for
-from pprs_dynamics.ros.joint_request import read_joint_trajectory
-from pprs_dynamics.ros.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.parameters import NodeParameter, declare_own, drive_count
-from pprs_dynamics.ros.provenance import hardware_of
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.request_reader import reader_for
-from pprs_dynamics.ros.status import StatusReporter
-from pprs_dynamics.ros.trajectory_request import SPLINE, TrajectoryRequest
+from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.request_reader import reader_for
+from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
+from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
+from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
@@ -118,7 +118,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         model, own = self._settings.model, self._settings.own
         feedforward = Feedforward(model, own)
         answer = feedforward.answer(self._request(model, goal))
-        trajectory = deserialize_message(AnswerBytes(model.drives).joint_trajectory(
+        trajectory = deserialize_message(CommandBytes(model.drives).joint_trajectory(
             0, answer.request.offsets, answer.forces, answer.effort), JointTrajectory)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives

@@ -16,8 +16,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import spline_derivatives
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.trajectory_request import read_trajectory
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 
 TIMES = np.arange(0.0, 1.0, 0.01)
 SMOOTH = smooth_motion(TIMES)
@@ -126,7 +126,7 @@ def test_splines_are_loaded_before_messages_and_only_where_they_are_asked_for(mi
         'import sys\n'
         'from pprs_dynamics import DriveModel\n'
         'from pprs_dynamics.physics.model.preparation import prepare\n'
-        'from pprs_dynamics.ros.answer import Feedforward\n'
+        'from pprs_dynamics.ros.force_command import Feedforward\n'
         'from pprs_dynamics.ros.feedforward_settings import parameters_for\n'
         'model = DriveModel.load()\n'
         'prepare(model)\n'

@@ -27,9 +27,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.physics.model.parameter_file import read_parameters
-from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.cdr_validation import is_whole
 from pprs_dynamics.ros.monitor import MonitorNode
-from pprs_dynamics.ros.whole import is_whole
 
 pytestmark = pytest.mark.nodes
 

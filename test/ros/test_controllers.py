@@ -18,10 +18,10 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.answer import Feedforward
-from pprs_dynamics.ros.answer_cdr import AnswerBytes
-from pprs_dynamics.ros.request_reader import reader_for
+from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.request_reader import reader_for
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
@@ -49,7 +49,7 @@ def forwarded(points: int, ahead: float, sample: int = 100) -> JointTrajectory:
         [round(k * 1e9 / RATE) for k in range(points)])
     request = reader_for(model).read(serialize_message(message), NOW, 0.0, 'reject')
     answer = Feedforward(model, OWN).answer(request)
-    found = deserialize_message(AnswerBytes(model.drives).joint_trajectory(
+    found = deserialize_message(CommandBytes(model.drives).joint_trajectory(
         request.start, request.offsets, answer.forces, answer.effort), JointTrajectory)
     assert isinstance(found, JointTrajectory)
     return found

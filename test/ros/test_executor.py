@@ -18,9 +18,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from pprs_dynamics.ros import executor as executors
-from pprs_dynamics.ros import rclpy_internals
-from pprs_dynamics.ros.executor import PromptExecutor
+from pprs_dynamics.ros.node import executor as executors
+from pprs_dynamics.ros.node import rclpy_internals
+from pprs_dynamics.ros.node.executor import PromptExecutor
 
 pytestmark = pytest.mark.nodes
 

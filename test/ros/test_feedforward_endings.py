@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
 

@@ -25,8 +25,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros import conversions
-from pprs_dynamics.ros.rejection import CODES
+from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.rejection import CODES
 
 pytestmark = pytest.mark.nodes
 

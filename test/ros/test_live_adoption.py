@@ -33,7 +33,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import read_parameters
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
 

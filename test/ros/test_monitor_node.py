@@ -19,7 +19,7 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros import conversions
+from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
 
 pytestmark = pytest.mark.nodes

@@ -19,7 +19,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics.measurement.files.pose_files import read_poses, write_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.trajectory_request import read_trajectory
+from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 
 pytestmark = pytest.mark.nodes
 

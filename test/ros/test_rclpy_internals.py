@@ -22,8 +22,8 @@ from ros_processes import environment, node_process
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from pprs_dynamics.ros import rclpy_internals
-from pprs_dynamics.ros.provenance import names_given
+from pprs_dynamics.ros.node import rclpy_internals
+from pprs_dynamics.ros.node.provenance import names_given
 
 PROJECT = Path(__file__).parents[2]
 PAPER = PROJECT / 'config' / 'paper.yaml'
@@ -40,7 +40,7 @@ WITHOUT = {
 }
 NODE = '''
 import sys
-from pprs_dynamics.ros import rclpy_internals as internals
+from pprs_dynamics.ros.node import rclpy_internals as internals
 {without}
 from pprs_dynamics.ros.executables import {node}
 sys.exit({node}())

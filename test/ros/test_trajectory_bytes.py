@@ -19,12 +19,13 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros import conversions, feedforward, serialisation
-from pprs_dynamics.ros.answer_cdr import AnswerBytes
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.trajectory_cdr import read_points
-from pprs_dynamics.ros.trajectory_request import read_serialised, read_trajectory
-from pprs_dynamics.ros.whole import is_whole, message_in
+from pprs_dynamics.ros import feedforward
+from pprs_dynamics.ros.messages import conversions, serialisation
+from pprs_dynamics.ros.messages.cdr_validation import is_whole, message_in
+from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.trajectory_cdr import read_points
+from pprs_dynamics.ros.messages.trajectory_request import read_serialised, read_trajectory
 
 pytestmark = pytest.mark.nodes
 
@@ -130,13 +131,14 @@ def test_answers_are_the_messages_that_rclpy_would_send(points: int) -> None:
     forces = DriveModel.load().drive_forces(random_motion(np.random.default_rng(3), points))
     mechanism, effort = forces.mechanism, forces.total
     for stamp in (0, -1_500_000_000, 7_000_000_001, 2**31 * 10**9 + 5):
-        command = deserialize_message(AnswerBytes(DRIVES).commands(effort[0]), Float64MultiArray)
+        command = deserialize_message(CommandBytes(DRIVES).commands(effort[0]), Float64MultiArray)
         assert command == Float64MultiArray(data=effort[0].tolist())
         for values in ((effort[0],), (effort[0], mechanism.position[0], mechanism.velocity[0])):
-            state = deserialize_message(AnswerBytes(DRIVES).joint_state(stamp, *values), JointState)
+            data = CommandBytes(DRIVES).joint_state(stamp, *values)
+            state = deserialize_message(data, JointState)
             assert state == conversions.joint_state(stamp, *values)
         offsets = np.arange(points) * 1_234_567_891
-        data = AnswerBytes(DRIVES).joint_trajectory(stamp, offsets, forces, effort)
+        data = CommandBytes(DRIVES).joint_trajectory(stamp, offsets, forces, effort)
         trajectory = deserialize_message(data, JointTrajectory)
         assert len(data) == len(serialize_message(trajectory))
         assert tuple(trajectory.joint_names) == DRIVES
@@ -219,15 +221,15 @@ def test_an_array_with_dimensions_is_whole() -> None:
 def test_bytes_are_used_where_rclpy_reads_them_and_objects_where_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert isinstance(serialisation.answers_for(DRIVES), AnswerBytes)
-    assert isinstance(serialisation.answers_for(('axis',)), AnswerBytes)
+    assert isinstance(serialisation.command_writer(DRIVES), CommandBytes)
+    assert isinstance(serialisation.command_writer(('axis',)), CommandBytes)
     assert serialisation.trajectories_have_known_bytes()
     # A middleware whose messages have another length word, and one with another layout of points.
     for name in ('commands', 'joint_state', 'joint_trajectory'):
         with monkeypatch.context() as patch:
-            known = getattr(AnswerBytes, name)
-            patch.setattr(AnswerBytes, name, lambda *a, known=known: known(*a)[:-8])
-            assert isinstance(serialisation.answers_for(DRIVES), serialisation.AnswerObjects)
+            known = getattr(CommandBytes, name)
+            patch.setattr(CommandBytes, name, lambda *a, known=known: known(*a)[:-8])
+            assert isinstance(serialisation.command_writer(DRIVES), serialisation.CommandObjects)
     monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
     assert not serialisation.trajectories_have_known_bytes()
 
@@ -237,7 +239,7 @@ def test_a_node_with_objects_answers_as_one_with_bytes(monkeypatch: pytest.Monke
     answers = []
     for known in (True, False):
         if not known:
-            monkeypatch.setattr(feedforward, 'answers_for', serialisation.AnswerObjects)
+            monkeypatch.setattr(feedforward, 'command_writer', serialisation.CommandObjects)
             monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
         with feedforward_bench() as node:
             answer = node.answer(message)

@@ -22,7 +22,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
-from pprs_dynamics.ros.rclpy_internals import (
+from pprs_dynamics.ros.node.rclpy_internals import (
     InternalsChangedError,
     WaitSet,
     call_if_due,

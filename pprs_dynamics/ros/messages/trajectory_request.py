@@ -16,10 +16,10 @@ from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
-from pprs_dynamics.ros.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.trajectory_cdr import read_points
-from pprs_dynamics.ros.whole import message_in
+from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.trajectory_cdr import read_points
 
 REJECT, SPLINE = 'reject', 'spline'
 VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)

@@ -23,8 +23,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.force_model import Forces
-from pprs_dynamics.ros.answer_cdr import AnswerBytes
-from pprs_dynamics.ros.conversions import (
+from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.conversions import (
     NANOSECONDS,
     doubles,
     duration,
@@ -33,14 +33,14 @@ from pprs_dynamics.ros.conversions import (
     time,
     write_trajectory,
 )
-from pprs_dynamics.ros.trajectory_cdr import read_points
+from pprs_dynamics.ros.messages.trajectory_cdr import read_points
 
 SAMPLES = 2  # points after the first have another place than it
 STAMP = 12 * NANOSECONDS + 345
 
 
-class AnswerObjects:
-    """What AnswerBytes writes, as message objects.
+class CommandObjects:
+    """What CommandBytes writes, as message objects.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class AnswerObjects:
     def joint_trajectory(
         self, start: int, offsets: Indices, forces: Forces, effort: Array,
     ) -> JointTrajectory:
-        """Return all samples; see `AnswerBytes.joint_trajectory`."""
+        """Return all samples; see `CommandBytes.joint_trajectory`."""
         message = JointTrajectory(joint_names=list(self._drives), points=[
             JointTrajectoryPoint(positions=doubles(position), velocities=doubles(velocity),
                                  accelerations=doubles(acceleration), effort=doubles(efforts),
@@ -73,9 +73,9 @@ class AnswerObjects:
         return message
 
 
-def answers_for(drives: Sequence[str]) -> AnswerBytes | AnswerObjects:
+def command_writer(drives: Sequence[str]) -> CommandBytes | CommandObjects:
     """Return what writes the answers: bytes where rclpy reads from them what objects say."""
-    written, objects = AnswerBytes(drives), AnswerObjects(drives)
+    written, objects = CommandBytes(drives), CommandObjects(drives)
     numbers = np.arange(4 * SAMPLES * len(drives), dtype=float).reshape(4, SAMPLES, -1) / 7
     forces: Any = SimpleNamespace(drive_motion=tuple(numbers[:3]))
     offsets = np.array([0, 1_500_000_000])

@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
-from pprs_dynamics.ros.rejection import Rejection
+from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.system.cdr import HEADER, STAMP, aligned
 
 TWO_WORDS = 8

@@ -12,8 +12,8 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from pprs_dynamics.ros.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
-from pprs_dynamics.ros.qos import LATCHED, publisher
+from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
+from pprs_dynamics.ros.node.qos import LATCHED, publisher
 
 try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

@@ -12,14 +12,14 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.ros.joint_request import read_joint_trajectory
-from pprs_dynamics.ros.serialisation import trajectories_have_known_bytes
-from pprs_dynamics.ros.trajectory_request import (
+from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
+from pprs_dynamics.ros.messages.serialisation import trajectories_have_known_bytes
+from pprs_dynamics.ros.messages.trajectory_request import (
     TrajectoryRequest,
     read_serialised,
     read_trajectory,
 )
-from pprs_dynamics.ros.whole import message_in
 
 
 class RequestReader(NamedTuple):

@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.ros.parameters import overrides
+from pprs_dynamics.ros.node.parameters import overrides
 
 # Reliable, and deep enough that a listener that stalls for a tenth of a second at 1 kHz gets
 # every message: each one is answered.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""From a request to the forces that may go out: the model, its memory, scale and limits."""
+"""Force commands: the model called for a request, its memory, scale and limits."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from pprs_dynamics.errors import LimitError
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.ros.conversions import NANOSECONDS
 from pprs_dynamics.ros.feedforward_settings import CLAMP
-from pprs_dynamics.ros.model_parameters import NodeModel
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.trajectory_request import SPLINE, Motion, TrajectoryRequest
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.trajectory_request import SPLINE, Motion, TrajectoryRequest
+from pprs_dynamics.ros.node.model_parameters import NodeModel
 
 REVERSAL_VELOCITY = 'friction.reversal_velocity'
 
 
-class Answer(NamedTuple):
+class ForceCommand(NamedTuple):
     """What goes out for a request.
 
     Parameters
@@ -66,7 +66,7 @@ class Feedforward:
         # The model that remembered last, and what.
         self._before: tuple[NodeModel, ModelState] | None = None
         self._epoch: int | None = None
-        self._last: Answer | None = None
+        self._last: ForceCommand | None = None
         self.use(model, own)
 
     def use(self, model: NodeModel, own: Mapping[str, Any]) -> None:
@@ -89,12 +89,12 @@ class Feedforward:
         """Names of the force parts of the model in force."""
         return [RIGID_BODY, *(e.name for e in self._model.effects if not e.is_measurement)]
 
-    def part(self, answer: Answer, name: str) -> Array:
+    def part(self, answer: ForceCommand, name: str) -> Array:
         """Return one part of the first forces, scaled as they are, (D,)."""
         part: Array = self._scale * answer.forces.parts[name][0]
         return part
 
-    def answer(self, request: TrajectoryRequest) -> Answer:
+    def answer(self, request: TrajectoryRequest) -> ForceCommand:
         """Return what goes out for a request.
 
         Raises
@@ -142,7 +142,7 @@ class Feedforward:
             speed = speed + abs(acceleration[-1]) * within
         return bool((speed <= self._model.values[REVERSAL_VELOCITY]).all())
 
-    def hold(self, gravity: bool) -> Answer:
+    def hold(self, gravity: bool) -> ForceCommand:
         """Return what goes out to hold the last accepted pose at rest, or zeros.
 
         Effects of other packages that fail are left out: a drive must be held without them, too.
@@ -161,15 +161,15 @@ class Feedforward:
             np.zeros_like(forces.total))
         if not np.all(np.isfinite(effort)):
             raise Rejection('OUTPUT', 'the model gave an effort that is not finite')
-        return Answer(self._last.request, forces, effort)
+        return ForceCommand(self._last.request, forces, effort)
 
-    def _checked(self, request: TrajectoryRequest, forces: Forces) -> Answer:
+    def _checked(self, request: TrajectoryRequest, forces: Forces) -> ForceCommand:
         effort = self._scale * forces.total if self._scales else forces.total
         if self._limits.allow(effort, forces.drive_motion):
-            return Answer(request, forces, effort)
+            return ForceCommand(request, forces, effort)
         return self._looked_at(request, forces, effort)
 
-    def _looked_at(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> Answer:
+    def _looked_at(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> ForceCommand:
         """Return what goes out where something is not allowed, or raise what is wrong."""
         position, velocity, acceleration = forces.drive_motion
         for name, quantity in (('n effort', effort), (' drive velocity', velocity),
@@ -182,8 +182,8 @@ class Feedforward:
         except LimitError as error:
             if not self._clamps:
                 raise
-            return Answer(request, forces, self._limits.clamped(effort), str(error))
-        return Answer(request, forces, effort)
+            return ForceCommand(request, forces, self._limits.clamped(effort), str(error))
+        return ForceCommand(request, forces, effort)
 
     def _timed(self, request: TrajectoryRequest) -> Motion:
         """Return the motion on one time scale for all messages, which memories go by."""

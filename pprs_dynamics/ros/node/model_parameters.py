@@ -23,7 +23,7 @@ from pprs_dynamics.physics.model.keys import (
     is_mechanism,
     mechanism_block,
 )
-from pprs_dynamics.ros.parameters import (
+from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     added_descriptor,
     current_values,

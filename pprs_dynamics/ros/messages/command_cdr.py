@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The answers as CDR bytes: the same messages as rclpy would serialise, without the objects."""
+"""Commands as CDR bytes: the same messages as rclpy would serialise, without the objects."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.model.force_model import Forces
-from pprs_dynamics.ros.conversions import LATEST_SECOND, NANOSECONDS, frame_of
+from pprs_dynamics.ros.messages.conversions import LATEST_SECOND, NANOSECONDS, frame_of
 from pprs_dynamics.system.cdr import LITTLE_ENDIAN, STAMP, WORD, padded, with_text
 
 
-class AnswerBytes:
+class CommandBytes:
     """Messages about some drives, serialised.
 
     Parameters

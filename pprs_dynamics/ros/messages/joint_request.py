@@ -11,9 +11,9 @@ import numpy as np
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
-from pprs_dynamics.ros.conversions import NANOSECONDS, nanoseconds
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.trajectory_request import (
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, nanoseconds
+from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.trajectory_request import (
     REJECT,
     TrajectoryRequest,
     check_counts,

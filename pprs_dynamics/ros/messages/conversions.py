@@ -17,8 +17,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros.rejection import Rejection
-from pprs_dynamics.ros.whole import message_in
+from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.rejection import Rejection
 
 PLATFORM = 'platform'
 BASE_FRAMES = ('', 'base')

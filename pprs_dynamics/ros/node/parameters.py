@@ -36,8 +36,8 @@ from pprs_dynamics.physics.model.keys import (
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
-from pprs_dynamics.ros.provenance import folder_of, names_given
-from pprs_dynamics.ros.rclpy_internals import parameter_overrides
+from pprs_dynamics.ros.node.provenance import folder_of, names_given
+from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
 
 ACTIVE = 'effects.active'
 HISTORY = 'history.'

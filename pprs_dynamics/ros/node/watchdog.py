@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from rclpy.node import Node
 
-from pprs_dynamics.ros.clocks import steady_clock
-from pprs_dynamics.ros.conversions import NANOSECONDS
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS
+from pprs_dynamics.ros.node.clocks import steady_clock
 
 IDLE = 3600.0  # [s] period of a timer that is cancelled
 
