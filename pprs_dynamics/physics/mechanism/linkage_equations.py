@@ -42,6 +42,8 @@ TRANSLATION, ANGLE = 0, 1  # kinds of rows
 class Tables(NamedTuple):
     """A mechanism as tables; joints are 1 .. J, in an order in which parents come first.
 
+    Parameters
+    ----------
     parent, turns, coordinate : (J + 1,) int arrays
     place_R (J + 1, 3, 3), place_p, axis (J + 1, 3), ratio, offset (J + 1,) : arrays
         Frame at position 0 in the parent's, axis in the joint's; its position is
@@ -90,6 +92,8 @@ class Tables(NamedTuple):
 class Motion(NamedTuple):
     """Motion of joints and links; per sample, vectors in the base's frame.
 
+    Parameters
+    ----------
     q, v, a : (C,) arrays
         Of all coordinates.
     R (J + 1, 3, 3), p, z, w, u, wd, ud (J + 1, 3) : arrays
@@ -451,6 +455,8 @@ def _angle_acceleration(t: Tables, m: Motion, k: int, i: int, j: int) -> Any:
 class Loads(NamedTuple):
     """Forces of N samples; per sample, in the base's frame.
 
+    Parameters
+    ----------
     f, n : (J + 1, 3) arrays
         What each joint transmits to its link: force, and moment about its origin.
     coordinates : (C,) array
