@@ -20,10 +20,10 @@ from workbench_bench import HIDDEN, write_hidden
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
-from pprs_dynamics.app.workbench.apart import EndedError, run_apart
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
-from pprs_dynamics.app.workbench.shown import EXACT, FITTED, LINEAR
+from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
+from pprs_dynamics.app.workbench.worker_process import EndedError, run_in_process
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import load_model
@@ -46,7 +46,7 @@ def shared(recording: Path) -> Session:
 
 @pytest.fixture
 def session(shared: Session) -> Session:
-    for name in list(shared.shown.ticks):
+    for name in list(shared.view_state.ticks):
         shared.untick(name)
     shared.settle()
     return shared
@@ -90,10 +90,10 @@ def test_errors_that_are_shown_are_those_of_compare_after_export(
 ) -> None:
     for name in ticks:
         session.tick(name)
-    assert session.shown.is_approximate is bool({'time_delay', 'homing_error'} & {*ticks})
+    assert session.view_state.is_approximate is bool({'time_delay', 'homing_error'} & {*ticks})
     session.settle()
-    assert not session.shown.is_approximate
-    assert not session.shown.notice
+    assert not session.view_state.is_approximate
+    assert not session.view_state.notice
     session.export(tmp_path / 'ticked.yaml', with_ticked=True)
     found = compared(tmp_path, recording, tmp_path / 'ticked.yaml')
     for name, error in session.errors().items():
@@ -170,7 +170,7 @@ def test_bad_requests_are_a_sentence_and_change_nothing(session: Session) -> Non
         with pytest.raises(error):
             call()
         assert session.revision == revision
-    assert set(session.shown.ticks) == {'coulomb_friction'}
+    assert set(session.view_state.ticks) == {'coulomb_friction'}
 
 
 def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) -> None:
@@ -178,7 +178,7 @@ def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) ->
     stages = []
 
     def change() -> None:
-        stages.append(session.shown.stage)
+        stages.append(session.view_state.stage)
         if stages == [FITTED]:
             session.tick('effort_offset')
     end = session.subscribe(change)
@@ -214,7 +214,7 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(
     adopted = session.adopt('payload_mass').result(300)
     assert adopted.adopted, adopted.reason
     assert adopted.held_out_on == 'validation'
-    assert set(session.shown.ticks) == {'coulomb_friction'}
+    assert set(session.view_state.ticks) == {'coulomb_friction'}
     assert [step.effect for step in session.steps] == ['payload_mass']
     session.export(tmp_path / 'adopted.yaml')
     assert [step.effect for step in read_steps(load_model(tmp_path / 'adopted.yaml').values)] == [
@@ -267,14 +267,15 @@ def end(progress: Any) -> None:
 
 def test_work_apart_answers_fails_and_is_ended() -> None:
     shares: list[float] = []
-    assert run_apart(sleep, 0.5, report=shares.append) == 'slept'
+    assert run_in_process(sleep, 0.5, report=shares.append) == 'slept'
     assert 0.5 in shares
     with pytest.raises(SessionError, match='must be 2'):
-        run_apart(fail, report=shares.append)
+        run_in_process(fail, report=shares.append)
     with pytest.raises(EndedError, match='status 3'):
-        run_apart(end, report=shares.append)
+        run_in_process(end, report=shares.append)
     began = time.monotonic()
-    job: Job[str] = Job('diagnose', '', lambda report: run_apart(sleep, 60, report=report)).start()
+    job: Job[str] = Job('diagnose', '', lambda report: run_in_process(
+        sleep, 60, report=report)).start()
     time.sleep(0.5)
     job.cancel()
     with pytest.raises(Cancelled):

@@ -11,8 +11,8 @@ const near = (found, wanted) => assert.ok(
 // By Cramer's rule: [[4, 1, .5], [1, 3, .2], [.5, .2, 2]] c = [1, 2, 3].
 const data = () => ({
   gram: Float64Array.of(4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2), side: Float64Array.of(1, 2, 3),
-  always: [0], limited: [], deviations: 2, steepness: 100, namePrice: 5, wrongSignPrice: 11,
-  drivePrices: [3, 4], effects: []});
+  always: [0], limited: [], deviations: 2, steepness: 100, name_price: 5, wrong_sign_price: 11,
+  drive_prices: [3, 4], effects: []});
 const placement = (columns, more = {}) => ({
   columns, fixed: [], signs: [], price: 0, hypotheses: [], drive: null, ...more});
 const solve2 = ([[a, b], [, d]], [p, q]) => [(p * d - b * q) / (a * d - b * b),

@@ -87,16 +87,16 @@ export class RidgeSystem {
   }
 
   price(placements, c) {
-    const {effects, namePrice, wrongSignPrice, drivePrices} = this.data;
+    const {effects, name_price, wrong_sign_price, drive_prices} = this.data;
     let price = 0;
     for (const one of placements) {
       price += one.price;
-      if (one.signs.some(([k, bound]) => c[k] < bound)) price += wrongSignPrice;
+      if (one.signs.some(([k, bound]) => c[k] < bound)) price += wrong_sign_price;
     }
     for (const effect of effects) {
       const used = effect.placements.filter((one) => placements.includes(one));
-      price += namePrice * new Set(used.flatMap((one) => one.hypotheses)).size;
-      if (used.length && used[0].drive) price += drivePrices[used.length - 1];
+      price += name_price * new Set(used.flatMap((one) => one.hypotheses)).size;
+      if (used.length && used[0].drive) price += drive_prices[used.length - 1];
     }
     return price;
   }

@@ -28,14 +28,14 @@ export class WhatIf {
 
   asFound() {
     this.ticked = new Set(this.data.effects.flatMap((effect) => effect.placements.filter(
-      (one) => one.isFound)));
+      (one) => one.is_found)));
   }
 
   /* Put an effect on some drives, or where it explains most without any named. */
   tick(name, drives) {
     const {placements} = this.data.effects.find((one) => one.name === name);
     for (const one of placements) {
-      const isOn = drives ? drives.includes(one.drive) : one.isFirstChoice;
+      const isOn = drives ? drives.includes(one.drive) : one.is_first_choice;
       this.ticked[isOn ? 'add' : 'delete'](one);
     }
   }
@@ -49,7 +49,7 @@ export class WhatIf {
     const own = (effect) => effect.placements.filter((one) => this.ticked.has(one));
     const evidence = new Map();
     for (const effect of effects.filter((one) => !own(one).length)) {
-      const more = effect.placements.filter((one) => one.isFirstChoice);
+      const more = effect.placements.filter((one) => one.is_first_choice);
       evidence.set(effect, cost - this.system.fit([...chosen, ...more]).cost);
     }
     // From the last one on the factor stays good for what stands before.
@@ -60,8 +60,8 @@ export class WhatIf {
     const errors = drives.map((drive) => ({
       before: drive.given, now: errorOf(drive, c), noise: drive.noise}));
     const samples = drives.map((one) => one.samples);
-    const isApproximate = effects.some((effect) => effect.isApproximate && effect.placements.some(
-      (one) => one.isFound !== this.ticked.has(one)));
+    const isApproximate = effects.some((effect) => effect.is_approximate && effect.placements.some(
+      (one) => one.is_found !== this.ticked.has(one)));
     return {
       drives: drives.map((one) => one.name), units: this.data.units, unit: this.data.unit,
       is_settled: true, is_approximate: isApproximate,
@@ -73,8 +73,8 @@ export class WhatIf {
         drives: own(effect).map((one) => one.drive),
         places: effect.placements.map((one) => one.drive),
         is_on_drives: effect.placements[0].drive !== null, evidence: evidence.get(effect),
-        evidence_is_pending: false, bends_columns: effect.isApproximate,
-        is_called_for: effect.placements.some((one) => one.isFound), parameters: []})),
+        evidence_is_pending: false, bends_columns: effect.is_approximate,
+        is_called_for: effect.placements.some((one) => one.is_found), parameters: []})),
       now: drives.map((drive) => curveOf(drive, weightsOf(drive, c), gap))};
   }
 

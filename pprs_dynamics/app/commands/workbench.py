@@ -12,7 +12,7 @@ import argparse
 import re
 
 from pprs_dynamics.app.commands.arguments import whole
-from pprs_dynamics.app.workbench.reading import Files
+from pprs_dynamics.app.workbench.recording_set import Files
 from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.serve import serve
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     files = Files.read(given, options.model, options.validate, options.topic)
 
     def begin() -> Session | None:
-        return Session.of(files) if files.recordings else None
+        return Session.of(files) if files.recordings.fitted else None
     live = _live(options, files.model) if options.live else None
     hub = Hub(begin, files.model, options.model, Folders.of(options.recordings),
               Surveys.of(options.recordings), live)

@@ -18,7 +18,7 @@ import numpy as np
 from pprs_dynamics.app.fleet.trend import FleetTrends, Quantity, Trend
 from pprs_dynamics.app.fleet.words import change_text, reach_text, sentences
 from pprs_dynamics.app.report.figures import BLUE, GREY, RED
-from pprs_dynamics.app.report.page import Page, plotly_objects
+from pprs_dynamics.app.report.page import Page, one_script, plotly_objects
 from pprs_dynamics.arrays import Array
 
 # Numbers of trends that a page holds: beyond, the quietest are not drawn but stay in the map.
@@ -27,80 +27,6 @@ SATURATED = 10.0  # standard deviations at which the map's colour is full
 MOST_ERRORS = 50
 ROW, HEAD = 26, 260  # heights of the map [px]
 LEAST_ROWS = 4  # so that its colour scale has room
-
-_SCRIPT = '''
-const data = JSON.parse(document.getElementById('fleet-data').textContent);
-const place = document.getElementById('trend'), card = document.getElementById('recording');
-let shown = data.first;
-function showTrend(robot, quantity) {
-  shown = [robot, quantity];
-  const trend = data.trends[robot + '\\u0000' + quantity];
-  card.hidden = true;
-  if (!trend) { document.getElementById('trend-title').textContent =
-    robot + ', ' + quantity + ': not drawn, too many recordings for one page'; return; }
-  document.getElementById('trend-title').textContent =
-    robot + ', ' + quantity + (trend.text ? ' ' + trend.text : ': no change');
-  const stamps = trend.t.map(day => new Date(day * 864e5).toISOString());
-  const traces = [{x: stamps, y: trend.y, mode: 'markers', name: quantity, customdata: trend.r,
-    marker: {color: data.colours[0]}, hovertemplate: '%{x}<br>%{y:.4g} ' + trend.unit +
-    '<extra>click: the recording</extra>',
-    error_y: {type: 'data', array: trend.s, thickness: 1, width: 2}},
-    {x: stamps, y: trend.f, mode: 'lines', name: trend.text ? 'change' : 'median',
-     line: {color: data.colours[1]}}];
-  const layout = {height: 420, margin: {l: 70, r: data.beside ? 70 : 15, t: 20, b: 50},
-    yaxis: {title: {text: quantity + (trend.unit ? ' [' + trend.unit + ']' : '')}},
-    legend: {orientation: 'h', y: 1.02, yanchor: 'bottom'}};
-  if (trend.limit !== null) traces.push({x: [stamps[0], stamps[stamps.length - 1]],
-    y: [trend.limit, trend.limit], mode: 'lines', name: 'limit',
-    line: {dash: 'dash', color: data.colours[2]}});
-  if (data.beside) {
-    traces.push({x: stamps, y: trend.r.map(k => data.recordings[k][3]), mode: 'lines+markers',
-      name: data.beside, yaxis: 'y2', opacity: 0.5, line: {color: data.colours[2]}});
-    layout.yaxis2 = {overlaying: 'y', side: 'right', title: {text: data.beside}, tickmode: 'auto',
-      showgrid: false};
-  }
-  place.setAttribute('aria-label', quantity + ' of ' + robot + ' over time');
-  const drawn = window.themed(JSON.stringify({data: traces, layout}));
-  Plotly.react(place, drawn.data, drawn.layout, {displayModeBar: false, responsive: true});
-  place.removeAllListeners('plotly_click');
-  place.on('plotly_click', event => {
-    const k = event.points[0].customdata;
-    if (k !== undefined) showRecording(k);
-  });
-}
-function showRecording(k) {
-  const [name, path, day] = data.recordings[k];
-  card.replaceChildren();
-  const title = document.createElement('h3'), line = document.createElement('p');
-  title.textContent = name + ', ' + new Date(day * 864e5).toISOString().slice(0, 19) + ' UTC';
-  line.textContent = 'Its own page: ';
-  const code = document.createElement('code');
-  const quoted = "'" + path.replaceAll("'", "'\\\\''") + "'";
-  code.textContent = 'pprs diagnose ' + quoted + data.given + ' --report recording.html';
-  line.append(code);
-  const table = document.createElement('table');
-  for (const [key, trend] of Object.entries(data.trends)) {
-    const at = trend.r.indexOf(k);
-    if (at < 0) continue;
-    const row = table.insertRow();
-    for (const text of [key.split('\\u0000')[1], trend.y[at].toPrecision(4), trend.unit])
-      row.insertCell().textContent = text;
-  }
-  card.append(title, line, table);
-  card.hidden = false;
-}
-function begin() {
-  // The page unpacks its library, and draws a figure once it is in view.
-  const map = document.querySelector('.plot');
-  if (!window.Plotly || !map.on) { setTimeout(begin, 100); return; }
-  map.on('plotly_click', event => showTrend(event.points[0].y, event.points[0].x));
-  if (shown) showTrend(...shown);
-}
-begin();
-matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
-  if (shown) showTrend(...shown);
-});
-'''
 
 
 def fleet_page(fleet: FleetTrends, beside: str | None = None,
@@ -132,7 +58,7 @@ def fleet_page(fleet: FleetTrends, beside: str | None = None,
         page.interactive('<h2 id="trend-title">Trend</h2><div id="trend" role="img"></div>'
                          '<section id="recording" class="card" hidden></section>',
                          'fleet-data', json.dumps(data, allow_nan=False),
-                         _SCRIPT)
+                         one_script(['dom.mjs', 'fleet.mjs']))
     if fleet.errors:
         page.heading('Recordings without a result')
         page.table(('recording', 'robot', 'reason'),

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import base64
 import json
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.app.report.comparison_figures import shown_samples
 from pprs_dynamics.app.report.page import Page, one_script
-from pprs_dynamics.inference.diagnosis.what_if import OptionalForces, OptionalPlacement, WhatIf
+from pprs_dynamics.inference.diagnosis.what_if import OptionalForces, WhatIf
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.measurement.residuals.residuals import Residuals
@@ -51,24 +52,17 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
     """
     with page.fold('What if: tick effects, and see what would be left'):
         page.interactive(_ELEMENTS, 'what-if-data', json.dumps({
-            'effects': [{'name': one.name, 'isApproximate': one.is_approximate, 'placements': [
-                _placement(placement) for placement in one.placements]} for one in system.effects],
+            'effects': [asdict(one) for one in system.effects],
             'always': system.always, 'limited': system.limited,
             'gram': _letters(system.gram, 'f8'), 'side': _letters(system.side, 'f8'),
-            'namePrice': system.name_price, 'wrongSignPrice': system.wrong_sign_price,
-            'drivePrices': system.drive_prices,
+            'name_price': system.name_price, 'wrong_sign_price': system.wrong_sign_price,
+            'drive_prices': system.drive_prices,
             'units': {one.name: {'effort': residuals.units_of(one.name).effort}
                       for one in system.drives},
             'unit': residuals.unit, 'gap': GAP,
             'deviations': DEVIATIONS, 'steepness': BEYOND_TOLERANCE,
             'drives': [_drive(one, residuals) for one in system.drives],
         }, allow_nan=False, separators=(',', ':')), one_script(MODULES), with_board=True)
-
-
-def _placement(one: OptionalPlacement) -> dict[str, Any]:
-    return {'drive': one.drive, 'isFound': one.is_found, 'isFirstChoice': one.is_first_choice,
-            'columns': one.columns, 'fixed': one.fixed, 'signs': one.signs, 'price': one.price,
-            'hypotheses': one.hypotheses}
 
 
 def _drive(one: OptionalForces, residuals: Residuals) -> dict[str, Any]:

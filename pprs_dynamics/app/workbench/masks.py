@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pprs_dynamics.app.workbench.shown import Share, Shown, names_of
-from pprs_dynamics.app.workbench.what_if import WhatIf
+from pprs_dynamics.app.workbench.tick_fits import TickFits
+from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
 
@@ -48,7 +48,7 @@ def spans_of(data: Residuals, mask: Mask) -> list[tuple[float, float]]:
     return [(float(data.time[part[0]]), float(data.time[part[-1]])) for part in parts[:MOST_SPANS]]
 
 
-def quantity(what_if: WhatIf, shown: Shown, name: str, drive: int) -> Array:
+def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
     """Return anything that may be drawn over anything, as a drive sees it, (M,).
 
     Raises
@@ -56,9 +56,9 @@ def quantity(what_if: WhatIf, shown: Shown, name: str, drive: int) -> Array:
     ResidualsError
         For a name that stands for nothing.
     """
-    data = what_if.design.residuals
-    table = {'measured': what_if.measured, 'error before': what_if.before,
-             'error now': shown.residual}
+    data = fits.design.residuals
+    table = {'measured': fits.measured, 'error before': fits.before,
+             'error now': view.residual}
     found = table[name][:, drive] if name in table else data.variable(name, drive)
     if found is None:
         raise ResidualsError('variable', f'{name!r} is not known',
@@ -71,7 +71,7 @@ def quantities(data: Residuals) -> list[str]:
     return ['time', *(name for name in data.variables), *EFFORTS]
 
 
-def shares_in(mask: Mask, what_if: WhatIf, shown: Shown) -> list[Share]:
+def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:
     """Return what every unticked effect explains of the squared error in a mask, the best first.
 
     Raises
@@ -79,17 +79,17 @@ def shares_in(mask: Mask, what_if: WhatIf, shown: Shown) -> list[Share]:
     ResidualsError
         For a mask of another shape.
     """
-    if mask.shape != what_if.measured.shape:
+    if mask.shape != fits.measured.shape:
         raise ResidualsError('mask', f'its shape is {mask.shape}',
-                             f'be {what_if.measured.shape}, samples by drives')
-    chosen = mask & np.isfinite(what_if.measured)
-    left = float(np.sum(what_if.residual(shown.free)[chosen] ** 2))
+                             f'be {fits.measured.shape}, samples by drives')
+    chosen = mask & np.isfinite(fits.measured)
+    left = float(np.sum(fits.residual(view.free)[chosen] ** 2))
     shares = []
-    for offer in shown.offers:
+    for offer in view.offers:
         after = float(np.sum(offer.residual[chosen] ** 2, dtype=float))
         explained = 1 - after / left if left > 0 else 0.0
         paid = max(offer.evidence, 0.0) / offer.gain if offer.gain > 0 else 0.0
-        shares.append(Share(offer.candidate.name, names_of(offer.candidate, what_if.drives),
+        shares.append(Share(offer.candidate.name, names_of(offer.candidate, fits.drives),
                             explained, explained * paid))
     return sorted(shares, key=lambda one: (-one.net, -one.explained))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.app.workbench.errors import SessionError
-from pprs_dynamics.app.workbench.tick_board import TickBoard
+from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -42,7 +42,7 @@ class RobotMotion:
     now: Array
 
 
-def robot_motion(board: TickBoard, most: int = MOST_POSES) -> RobotMotion:
+def robot_motion(session: Session, most: int = MOST_POSES) -> RobotMotion:
     """Return the poses of all recordings, one after the other.
 
     Raises
@@ -50,12 +50,12 @@ def robot_motion(board: TickBoard, most: int = MOST_POSES) -> RobotMotion:
     SessionError
         For a model of another mechanism.
     """
-    model = board.model
+    model = session.model
     if not isinstance(model, DriveModel):
         raise SessionError(f'{model.title} is not drawn, only the 3-PPRS is')
-    chosen = np.unique(np.linspace(0, len(board.data) - 1, most).astype(int))
+    chosen = np.unique(np.linspace(0, len(session.data) - 1, most).astype(int))
     joints, first = [], 0
-    for one in board.what_if.design.reconstructions:
+    for one in session.fits.design.reconstructions:
         starts = one.treat.starts
         here = chosen[(chosen >= first) & (chosen < first + len(starts))] - first
         first += len(starts)
@@ -64,8 +64,8 @@ def robot_motion(board: TickBoard, most: int = MOST_POSES) -> RobotMotion:
             found = joint_positions(model.robot.geometry, one.motion[starts[here]])
             joints.append(np.stack((found.foot, found.elbow, found.tip), axis=1))
     angles = tuple(float(angle) for angle in model.values['geometry.chain_angles'])
-    return RobotMotion(angles, board.data.time[chosen], np.concatenate(joints),
-                       _rms_between(board.before, chosen), _rms_between(board.now, chosen))
+    return RobotMotion(angles, session.data.time[chosen], np.concatenate(joints),
+                       _rms_between(session.before, chosen), _rms_between(session.now, chosen))
 
 
 def _rms_between(error: Array, chosen: np.typing.NDArray[np.int_]) -> Array:

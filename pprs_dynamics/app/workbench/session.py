@@ -5,42 +5,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from os import PathLike
+from threading import RLock
 from typing import Any
 
-from pprs_dynamics.app.workbench.apart import run_apart
-from pprs_dynamics.app.workbench.errors import SessionError
+import numpy as np
+
+from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
 from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed, judged
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
-from pprs_dynamics.app.workbench.reading import (
-    Files,
-    read,
-    refuse_paths,
-    refuse_repeats,
-    with_mistakes,
-)
-from pprs_dynamics.app.workbench.shown import (
+from pprs_dynamics.app.workbench.recording_set import Files, RecordingSet
+from pprs_dynamics.app.workbench.tick_fits import Tick, TickFits
+from pprs_dynamics.app.workbench.view_stages import following, linear, without_ticks
+from pprs_dynamics.app.workbench.view_state import (
+    NOT_KNOWN,
+    DriveError,
     Share,
+    ViewState,
     effect_to_dict,
+    errors_of,
     finite,
     names_of,
     recordings_to_dict,
+    rms,
     units_to_dict,
 )
-from pprs_dynamics.app.workbench.tick_board import TickBoard
-from pprs_dynamics.app.workbench.what_if import WhatIf
+from pprs_dynamics.app.workbench.worker_process import run_in_process
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import original
 from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.experiments.next_experiment import check_duration
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -49,20 +53,34 @@ from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
 
-class Session(TickBoard):
+class Session:
     """Recordings, a model, and what effects would do to its error.
 
+    Ticks are answered at once, at the noise as it is; `settle` fits the noise and the shapes
+    beside them and evaluates the fitted model. All methods may be called from several threads.
     Nothing on disk changes before `export`.
 
     Parameters
     ----------
     model : ForceModel
     recordings : mapping of str to Recording
-        To fit to, by path or by whatever name.
+        To fit to, by whatever name.
     validation : mapping of str to Recording, optional
         Never fitted, adoptions are judged on them.
     base : path, optional
         The model's file, whose comments exported models keep.
+
+    Attributes
+    ----------
+    recordings : RecordingSet
+    fits : TickFits
+        Design, regression and library of the model.
+    view_state : ViewState
+        Fit, values and evidence of one moment.
+    revision : int
+        Counts what somebody changed.
+    version : int
+        Counts every change of what is shown.
 
     Raises
     ------
@@ -75,14 +93,16 @@ class Session(TickBoard):
                  base: str | PathLike[str] | None = None) -> None:
         if not recordings:
             raise SessionError('no recording is given, must be at least one')
-        self.recordings, self.validation = dict(recordings), dict(validation or {})
+        self.recordings = RecordingSet(recordings, validation or {})
         self.base = base
         self.diagnosis: Diagnosis | None = None
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
-        self._files: set[str] = set()  # the ledger has the hashes of these; of others' samples
         self.jobs: dict[str, Job[Any]] = {}
-        super().__init__(WhatIf(model, list(self.recordings.values())))
+        self.revision = self.version = 0
+        self._lock, self._settling = RLock(), RLock()
+        self._listeners: list[Callable[[], None]] = []
+        self._use(TickFits(model, list(recordings.values())))
 
     @classmethod
     def open(cls, recordings: Sequence[str | PathLike[str]],
@@ -108,15 +128,27 @@ class Session(TickBoard):
         PprsError
             As `measure_residuals`.
         """
+        read = files.recordings
         try:
-            session = cls(files.model, files.recordings, files.validation, files.base)
+            session = cls(files.model, read.fitted, read.held_out, files.base)
         except PprsError:
             # Positions in millimetres are told as that, not as a pose out of reach.
-            for recording in files.recordings.values():
-                with_mistakes(files.model, recording)
+            read.with_mistakes(files.model)
             raise
-        session._files = {*files.recordings, *files.validation}
+        session.recordings = read
         return session
+
+    def _use(self, fits: TickFits, ticks: Mapping[str, Tick] | None = None) -> None:
+        """Begin with a model, from what was ticked under another."""
+        with self._lock:
+            self.fits = fits
+            self.noise_floors: dict[str, float] | None = None
+            self.revision += 1
+            self.view_state = without_ticks(fits, self.revision)
+            for name, tick in (ticks or {}).items():
+                with suppress(PprsError):  # what cannot act under this model is ticked no more
+                    self.tick(name, names_of(tick.best, fits.drives))
+            self.notify()
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
         """Take one more recording, read by the reader of all commands.
@@ -126,20 +158,14 @@ class Session(TickBoard):
         PprsError
             Where it cannot be read, holds the samples of another, or the model cannot follow it.
         """
-        refuse_paths([*self.recordings, *self.validation, str(path)])
-        more = {str(path): with_mistakes(self.model, read(path, self.model))}
-        fitted = self.recordings if is_held_out else {**self.recordings, **more}
-        held_out = {**self.validation, **more} if is_held_out else self.validation
-        refuse_repeats(fitted, held_out)
-        self._files |= {*more}
-        if is_held_out:
-            self.validation = held_out
-            self.tell()
-            return
-        what_if = WhatIf(self.model, list(fitted.values()))
+        more = self.recordings.with_more(self.model, str(path), is_held_out)
+        fits = self.fits if is_held_out else TickFits(self.model, list(more.fitted.values()))
         with self._lock:
-            self.recordings, self.diagnosis = fitted, None
-            self._use(what_if, self.shown.ticks)
+            self.recordings = more
+            if fits is not self.fits:
+                self.diagnosis = None
+                self._use(fits, self.view_state.ticks)
+        self.notify()
 
     def find_mistakes(self) -> None:
         """Look for units, signs and orders that are not SI's, and add them to the findings.
@@ -149,14 +175,199 @@ class Session(TickBoard):
         UnreadableFileError
             For positions that are no metres.
         """
-        for listed in (self.recordings, self.validation):
-            listed.update({path: with_mistakes(self.model, one) for path, one in listed.items()})
-        self.tell()
+        self.recordings = self.recordings.with_mistakes(self.model)
+        self.notify()
+
+    # Those who look on
+
+    @contextmanager
+    def steady(self) -> Iterator[None]:
+        """Keep everything as it is while the block lasts, so that it belongs together."""
+        with self._lock:
+            yield
+
+    def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call a function after every change, and return one that ends this."""
+        with self._lock:
+            self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def notify(self) -> None:
+        """Tell everybody who subscribed that something changed."""
+        with self._lock:
+            self.version += 1
+            listeners = list(self._listeners)
+        for listener in listeners:
+            listener()
+
+    # What there is
+
+    @property
+    def model(self) -> ForceModel:
+        """With everything that was adopted."""
+        return self.fits.model
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names."""
+        return self.fits.drives
+
+    @property
+    def data(self) -> Residuals:
+        """Times, measured efforts and variables that errors may depend on."""
+        return self.fits.design.residuals
+
+    @property
+    def candidates(self) -> list[type[CatalogueEffect]]:
+        """Effects that the model may lack, by name."""
+        return self.fits.candidates()
+
+    @property
+    def before(self) -> Array:
+        """What the model leaves, (M, D) [N]."""
+        return self.fits.before
+
+    @property
+    def now(self) -> Array:
+        """What is left with the ticked effects, (M, D) [N]."""
+        return self.view_state.residual
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """The rms of every drive's noise [N]: the diagnosis', or a first guess before it."""
+        if self.noise_floors is not None:
+            return self.noise_floors
+        return self.fits.quiet_noise(self.view_state.free)
+
+    def errors(self) -> dict[str, DriveError]:
+        """Return the error of every drive that was measured: before, now, and of the noise."""
+        return errors_of(self.before, self.now, self.noise, self.drives)
+
+    def overall(self) -> DriveError:
+        """Return the error over all samples and drives."""
+        noise = list(self.noise.values())
+        return DriveError(rms(self.before), rms(self.now),
+                          float(np.sqrt(np.mean(np.square(noise)))) if noise else NOT_KNOWN)
 
     @property
     def steps(self) -> list[Step]:
         """The ledger of the model, oldest first."""
         return read_steps(self.model.values)
+
+    # Ticks
+
+    def tick(self, effect: str, drives: Sequence[str] | None = None,
+             revision: int | None = None) -> ViewState:
+        """Let an effect take part, on some drives or where it pays best.
+
+        Raises
+        ------
+        EffectRequestError
+            For an effect or a drive that does not exist.
+        SessionError
+            For an effect that cannot act, or that the model has already.
+        StaleError
+            Where the session is at another revision.
+        """
+        text = effect if drives is None else f'{effect}:{",".join(drives)}'
+        request = EffectRequest.of(text, self.drives)
+        request.require_place(self.model)
+        with self._changing(revision):
+            view = self.view_state
+            offer = next((one.candidate for one in view.offers
+                          if one.candidate.effect is request.effect), None)
+            asked = None if request.drives is None else tuple(
+                self.drives.index(name) for name in request.drives)
+            if offer is None or (asked is not None and offer.drives != asked):
+                rest = [tick.best for name, tick in view.ticks.items() if name != effect]
+                offer = self.fits.offered(request.effect, asked, self.fits.at(rest, view.free))
+            if offer is None:
+                raise SessionError(f'{text} has nothing to act on in these recordings, or the '
+                                   'model has it already')
+            return self._linear({**view.ticks, effect: Tick(offer)})
+
+    def untick(self, effect: str, revision: int | None = None) -> ViewState:
+        """Let an effect take no part."""
+        with self._changing(revision):
+            self._ticked(effect)
+            return self._linear({name: tick for name, tick in self.view_state.ticks.items()
+                                 if name != effect})
+
+    def choose(self, effect: str, key: str, value: float, revision: int | None = None) -> ViewState:
+        """Set a parameter of a ticked effect, named as in its values; all others follow.
+
+        `ViewState.departure` is what it costs. The noise stays that of the best fit.
+
+        Raises
+        ------
+        SessionError
+            For an effect that is not ticked, or a parameter that it does not have.
+        ModelError
+            For a value that the parameter may not have.
+        """
+        with self._changing(revision):
+            tick, view = self._ticked(effect), self.view_state
+            known = view.estimates.get(effect, {})
+            if key not in known:
+                raise SessionError(f'{effect} has no parameter {key!r}, must be one of '
+                                   f'{", ".join(known)}')
+            drive, _, name = key.rpartition('.')
+            parameter = next(p for p in tick.effect.parameters if p.name == name)
+            checked = parameter.check(f'{effect}.{key}', value)
+            place = (self.drives.index(drive) if drive else None, name)
+            return self._linear({**view.ticks, effect: replace(
+                tick, chosen={**tick.chosen, place: checked})})
+
+    def release(self, effect: str, revision: int | None = None) -> ViewState:
+        """Let the fit decide about an effect's parameters again."""
+        with self._changing(revision):
+            return self._linear({**self.view_state.ticks, effect: replace(
+                self._ticked(effect), chosen={})})
+
+    def settle(self) -> ViewState:
+        """Fit noise and shapes beside the ticks, and evaluate the fitted model.
+
+        Listeners are told after every part; a tick in between ends it.
+        """
+        with self._settling:
+            with self._lock:
+                fits, view = self.fits, self.view_state
+            if not view.is_settled:
+                for one in following(fits, view):
+                    if not self._show(one):
+                        break
+            return self.view_state
+
+    def _show(self, view: ViewState) -> bool:
+        """Show it, where nothing was changed since; return whether it is so."""
+        with self._lock:
+            if view.revision != self.revision:
+                return False
+            self.view_state = view
+            self.notify()
+            return True
+
+    def _ticked(self, effect: str) -> Tick:
+        ticks = self.view_state.ticks
+        if effect not in ticks:
+            raise SessionError(f'{effect!r} is not ticked, must be one of '
+                               f'{", ".join(ticks) or "those that are, and none is"}')
+        return ticks[effect]
+
+    @contextmanager
+    def _changing(self, revision: int | None) -> Iterator[None]:
+        """Keep others from changing anything; raise StaleError where somebody did before."""
+        with self._lock:
+            if revision is not None and revision != self.revision:
+                raise StaleError(f'revision is {revision}, must be {self.revision}: something '
+                                 'was changed elsewhere')
+            yield
+
+    def _linear(self, ticks: dict[str, Tick]) -> ViewState:
+        self.revision += 1
+        self.view_state = linear(self.fits, self.view_state, ticks, self.revision)
+        self.notify()
+        return self.view_state
 
     # Pointing at data
 
@@ -168,12 +379,12 @@ class Session(TickBoard):
                drive: str) -> Mask:
         """Return a drive's samples in a region of the scatter of y over x, see `quantities`."""
         d, = self._indices([drive])
-        x_values, y_values = (quantity(self.what_if, self.shown, name, d) for name in (x, y))
+        x_values, y_values = (quantity(self.fits, self.view_state, name, d) for name in (x, y))
         return region_mask(x_values, y_values, x_range, y_range, self.data, d)
 
     def shares(self, mask: Mask) -> list[Share]:
         """Return what each unticked effect explains of the error in a mask, less its price."""
-        return shares_in(mask, self.what_if, self.shown)
+        return shares_in(mask, self.fits, self.view_state)
 
     def _indices(self, drives: Sequence[str] | None) -> list[int]:
         for name in drives or ():
@@ -186,13 +397,13 @@ class Session(TickBoard):
 
     def diagnose(self) -> Job[Diagnosis]:
         """Begin to look for what the recordings call for; it tells the noise, too."""
-        what_if = self.what_if
+        fits = self.fits
 
         def work(report: Callable[[float], None]) -> Diagnosis:
-            found: Diagnosis = run_apart(diagnosed, original(what_if.model), what_if.recordings,
+            found: Diagnosis = run_in_process(diagnosed, original(fits.model), fits.recordings,
                                          report=report)
             with self._lock:
-                if what_if is self.what_if:
+                if fits is self.fits:
                     self.diagnosis, self.noise_floors = found, found.noise_floors
             return found
         return self._begin('diagnose', '', work)
@@ -213,40 +424,35 @@ class Session(TickBoard):
             Where the session is at another revision.
         """
         with self._changing(revision):
-            tick = self.shown.ticks.get(effect)
+            tick = self.view_state.ticks.get(effect)
             on = drives or (names_of(tick.best, self.drives) if tick else None)
             request = EffectRequest.of(f'{effect}:{",".join(on)}' if on else effect, self.drives)
             request.require_place(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
                 raise SessionError(f'{self.jobs["adopt"].what} is being adopted, must end first')
-            what_if = self.what_if
+            fits = self.fits
 
             def work(report: Callable[[float], None]) -> Adoption:
-                return self._adopted(what_if, request, force, report)
+                return self._adopted(fits, request, force, report)
             return self._begin('adopt', effect, work)
 
-    def _adopted(self, what_if: WhatIf, request: EffectRequest, force: bool,
+    def _adopted(self, fits: TickFits, request: EffectRequest, force: bool,
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
-        answer: Adoption = run_apart(
-            judged, what_if.model, request, what_if.recordings, list(self.validation.values()),
+        answer: Adoption = run_in_process(
+            judged, fits.model, request, fits.recordings, list(self.recordings.held_out.values()),
             force, self.diagnosis, report=lambda share: report(0.9 * share))
         if answer.adopted:
-            book = LedgerBook(self._entries(self.recordings), self._entries(self.validation))
-            after = WhatIf(book.entered(answer), what_if.recordings)
+            after = TickFits(self.recordings.book().entered(answer), fits.recordings)
             report(0.95)
             with self._lock:
-                if what_if is not self.what_if:
+                if fits is not self.fits:
                     raise SessionError('the model was changed while the effect was judged')
                 self.diagnosis = None
-                self._use(after, {name: tick for name, tick in self.shown.ticks.items()
+                self._use(after, {name: tick for name, tick in self.view_state.ticks.items()
                                   if name != request.name})
         self.last_adoption = answer
         return answer
-
-    def _entries(self, recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
-        return tuple(RecordingEntry.of(path, one) if path in self._files
-                     else RecordingEntry.of_samples(one) for path, one in recordings.items())
 
     def _await_diagnosis(self, report: Callable[[float], None]) -> None:
         """Wait for a diagnosis that is under way: an adoption would make it again."""
@@ -270,7 +476,7 @@ class Session(TickBoard):
         check_duration(duration)
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
-            found: DesignedMotion = run_apart(designed, model, self.what_if.recordings, duration,
+            found: DesignedMotion = run_in_process(designed, model, self.fits.recordings, duration,
                                               seed, report=report)
             self.experiment = found
             return found
@@ -284,7 +490,7 @@ class Session(TickBoard):
     def _begin(self, kind: str, of: str,
                work: Callable[[Callable[[float], None]], Any]) -> Job[Any]:
         self.cancel(kind)
-        self.jobs[kind] = Job(kind, of, work, lambda job: self.tell())
+        self.jobs[kind] = Job(kind, of, work, lambda job: self.notify())
         return self.jobs[kind].start()
 
     def undo(self, revision: int | None = None) -> Step:
@@ -301,7 +507,7 @@ class Session(TickBoard):
             values, step = without_last_step(self.model.values)
             model = replace(build_model(values), source=self.model.source)
             self.diagnosis = None
-            self._use(WhatIf(model, self.what_if.recordings), self.shown.ticks)
+            self._use(TickFits(model, self.fits.recordings), self.view_state.ticks)
             return step
 
     # What goes out
@@ -314,14 +520,14 @@ class Session(TickBoard):
         SessionError
             Where it is not evaluated yet, or where no model may have these values.
         """
-        shown = self.settle()
-        while not shown.is_settled:  # somebody ticked in between
-            shown = self.settle()
-        if not shown.ticks:
+        view = self.settle()
+        while not view.is_settled:  # somebody ticked in between
+            view = self.settle()
+        if not view.ticks:
             return self.model
-        if shown.exact is None:
-            raise SessionError(f'no model has these values: {shown.notice}')
-        return shown.exact.model
+        if view.exact is None:
+            raise SessionError(f'no model has these values: {view.notice}')
+        return view.exact.model
 
     def export(self, path: str | PathLike[str], with_ticked: bool = False) -> None:
         """Write the model with its ledger, or with what is ticked besides.
@@ -337,16 +543,16 @@ class Session(TickBoard):
     def to_dict(self) -> dict[str, Any]:
         """Return all that one screen shows, but for the curves."""
         with self._lock:
-            shown, diagnosis, adoption = self.shown, self.diagnosis, self.last_adoption
+            view, diagnosis, adoption = self.view_state, self.diagnosis, self.last_adoption
             called_for = {one.name for one in diagnosis.effects} if diagnosis else set()
             return {
-                'revision': self.revision, 'version': self.version, 'stage': shown.stage,
-                'is_settled': shown.is_settled, 'is_approximate': shown.is_approximate,
-                'departure': finite(shown.departure), 'notice': shown.notice,
+                'revision': self.revision, 'version': self.version, 'stage': view.stage,
+                'is_settled': view.is_settled, 'is_approximate': view.is_approximate,
+                'departure': finite(view.departure), 'notice': view.notice,
                 'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
                 'errors': {name: one.to_dict() for name, one in self.errors().items()},
                 'overall': self.overall().to_dict(), **units_to_dict(self.model),
-                'effects': [effect_to_dict(shown, effect, self.model, effect.name in called_for)
+                'effects': [effect_to_dict(view, effect, self.model, effect.name in called_for)
                             for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'steps': [step.to_dict() for step in self.steps],
@@ -354,5 +560,5 @@ class Session(TickBoard):
                 'adoption': adoption.to_dict() if adoption else None,
                 'experiment': self.experiment.promise if self.experiment else None,
                 'recordings': recordings_to_dict(
-                    list(self.recordings.values()), self.what_if, self.now),
-                'held_out': [one.name for one in self.validation.values()]}
+                    list(self.recordings.fitted.values()), self.fits, self.now),
+                'held_out': [one.name for one in self.recordings.held_out.values()]}

@@ -9,6 +9,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -39,7 +40,7 @@ from pprs_dynamics.app.workbench.server.request_fields import (
     revision_of,
     text_of,
 )
-from pprs_dynamics.app.workbench.shown import units_to_dict
+from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.motion_files import write_motion
 
@@ -60,18 +61,11 @@ def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -
         await run_in_threadpool(hub.stop)
 
     api = Api(hub, keys)
-    post = {'tick': api.tick, 'choose': api.choose, 'release': api.release, 'shares': api.shares,
-            'adopt': api.adopt, 'cancel': api.cancel, 'undo': api.undo, 'open': api.open,
-            'experiment': api.experiment, 'invite': api.invite, 'live/set': api.live_set,
-            'live/take': api.live_take}
-    get = {'screen': api.screen, 'curves': api.curves, 'scatter': api.scatter,
-           'robot': api.robot, 'files': api.files, 'live': api.live, 'model.yaml': api.model,
-           'ledger.json': api.ledger, 'experiment.csv': api.experiment_file}
     routes = [Route('/', page), Route('/static/{name}', asset), Route('/api/events', api.events),
               Route(UPLOAD, api.upload, methods=['POST']),
-              *(Route(f'/api/{name}', in_thread(work)) for name, work in get.items()),
-              *(Route(f'/api/{name}', with_body(work), methods=['POST'])
-                for name, work in post.items())]
+              *(Route(f'/api/{path}', in_thread(work)) for path, work in api.answers().items()),
+              *(Route(f'/api/{path}', with_body(work), methods=['POST'])
+                for path, work in api.changes().items())]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers={
         StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413)})
     return AccessControl(app, keys, {UPLOAD: MOST_UPLOADED}, used)
@@ -125,6 +119,19 @@ class Api:
 
     def __init__(self, hub: Hub, keys: Keys) -> None:
         self.hub, self.keys = hub, keys
+
+    def answers(self) -> dict[str, Callable[[Any], Response]]:
+        """Return what is asked for by GET, with a query."""
+        return {'model.yaml': self.model, 'ledger.json': self.ledger,
+                'experiment.csv': self.experiment_file, **{work.__name__: work for work in (
+                    self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
+
+    def changes(self) -> dict[str, Callable[[Any], Response]]:
+        """Return what is asked for by POST, with a JSON object."""
+        return {'live/set': self.live_set, 'live/take': self.live_take,
+                **{work.__name__: work for work in (
+                    self.tick, self.choose, self.release, self.shares, self.adopt, self.cancel,
+                    self.undo, self.open, self.experiment, self.invite)}}
 
     def screen(self, query: Any) -> Response:
         """Answer what of the screen changed since a version, the errors now where they did."""
@@ -185,7 +192,7 @@ class Api:
         else:
             drive = body.get('drive')
             mask = session.span(*range_of(body, 'time'), None if drive is None else [str(drive)])
-        return JSONResponse({'shares': [one.to_dict() for one in session.shares(mask)],
+        return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
 
@@ -243,7 +250,7 @@ class Api:
             raise BadRequestError(f'drive must be one of {", ".join(session.drives)}')
         d = session.drives.index(query['drive'])
         with session.steady():
-            x, y = (quantity(session.what_if, session.shown, query.get(axis, ''), d)
+            x, y = (quantity(session.fits, session.view_state, query.get(axis, ''), d)
                     for axis in ('x', 'y'))
         step = max(1, -(-len(x) // MOST_POINTS))
         return binary({}, {'x': x[::step], 'y': y[::step]})
@@ -308,7 +315,7 @@ class Api:
     async def events(self, request: Request) -> Response:
         """Tell the page, whenever something changed, how often so far."""
         async def lines() -> AsyncIterator[bytes]:
-            queue = self.hub.listen()
+            queue = self.hub.subscribe()
             try:
                 yield b'data: 0\n\n'
                 while True:
@@ -316,5 +323,5 @@ class Api:
                         await asyncio.wait_for(queue.get(), HEARTBEAT)
                     yield b'data: %d\n\n' % self.hub.count
             finally:
-                self.hub.leave(queue)
+                self.hub.unsubscribe(queue)
         return StreamingResponse(lines(), media_type='text/event-stream')

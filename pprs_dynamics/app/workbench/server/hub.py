@@ -80,7 +80,7 @@ class Hub:
         self._ends = False
         self._waiting: set[asyncio.Queue[None]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._what_if: object = None
+        self._fits: object = None
         self._diagnosed: object = None  # once for each model, also where it fails
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
@@ -111,17 +111,17 @@ class Hub:
 
     # Those who listen
 
-    def listen(self) -> asyncio.Queue[None]:
+    def subscribe(self) -> asyncio.Queue[None]:
         """Return a queue that gets an entry after changes; to be called in the loop."""
         queue: asyncio.Queue[None] = asyncio.Queue(1)
         self._waiting.add(queue)
         return queue
 
-    def leave(self, queue: asyncio.Queue[None]) -> None:
+    def unsubscribe(self, queue: asyncio.Queue[None]) -> None:
         """Listen no more."""
         self._waiting.discard(queue)
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         """Tell all browsers that something changed."""
         self.count += 1
         if self._loop is not None and not self._loop.is_closed():
@@ -195,13 +195,13 @@ class Hub:
         session.subscribe(self._changed)
 
     def _changed(self) -> None:
-        what_if = self.session.what_if if self.session is not None else None
-        if what_if is not self._what_if:
+        fits = self.session.fits if self.session is not None else None
+        if fits is not self._fits:
             # Times and the error before are others: browsers fetch them again.
-            self._what_if = what_if
+            self._fits = fits
             self.generation += 1
         self._work.set()
-        self.tell()
+        self.notify()
 
     def _run(self) -> None:
         """Settle after every change; look for what is missing once nothing happens."""
@@ -224,13 +224,13 @@ class Hub:
             session = self.session
             if session is None or self._ends:
                 continue
-            if not session.shown.is_settled:
+            if not session.view_state.is_settled:
                 try:
                     session.settle()
                     self.failure = ''
                 except Exception as error:
                     self._fail(error)
-                    self.tell()
+                    self.notify()
 
     def _find_mistakes(self) -> None:
         """Look at units and signs of what the command line gave, once the page stands."""
@@ -240,7 +240,7 @@ class Hub:
                 self.session.find_mistakes()
             except PprsError as error:
                 self.failure = str(error)
-                self.tell()
+                self.notify()
 
     def _fail(self, error: Exception) -> None:
         """Say on the page what went wrong; a defect of ours stands in the terminal as well."""
@@ -251,7 +251,7 @@ class Hub:
 
     def _diagnose(self) -> None:
         session = self.session
-        if session is not None and session.what_if is not self._diagnosed and not any(
+        if session is not None and session.fits is not self._diagnosed and not any(
                 job.is_running for job in session.jobs.values()):
-            self._diagnosed = session.what_if
+            self._diagnosed = session.fits
             session.diagnose()

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.workbench.what_if import Exact, Offer, Tick, WhatIf
+from pprs_dynamics.app.workbench.tick_fits import Exact, Offer, Tick, TickFits
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.estimates import Estimate
@@ -62,14 +62,9 @@ class Share:
     explained: float
     net: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {'effect': self.effect, 'drives': self.drives and list(self.drives),
-                'explained': self.explained, 'net': self.net}
-
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ViewState:
     """A moment.
 
     Parameters
@@ -129,23 +124,23 @@ class Shown:
             tick.effect.bends_columns for tick in self.ticks.values())
 
 
-def effect_to_dict(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
+def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
                    is_called_for: bool) -> dict[str, Any]:
     """Return all that is shown of one effect."""
     card, drives = effect.card_in(model.kind), model.drives
-    tick = shown.ticks.get(effect.name)
-    offer = next((one for one in shown.offers if one.candidate.effect is effect), None)
+    tick = view.ticks.get(effect.name)
+    offer = next((one for one in view.offers if one.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None
-    evidence = shown.evidence.get(effect.name) if tick else offer.evidence if offer else None
+    evidence = view.evidence.get(effect.name) if tick else offer.evidence if offer else None
     return {
         'name': effect.name, 'is_ticked': tick is not None,
         'drives': None if candidate is None else names_of(candidate, drives),
         'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
-        'evidence_is_pending': (shown.stage == LINEAR if tick else not shown.has_offers),
+        'evidence_is_pending': (view.stage == LINEAR if tick else not view.has_offers),
         'bends_columns': effect.bends_columns, 'is_called_for': is_called_for,
         'equation': card.equation, 'looks_like': card.looks_like,
         'causes': card.causes, 'confirm': card.confirm,
-        'parameters': _parameters(shown, effect, model) if tick else []}
+        'parameters': _parameters(view, effect, model) if tick else []}
 
 
 def units_to_dict(model: ForceModel) -> dict[str, Any]:
@@ -156,16 +151,16 @@ def units_to_dict(model: ForceModel) -> dict[str, Any]:
         for drive, unit in zip(model.drives, model.units, strict=True)}}
 
 
-def _parameters(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
+def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
                 ) -> list[dict[str, Any]]:
     drives = model.drives
     units = dict(zip(drives, model.units, strict=True))
-    tick = shown.ticks[effect.name]
+    tick = view.ticks[effect.name]
     chosen = {name if d is None else f'{drives[d]}.{name}' for d, name in tick.chosen}
     known = {parameter.name: parameter for parameter in effect.parameters}
     shapes = {parameter.name for parameter in effect.shape}
     rows = []
-    for key, one in shown.estimates.get(effect.name, {}).items():
+    for key, one in view.estimates.get(effect.name, {}).items():
         parameter = known[key.rpartition('.')[2]]
         rows.append({
             'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
@@ -177,17 +172,17 @@ def _parameters(shown: Shown, effect: type[CatalogueEffect], model: ForceModel,
     return rows
 
 
-def recordings_to_dict(recordings: Sequence[Recording], what_if: WhatIf, now: Array,
+def recordings_to_dict(recordings: Sequence[Recording], fits: TickFits, now: Array,
                        ) -> list[dict[str, Any]]:
     """Return every recording with its times and its error before and now."""
     found, first = [], 0
-    time = what_if.design.residuals.time
-    for recording, one in zip(recordings, what_if.design.reconstructions, strict=True):
+    time = fits.design.residuals.time
+    for recording, one in zip(recordings, fits.design.reconstructions, strict=True):
         part = slice(first, first + len(one.treat.starts))
         first = part.stop
         found.append({
             'name': recording.name, 'start': float(time[part][0]), 'end': float(time[part][-1]),
-            'before': finite(rms(what_if.before[part])), 'now': finite(rms(now[part])),
+            'before': finite(rms(fits.before[part])), 'now': finite(rms(now[part])),
             'findings': [finding.text for finding in recording.findings]})
     return found
 

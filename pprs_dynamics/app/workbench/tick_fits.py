@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from threading import RLock
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -102,7 +104,7 @@ class Exact:
     parameters: dict[str, dict[str, Estimate]] | None = None
 
 
-class WhatIf:
+class TickFits:
     """Everything that ticks are answered from, for one model.
 
     Parameters
@@ -130,6 +132,7 @@ class WhatIf:
         self.design = Design.of(start, recordings)
         self.search = Search(self.design, decisions, with_unknown=False)
         self.none = self.search.evaluate(())
+        self._scanning = RLock()  # of the library
         self.measured = self.design.residuals.measured
         self.before = (self.design.residuals if start is model
                        else measure_residuals(model, recordings)[0]).error
@@ -141,23 +144,30 @@ class WhatIf:
 
     # Candidates
 
+    def candidates(self) -> list[type[CatalogueEffect]]:
+        """Return the effects that the model may lack, by name."""
+        design = self.design
+        return [effect for effect in catalogue().values() if self.model.offers(effect) and (
+            any(design.acts_on(effect, d) for d in range(len(self.drives)))
+            if issubclass(effect, DriveEffect)
+            else any(term.effect is effect for term in design.structure))]
+
     def offered(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 found: CandidateSet) -> EffectCandidate | None:
         """Return an effect on some drives, or where it pays best beside a set.
 
         In the best shape that a scan knows at the noise of the set; None where it cannot act.
         """
-        if drives is None or not issubclass(effect, DriveEffect):
-            made = [sets[-1] for sets in self._proposals(found)]
-            return next((c for c in made if isinstance(c, EffectCandidate)
-                         and c.effect is effect), None)
-        placements = []
-        for d in drives:
-            one = self._on_drive(effect, d, found)
-            if one is None:
-                return None
-            placements.append(one)
-        return self.search.library.candidate(effect, placements) if placements else None
+        with self._scanning:
+            if drives is None or not issubclass(effect, DriveEffect):
+                made = [sets[-1] for sets in self._proposals(found)]
+                return next((c for c in made if isinstance(c, EffectCandidate)
+                             and c.effect is effect), None)
+            placements = [one for d in drives
+                          if (one := self._on_drive(effect, d, found)) is not None]
+        if not placements or len(placements) < len(drives):
+            return None
+        return self.search.library.candidate(effect, placements)
 
     def _on_drive(self, effect: type[DriveEffect], d: int, found: CandidateSet,
                   ) -> Placement | None:
@@ -178,13 +188,11 @@ class WhatIf:
         there = {c.effect for c in found.effects}
         # A fit that was ended before it stood still has the deviance of the noise before.
         found = self.at(found.effects, found)
-        offers = []
-        for proposed in self._proposals(found):
-            candidate = proposed[-1]
-            assert isinstance(candidate, EffectCandidate)
-            if candidate.effect not in there:
-                offers.append(self.offer(found, candidate))
-        return sorted(offers, key=lambda one: -one.evidence)
+        with self._scanning:
+            proposed = [sets[-1] for sets in self._proposals(found)]
+            return sorted((self.offer(found, one) for one in proposed
+                           if isinstance(one, EffectCandidate) and one.effect not in there),
+                          key=lambda one: -one.evidence)
 
     def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
         """Return what one candidate would gain beside a set at its noise."""

@@ -21,7 +21,7 @@ from pprs_dynamics.errors import PprsError
 
 SHARE, RESULT, ERROR = 'share', 'result', 'error'
 PATIENCE = 0.2  # [s] between looks whether the work was called off
-START = 'from pprs_dynamics.app.workbench.apart import main; main()'
+START = 'from pprs_dynamics.app.workbench.worker_process import main; main()'
 NICENESS = 2  # whoever clicks comes first
 
 
@@ -29,7 +29,8 @@ class EndedError(PprsError, RuntimeError):
     """Work whose process ended without an answer."""
 
 
-def run_apart(work: Callable[..., Any], *arguments: Any, report: Callable[[float], None]) -> Any:
+def run_in_process(work: Callable[..., Any], *arguments: Any,
+                   report: Callable[[float], None]) -> Any:
     """Return work(*arguments, progress), computed in another process.
 
     Parameters
