@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Dynamics of the 3-PPRS parallel robot with friction in every joint."""
+"""Forces of parallel robots with friction in every joint, and which effect a model lacks.
+
+What stands here is stable; what is behind it may move.
+"""
 
 from __future__ import annotations
 
@@ -9,34 +12,106 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pprs_dynamics.errors import PprsError
+    from pprs_dynamics.app.front_door.adopt import (
+        AdoptionResult,
+        AdoptionRunResult,
+        adopt,
+        adopt_all,
+    )
+    from pprs_dynamics.app.front_door.compare import ComparisonResult, compare
+    from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
+    from pprs_dynamics.app.front_door.fit import FitResult, fit
+    from pprs_dynamics.app.front_door.next_experiment import ExperimentResult, next_experiment
+    from pprs_dynamics.app.front_door.simulate import SimulationResult, simulate
+    from pprs_dynamics.app.workbench.session import Session
+    from pprs_dynamics.arrays import Array
+    from pprs_dynamics.errors import (
+        ConvergenceError,
+        EffectError,
+        LimitError,
+        MissingLibraryError,
+        ModelError,
+        MotionError,
+        PprsError,
+        SingularityError,
+        UnknownNameError,
+        UnreadableFileError,
+        WorkspaceError,
+    )
+    from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
+    from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+    from pprs_dynamics.measurement.files.recording import (
+        Recording,
+        read_recording,
+        write_recording,
+    )
+    from pprs_dynamics.physics.effects.drive_effect import (
+        DriveEffect,
+        DriveRange,
+        DriveSamples,
+        MeasurementEffect,
+    )
+    from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
+    from pprs_dynamics.physics.effects.structure_effect import StructureEffect
     from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+    from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
     from pprs_dynamics.physics.model.arm_model import ArmModel
     from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
     from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
-    from pprs_dynamics.physics.model.model_file import load_model
+    from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-__all__ = ['ArmModel', 'AxisModel', 'AxisMotion', 'DriveForces', 'DriveModel', 'JointMotion',
-           'ModelState', 'PlatformMotion', 'PprsError', 'load_model']
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array', 'AxisModel',
+           'AxisMotion', 'Card', 'CatalogueEffect', 'ComparisonResult', 'ConvergenceError',
+           'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel', 'DriveRange',
+           'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult', 'FitResult',
+           'HelicalPath', 'JointMotion', 'LimitError', 'MeasurementEffect', 'MissingLibraryError',
+           'ModelError', 'ModelState', 'MotionError', 'MotionLimits', 'Parameter',
+           'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
+           'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
+           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'compare', 'diagnose', 'fit',
+           'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
-    'ArmModel': 'pprs_dynamics.physics.model.arm_model',
-    'AxisModel': 'pprs_dynamics.physics.model.axis_model',
-    'AxisMotion': 'pprs_dynamics.physics.model.axis_model',
-    'JointMotion': 'pprs_dynamics.physics.mechanism.joint_motion',
-    'DriveForces': 'pprs_dynamics.physics.model.drive_model',
-    'DriveModel': 'pprs_dynamics.physics.model.drive_model',
-    'ModelState': 'pprs_dynamics.physics.model.drive_model',
-    'PlatformMotion': 'pprs_dynamics.physics.mechanism.motion',
-    'PprsError': 'pprs_dynamics.errors',
-    'load_model': 'pprs_dynamics.physics.model.model_file',
+    'app.front_door.adopt': ('AdoptionResult', 'AdoptionRunResult', 'adopt', 'adopt_all'),
+    'app.front_door.compare': ('ComparisonResult', 'compare'),
+    'app.front_door.diagnose': ('DiagnosisResult', 'diagnose'),
+    'app.front_door.fit': ('FitResult', 'fit'),
+    'app.front_door.next_experiment': ('ExperimentResult', 'next_experiment'),
+    'app.front_door.simulate': ('SimulationResult', 'simulate'),
+    'app.workbench.session': ('Session',),
+    'arrays': ('Array',),
+    'errors': (
+        'ConvergenceError', 'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
+        'MotionError', 'PprsError', 'SingularityError', 'UnknownNameError', 'UnreadableFileError',
+        'WorkspaceError'),
+    'inference.experiments.arm_motions': ('ArmLimits',),
+    'inference.experiments.motion_limits': ('MotionLimits',),
+    'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
+    'physics.effects.drive_effect': (
+        'DriveEffect', 'DriveRange', 'DriveSamples', 'MeasurementEffect'),
+    'physics.effects.effect': ('Card', 'CatalogueEffect', 'Parameter'),
+    'physics.effects.structure_effect': ('StructureEffect',),
+    'physics.mechanism.joint_motion': ('JointMotion',),
+    'physics.mechanism.motion': ('PlatformMotion',),
+    'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
+    'physics.model.arm_model': ('ArmModel',),
+    'physics.model.axis_model': ('AxisModel', 'AxisMotion'),
+    'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
+    'physics.model.model_file': ('build_model', 'load_model'),
 }
+_MODULES = {name: f'{__name__}.{module}' for module, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    return getattr(import_module(_HOMES[name]), name)
+    value = getattr(import_module(_MODULES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

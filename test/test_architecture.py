@@ -37,7 +37,7 @@ FLOORS = {
     'measurement': ['files', 'motion', 'residuals'],
     'inference': ['regression', 'search', 'fit', 'diagnosis', 'adoption', 'experiments'],
     'ros': ['messages', 'node'],
-    'app': ['fleet', 'report', 'workbench', 'commands'],
+    'app': ['fleet', 'report', 'front_door', 'workbench', 'commands'],
 }
 # The 3-PPRS' compiled motion stands behind the motion of any platform, and its spatial algebra
 # behind an arm's.

@@ -19,9 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics import Array, Card, DriveEffect, DriveRange, DriveSamples, Parameter
 
 
 class EddyBrake(DriveEffect):

@@ -19,9 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.signal import lfilter
 
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics import Array, Card, DriveRange, MeasurementEffect, Parameter
 
 
 class EffortFilter(MeasurementEffect):

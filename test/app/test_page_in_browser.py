@@ -18,7 +18,7 @@ from made_up_pages import made_up_pages
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
-from pprs_dynamics.app.report.robot_view import write_robot_page
+from pprs_dynamics.app.report.robot_view import robot_page
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -69,9 +69,8 @@ READABLE = '''() => {
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp('pages')
     path = Excitation(duration=4.0, seed=1)
-    write_robot_page(folder / 'robot.html', DriveModel.load(),
-                     path.motion(np.arange(0.0, 4.0, 0.02)), 'The robot')
-    return {'robot': folder / 'robot.html',
+    robot = robot_page(DriveModel.load(), path.motion(np.arange(0.0, 4.0, 0.02)), 'The robot')
+    return {'robot': robot.write(folder / 'robot.html'),
             **{name: page.write(folder / f'{name}.html')
                for name, page in made_up_pages(folder).items()}}
 

@@ -8,16 +8,11 @@ from __future__ import annotations
 import argparse
 
 from pprs_dynamics.app.commands.arguments import PAGE, add_details, output_file
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, given_files, read_recordings
-from pprs_dynamics.app.report.comparison_page import comparison_page
-from pprs_dynamics.app.report.progress import progress_bar
-from pprs_dynamics.app.report.tables import comparison_view
-from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.inference.diagnosis.comparison import compare
-from pprs_dynamics.inference.diagnosis.localisation import localise
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.app.commands.output import tell
+from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
+from pprs_dynamics.app.front_door.compare import compare
+from pprs_dynamics.app.report.progress import staged_bar
+from pprs_dynamics.app.report.terminal import console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,18 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(options.model)
-    recordings = read_recordings(options, screen, model)
-    with progress_bar(screen, 'motion and model') as progress:
-        residuals, notes = measure_residuals(model, recordings, progress)
-    with progress_bar(screen, 'where it fails') as progress:
-        where = localise(residuals, progress=lambda share: progress(share, 1.0))
-    comparison = compare(residuals, where)
-    command = given_files(options).command('diagnose', '--report', 'why.html')
-    screen.print(comparison_view(comparison, command, options.details))
-    if options.json:
-        write_json(options.json, {**comparison.to_dict(), 'verdict': comparison.verdict})
-    if options.report:
-        page = comparison_page(model, recordings, residuals, comparison, notes, command)
-        screen.print(f'page: {shown(page.write(options.report))}')
+    inputs = read_inputs(options, screen)
+    with staged_bar(screen) as progress:
+        result = compare(inputs.model, inputs, progress=progress)
+    tell(result, options, screen)
     return 0

@@ -6,33 +6,16 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
-from pprs_dynamics.app.commands.adopt_all import adopt_what_was_found
-from pprs_dynamics.app.commands.arguments import (
-    MODEL,
-    PAGE,
-    add_details,
-    output_file,
-)
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import (
-    add_recordings,
-    add_validation,
-    given_files,
-    read_recordings,
-    read_validation,
-)
-from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
-from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
-from pprs_dynamics.app.report.progress import progress_bar
+from pprs_dynamics.app.commands.arguments import MODEL, PAGE, add_details, output_file
+from pprs_dynamics.app.commands.output import tell, write_json
+from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
+from pprs_dynamics.app.front_door.adopt import adopt_all
+from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
+from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.diagnosis.rivals import rival_effects
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.inference.diagnosis.what_if import what_if
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.physics.model.model_file import load_model
 
 
 class OptionsError(PprsError, ValueError):
@@ -56,25 +39,30 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     _check(options)
     screen = console()
-    model = load_model(options.model)
-    recordings = read_recordings(options, screen, model)
-    validate = read_validation(options, screen, model, recordings)
-    with progress_bar(screen, 'diagnosing') as progress:
-        diagnosis = diagnose(model, recordings, validate, lambda share: progress(share, 1.0))
-    rivals = rival_effects(diagnosis, validate)
-    words = word_diagnosis(diagnosis, given_files(options), rivals)
-    screen.print(diagnosis_view(diagnosis, words, options.details))
+    inputs = read_inputs(options, screen)
+    with staged_bar(screen) as progress:
+        result = diagnose(inputs.model, inputs, progress=progress)
+    tell(result, options, screen)
+    return _adopt_all(result, options, screen) if options.adopt_all else 0
+
+
+def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: Any) -> int:
+    """Adopt step by step, write the model file, and return the exit status.
+
+    With nothing to adopt the file is written as it was; with a refusal, what was adopted before
+    it, if anything.
+    """
+    inputs = diagnosis.inputs
+    with staged_bar(screen) as progress:
+        result = adopt_all(inputs.model, inputs, diagnosis=diagnosis, progress=progress)
+    screen.print(result.view(options.details))
     if options.json:
-        write_json(options.json, diagnosis.to_dict())
-    if options.report:
-        with progress_bar(screen, 'page') as progress:
-            after, _ = measure_residuals(diagnosis.adopted, recordings, progress)
-            page = diagnosis_page(diagnosis, words, after, [one.name for one in recordings],
-                                  [one.name for one in validate], rivals, what_if(diagnosis))
-        screen.print(f'page: {shown(page.write(options.report))}')
-    if options.adopt_all:
-        return adopt_what_was_found(options, model, recordings, validate, diagnosis, screen)
-    return 0
+        write_json(options.json, {**diagnosis.to_dict(), 'adoption': result.to_dict()})
+    count = len(result.run.adopted)
+    if count or not result.refused:
+        result.save(options.output)
+        screen.print(f'model, {count} effect{"s" * (count != 1)} added: {shown(options.output)}')
+    return int(result.refused)
 
 
 def _check(options: argparse.Namespace) -> None:

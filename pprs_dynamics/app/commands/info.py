@@ -9,7 +9,9 @@ import argparse
 from dataclasses import asdict
 
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, read_each
+from pprs_dynamics.app.commands.recordings import add_recordings
+from pprs_dynamics.app.front_door.inputs import read_checked
+from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.tables import recording_table
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.measurement.files.recording import describe
@@ -26,7 +28,9 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = load_model(options.model)
-    recordings = read_each(options.recordings, options, screen, model)
+    with staged_bar(screen) as progress:
+        recordings = [read_checked(model, path, options.topic, progress)
+                      for path in options.recordings]
     summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
         for table in recording_table(summary, model.units):

@@ -6,21 +6,17 @@
 from __future__ import annotations
 
 import argparse
+import math
 import shlex
-from typing import Any
 
-import numpy as np
 from rich.markup import escape
 
 from pprs_dynamics.app.commands.arguments import PAGE, POSES, number, output_file, seed
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, read_recordings
-from pprs_dynamics.app.report.experiment_page import experiment_page
-from pprs_dynamics.app.report.experiment_tables import experiment_view
-from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.progress import progress_bar
+from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
+from pprs_dynamics.app.front_door.next_experiment import RATE, next_experiment
+from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.inference.experiments.arm_excitation import excite_arm
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import (
@@ -28,17 +24,12 @@ from pprs_dynamics.inference.experiments.next_experiment import (
     PURPOSES,
     SHORTEST,
     check_purpose,
-    next_experiment,
 )
-from pprs_dynamics.measurement.files.motion_files import write_motion
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
+from pprs_dynamics.physics.model.force_model import ForceModel
 
-RATE = 100.0  # [Hz], the default of play_trajectory
-FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
 LEAST_NOISE = 1e-6  # [N]; what is finer no sensor of forces resolves
+FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
 LIMITS = MotionLimits()
 PLAYED = 'positions, velocities and accelerations of its joints'
 
@@ -63,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--acceleration', type=number(0.0, 1e4, 'm/s^2', above=True),
                         default=LIMITS.acceleration,
                         help=f'limit of every drive [m/s^2] (default {LIMITS.acceleration:g})')
-    parser.add_argument('--tilt', type=number(0.0, np.pi, 'rad', above=True), default=LIMITS.tilt,
+    parser.add_argument('--tilt', type=number(0.0, math.pi, 'rad', above=True), default=LIMITS.tilt,
                         help=f'limit of the platform [rad] (default {LIMITS.tilt:g})')
     parser.add_argument('--condition', type=number(1.0, 1e6), default=LIMITS.condition_number,
                         help='limit of the condition number, where the model file allows more '
@@ -82,41 +73,21 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     check_purpose(options.purpose, options.recordings)
-    base = find_file(options.model)
-    model: DriveModel | ArmModel
-    limits: MotionLimits | ArmLimits
-    if is_mechanism(read_parameters(base)):
-        model = ArmModel.load(base)
-        limits = ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
-                           options.margin)
-    else:
-        model = DriveModel.load(base)
-        limits = MotionLimits(options.velocity or LIMITS.velocity, options.acceleration,
-                              options.tilt, options.condition, options.margin)
-    if isinstance(limits, ArmLimits) and options.purpose == 'commission':
-        assert isinstance(model, ArmModel)
-        return _excite_arm(options, model, limits, screen)
-    recordings = read_recordings(options, screen, model)
-    with progress_bar(screen, 'designing') as progress:
-        experiment = next_experiment(
-            model, recordings, options.purpose, limits, options.duration, options.seed,
-            options.noise, lambda share: progress(share, 1.0))
-    count = int(options.duration * options.rate + 1e-9) + 1
-    motion = experiment.motion(np.arange(count) / options.rate)
-    screen.print(experiment_view(experiment))
-    write_motion(options.output, model.drives, motion)
-    command = ''
-    if not isinstance(model, ArmModel):
-        command = shlex.join([
-            'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
-            '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
+    inputs = read_inputs(options, screen)
+    with staged_bar(screen) as progress:
+        result = next_experiment(
+            inputs.model, inputs, purpose=options.purpose, limits=_limits(options, inputs.model),
+            duration=options.duration, seed=options.seed, noise=options.noise,
+            rate=options.rate, progress=progress)
+    screen.print(result.view())
+    result.save(options.output)
+    command = '' if isinstance(inputs.model, ArmModel) else shlex.join([
+        'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
+        '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     if options.json:
-        write_json(options.json, {**experiment.to_dict(), 'purpose': options.purpose,
-                                  'seed': options.seed, 'rate': options.rate,
-                                  'output': options.output})
+        write_json(options.json, {**result.to_dict(), 'output': options.output})
     if options.report:
-        page = experiment_page(experiment, motion, command)
-        screen.print(f'page: {shown(page.write(options.report))}')
+        screen.print(f'page: {shown(result.page(command).write(options.report))}')
     if command:
         screen.print(f'[bold]play it[/]: {escape(command)}')
     else:
@@ -125,25 +96,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _excite_arm(options: argparse.Namespace, model: ArmModel, limits: ArmLimits,
-                screen: Any) -> int:
-    """Design the first motion of an arm."""
-    with progress_bar(screen, 'designing') as progress:
-        found = excite_arm(model, limits, options.duration, options.seed,
-                           lambda share: progress(share, 1.0))
-    count = int(options.duration * options.rate + 1e-9) + 1
-    write_motion(options.output, model.drives, found.motion(np.arange(count) / options.rate))
-    screen.print(escape(found.text))
-    screen.print('limits, of what their margin leaves: ' + ', '.join(
-        f'{name} {share:.0%}' for name, share in found.limits.items()))
-    if options.json:
-        write_json(options.json, {**found.to_dict(), 'purpose': options.purpose,
-                                  'seed': options.seed, 'rate': options.rate,
-                                  'output': options.output})
-    if options.report:
-        page = Page('The next experiment')
-        page.text(found.text, 'lead')
-        page.table(('limit', 'use'), [(name, f'{share:.0%}')
-                                      for name, share in found.limits.items()])
-        screen.print(f'page: {shown(page.write(options.report))}')
-    return 0
+def _limits(options: argparse.Namespace, model: ForceModel) -> MotionLimits | ArmLimits:
+    if isinstance(model, ArmModel):
+        return ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
+                         options.margin)
+    return MotionLimits(options.velocity or LIMITS.velocity, options.acceleration, options.tilt,
+                        options.condition, options.margin)

@@ -5,11 +5,15 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pprs_dynamics.app.front_door.result import Result
+from pprs_dynamics.app.report.progress import staged_bar
+from pprs_dynamics.app.report.terminal import shown
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -32,6 +36,18 @@ def write_json(path: str | PathLike[str], content: Any) -> None:
     Names of files that are not UTF-8 become what `displayed` makes of them.
     """
     write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + '\n')
+
+
+def tell(result: Result, options: argparse.Namespace, screen: Any) -> None:
+    """Print a result, and write what --json and --report ask for."""
+    screen.print(result.view(options.details))
+    if options.json:
+        write_json(options.json, result.to_dict())
+    if options.report:
+        with staged_bar(screen) as progress:
+            progress('page', 0.0)
+            page = result.report(options.report)
+        screen.print(f'page: {shown(page)}')
 
 
 def _plain(content: Any) -> Any:

@@ -9,36 +9,24 @@ Runs the physics-engine robot without ROS, faster than real time, and writes wha
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.app.commands.arguments import PAGE, RECORDING, number, output_file, seed
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.report.progress import progress_bar
-from pprs_dynamics.app.report.robot_view import write_robot_page
+from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
+from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.measurement.files.pose_files import read_poses
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.arm_forms import NAMES as ARM_EFFECTS
-from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
-from pprs_dynamics.simulation.arm_run import simulate_arm
-from pprs_dynamics.simulation.drive_control import ControlSettings
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM, draw_effects
-from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
-from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM
 
-RATE = 500.0
-NOISE = 0.08  # [N]
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
-FEEDFORWARDS = ('friction', 'rigid_body', 'none')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,69 +59,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    if is_mechanism(read_parameters(find_file(options.model))):
-        return _run_arm(options, screen)
-    model = DriveModel.load(options.model)
-    motion = _motion(options)
-    forces = model.drive_forces(motion)
-    model.limits.check_strokes(forces.mechanism.position)
-    rng = np.random.default_rng(options.seed)
-    effects = draw_effects(options.effect, rng, options.scale)
-    effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
-    with progress_bar(screen, 'simulating') as progress:
+    model = load_model(find_file(options.model))
+    motion = None if isinstance(model, ArmModel) else _motion(options)
+    with staged_bar(screen) as progress:
         result = simulate(
-            model, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
-                                  effort[options.feedforward]),
-            effects, seed=options.seed, rate=RATE, truth=False,
-            control=ControlSettings(gravity_compensation=options.feedforward == 'none'),
-            sensors=SensorSettings.with_effort_noise(
-                NOISE if options.noise is None else options.noise),
-            progress=lambda share: progress(share, 1.0))
-    write_recording(options.output, Recording.from_arrays(
-        Path(options.output).name, result.time, result.position, result.velocity, result.effort))
-    for note in result.notes:
-        screen.print(f'[yellow]{note.time:.2f} s {note.code}[/]: {shown(note.message)}')
+            model, options.effect, seed=options.seed, scale=options.scale, motion=motion,
+            duration=options.duration, path_seed=options.path_seed, noise=options.noise,
+            feedforward=options.feedforward, progress=progress)
+    result.save(options.output)
+    screen.print(result.view())
+    if options.json:
+        write_json(options.json, {'recording': options.output, **result.to_dict()})
     if options.report:
-        write_robot_page(options.report, model, motion, 'The simulated motion')
-    if options.json:
-        write_json(options.json, _content(options, result))
-    hidden = f'{len(effects)} hidden effect{"s" * (len(effects) != 1)}'
-    screen.print(f'{len(result.time)} samples at {RATE:g} Hz, {hidden}: {shown(options.output)}')
+        screen.print(f'page: {shown(result.report(options.report))}')
+    screen.print(f'recording: {shown(options.output)}')
     return 0
 
 
-def _run_arm(options: argparse.Namespace, screen: Any) -> int:
-    """Simulate an arm along a random motion."""
-    model = ArmModel.load(options.model)
-    with progress_bar(screen, 'simulating') as progress:
-        result = simulate_arm(
-            model, options.effect, options.seed, options.scale, options.noise, options.duration,
-            options.path_seed, lambda share: progress(share, 1.0))
-    assert result.motion.time is not None
-    write_recording(options.output, Recording.from_arrays(
-        Path(options.output).name, result.motion.time, result.position, None, result.effort,
-        model.drives))
-    if options.json:
-        write_json(options.json, {
-            'recording': options.output, 'samples': len(result.position), 'rate': ARM_RATE,
-            'seed': options.seed, 'effects': list(result.effects), 'notes': []})
-    hidden = f'{len(result.effects)} hidden effect{"s" * (len(result.effects) != 1)}'
-    screen.print(f'{len(result.position)} samples at {ARM_RATE:g} Hz, {hidden}: '
-                 f'{shown(options.output)}')
-    return 0
-
-
-def _motion(options: argparse.Namespace) -> PlatformMotion:
-    if options.path not in ('helix', 'excitation'):
-        return read_poses(options.path).resampled(RATE)
-    path: HelicalPath | Excitation = HelicalPath()
+def _motion(options: argparse.Namespace) -> PlatformMotion | None:
     if options.path == 'excitation':
-        path = Excitation(duration=options.duration, seed=options.path_seed)
+        return None
+    if options.path != 'helix':
+        return read_poses(options.path).resampled(RATE)
+    path = HelicalPath()
     return path.motion(np.arange(0.0, path.duration, 1 / RATE))
-
-
-def _content(options: argparse.Namespace, result: SimulatedRun) -> dict[str, object]:
-    return {'recording': options.output, 'samples': len(result.time), 'rate': RATE,
-            'seed': options.seed, 'effects': result.effects,
-            'notes': [{'time': note.time, 'code': note.code, 'message': note.message}
-                      for note in result.notes]}

@@ -15,6 +15,7 @@ from rich.panel import Panel
 from rich.table import Table
 
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
+from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import counted, in_unit, plain, with_uncertainty
 
 MOST_SHOWN = 6  # values without --details
@@ -24,6 +25,13 @@ MOST_REMARKS = 2
 def adoption_view(answer: Adoption, details: bool = False) -> Group:
     """Return what the terminal shows, most important first; all there is with `details`."""
     return Group(*(_parts if details else _brief)(answer))
+
+
+def run_view(run: AdoptionRun, details: bool = False) -> Group:
+    """Return what was adopted and refused, a line each, or all of each, and why it ended."""
+    steps = [adoption_view(step, True) if details else escape(headline(step))
+             for step in run.steps]
+    return Group(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
 
 
 def _brief(answer: Adoption) -> Iterator[Any]:

@@ -18,6 +18,7 @@ from pprs_dynamics.app.report.experiment_tables import (
 from pprs_dynamics.app.report.page import Page, plotly_objects
 from pprs_dynamics.app.report.robot_view import animate_robot
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -67,6 +68,15 @@ def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Pag
                        'deviations; effects that may or may not be there each beside the model '
                        'alone. A number of an effect matters from the size in the fourth column; '
                        'for a number of the model that is what its tolerance says.')
+    return page
+
+
+def excitation_page(excitation: ArmExcitation) -> Page:
+    """Return the page of an arm's first motion."""
+    page = Page('The next experiment')
+    page.text(excitation.text, 'lead')
+    page.table(('limit', 'use'), [(name, f'{share:.0%}')
+                                  for name, share in excitation.limits.items()])
     return page
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 
 MOST_SHOWN = 12
@@ -31,6 +32,15 @@ def experiment_view(experiment: Experiment) -> Any:
     parts.append('limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share}' for name, share in used[:6]) + '; all others less')
     return Group(*parts)
+
+
+def excitation_view(excitation: ArmExcitation) -> Any:
+    """Return what an arm's first motion is for, and which limits it uses."""
+    from rich.console import Group
+    from rich.markup import escape
+
+    return Group(escape(excitation.text), 'limits, of what their margin leaves: ' + ', '.join(
+        f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 
 CONTEST_HEADINGS = ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance')

@@ -37,7 +37,16 @@ def number_rows(numbers: tuple[FittedNumber, ...]) -> list[tuple[str, ...]]:
              plain(2 * one.std) if isfinite(one.std) else '', one.unit) for one in numbers]
 
 
-def fit_table(model: ForceModel, fit: BaseFit) -> Any:
+def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
+    """Return what the terminal shows: errors and notes; with `details` every number."""
+    from rich.console import Group
+    from rich.markup import escape
+
+    return Group(_fit_table(model, fit), *map(escape, fit.told),
+                 *([_numbers_table(fit)] if details else []))
+
+
+def _fit_table(model: ForceModel, fit: BaseFit) -> Any:
     """Return the errors as a table of the terminal."""
     from rich.table import Table
 
@@ -49,7 +58,7 @@ def fit_table(model: ForceModel, fit: BaseFit) -> Any:
     return table
 
 
-def numbers_table(fit: BaseFit) -> Any:
+def _numbers_table(fit: BaseFit) -> Any:
     """Return every fitted number as a table of the terminal."""
     from rich.table import Table
 

@@ -9,8 +9,6 @@ grow as 1 / sin u_i. Rods are coloured by abs(sin u_i); the title gives the cond
 
 from __future__ import annotations
 
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -72,13 +70,11 @@ def animate_robot(model: DriveModel, motion: PlatformMotion, title: str) -> Any:
     return figure
 
 
-def write_robot_page(
-    path: str | PathLike[str], model: DriveModel, motion: PlatformMotion, title: str,
-) -> Path:
-    """Write the animation as one HTML file that needs no network."""
+def robot_page(model: DriveModel, motion: PlatformMotion, title: str) -> Page:
+    """Return the animation as a page."""
     page = Page(title)
     page.figure(animate_robot(model, motion, title), 'The robot in motion; it plays on request.')
-    return page.write(path)
+    return page
 
 
 def _rails(go: Any, model: DriveModel, joints: JointPositions, motion: PlatformMotion) -> list[Any]:

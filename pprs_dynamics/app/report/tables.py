@@ -14,6 +14,7 @@ from pprs_dynamics.inference.diagnosis.quantities import percent
 from pprs_dynamics.measurement.files.recording import Summary
 from pprs_dynamics.physics.mechanism.units import DriveUnits
 from pprs_dynamics.physics.model.reproduction import Claim
+from pprs_dynamics.simulation.drive_control import Note
 
 # Lines that places take without --details, and characters of a line of 80 columns, which words
 # seldom fill.
@@ -61,6 +62,16 @@ def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str])
 
 def _span(bounds: tuple[float, float] | None) -> str:
     return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
+
+
+def simulation_view(samples: int, rate: float, hidden: int, notes: Iterable[Note]) -> Any:
+    """Return what a simulation made and what happened on the way; not what was hidden."""
+    from rich.console import Group
+    from rich.markup import escape
+
+    return Group(*(f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}'
+                   for note in notes),
+                 f'{samples} samples at {rate:g} Hz, {hidden} hidden effect{"s" * (hidden != 1)}')
 
 
 EFFORTS = ('rms', 'bias', 'peak', 'noise')

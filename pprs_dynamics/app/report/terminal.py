@@ -5,10 +5,14 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.system.plain_text import PLAIN, displayed
+
+# A notebook's output cell: what it shows has the width and the font of a terminal.
+HTML = '<pre style="line-height:1.2;white-space:pre;overflow-x:auto">{code}</pre>'
 
 
 def console() -> Any:
@@ -27,6 +31,25 @@ def console() -> Any:
 
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False)
+
+
+def as_text(view: Any, width: int) -> str:
+    """Return what the terminal would show, without colours."""
+    screen = console()
+    screen.width = width
+    with screen.capture() as captured:
+        screen.print(view)
+    return str(captured.get()).rstrip('\n')
+
+
+def as_html(view: Any, width: int) -> str:
+    """Return what the terminal would show as HTML, with its colours."""
+    console()  # says what is missing
+    from rich.console import Console
+
+    screen = Console(record=True, width=width, file=io.StringIO(), emoji=False)
+    screen.print(view)
+    return screen.export_html(inline_styles=True, code_format=HTML)
 
 
 def shown(name: object) -> str:

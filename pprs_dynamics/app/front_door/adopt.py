@@ -1,0 +1,262 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Adding effects to a model, fitted and checked on data that they were not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from pprs_dynamics.app.front_door.diagnose import DiagnosisResult
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
+from pprs_dynamics.inference.adoption.adoption import Adoption
+from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
+from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
+from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_writer import write_model
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from pprs_dynamics.app.report.page import Page
+
+
+class RefusedError(PprsError, ValueError):
+    """A model of an adoption that was refused."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class AdoptionResult(Result):
+    """What `pprs adopt` says.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Model and recordings.
+    adoption : Adoption
+        The answer with all that it was decided from.
+    """
+
+    inputs: Inputs
+    adoption: Adoption
+
+    @property
+    def adopted(self) -> bool:
+        """Whether the model takes the effect."""
+        return self.adoption.adopted
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence."""
+        return self.adoption.reason
+
+    @cached_property
+    def model(self) -> ForceModel:
+        """The model with the effect and its entry in the ledger; as given, where it is refused."""
+        return self.inputs.ledger.entered(self.adoption) if self.adopted else self.inputs.model
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model file, with the comments and further keys of the one that was given.
+
+        Raises
+        ------
+        RefusedError
+            Where the effect was not adopted.
+        PprsError
+            Where it cannot be written, or is the file that was given.
+        """
+        if not self.adopted:
+            raise RefusedError(f'{self.adoption.effect} is refused: {self.reason}')
+        write_model(path, self.model.values, self.inputs.base)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `pprs adopt --json` writes."""
+        return self.adoption.to_dict()
+
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows."""
+        from pprs_dynamics.app.report.adoption_tables import adoption_view
+
+        return adoption_view(self.adoption, details)
+
+    def page(self, saved_as: str = 'better.yaml') -> Page:
+        """Return the page of `pprs adopt --report`; its next command names the file of `save`."""
+        from pprs_dynamics.app.report.adoption_page import adoption_page
+
+        return adoption_page(self.adoption, self.inputs.fitted, self.inputs.held_out,
+                             replace(self.inputs.files, model=saved_as).command(
+                                 'diagnose', held_out=True))
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per parameter: its value, std and unit."""
+        found = self.adoption.parameters
+        return data_frame([{'value': one.value, 'std': one.std, 'unit': one.unit}
+                           for one in found.values()], list(found), 'parameter')
+
+    def plot(self) -> Figure:
+        """Return a picture: the error of every drive before, after, and the noise."""
+        return _plot(self.adoption, self.adoption)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class AdoptionRunResult(Result):
+    """What `pprs diagnose --adopt-all` says.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Model and recordings.
+    run : AdoptionRun
+        What was adopted and refused, one after the other.
+    """
+
+    inputs: Inputs
+    run: AdoptionRun
+
+    @property
+    def model(self) -> ForceModel:
+        """The model with all that was adopted, and its ledger."""
+        return self.run.model
+
+    @property
+    def refused(self) -> bool:
+        """Whether it ended because what is left was refused."""
+        return self.run.ended == REFUSED
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model file, as `AdoptionResult.save`; as it was, with nothing to adopt.
+
+        Raises
+        ------
+        RefusedError
+            Where nothing was adopted because it was refused.
+        PprsError
+            Where it cannot be written, or is the file that was given.
+        """
+        if self.refused and not self.run.adopted:
+            raise RefusedError(self.run.reason)
+        write_model(path, self.model.values, self.inputs.base)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
+        return self.run.to_dict()
+
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows."""
+        from pprs_dynamics.app.report.adoption_tables import run_view
+
+        return run_view(self.run, details)
+
+    def page(self) -> Page:
+        """Return the page of `pprs history --report` of the model."""
+        from pprs_dynamics.app.report.history_page import history_page
+        from pprs_dynamics.physics.mechanism.units import common_effort
+        from pprs_dynamics.physics.model.ledger import read_steps
+
+        return history_page('the adopted model', read_steps(self.model.values),
+                            common_effort(self.model.units))
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
+        return data_frame([
+            {'effect': one.effect, 'adopted': one.adopted, 'error_before': one.error_before,
+             'error_after': one.error_after, 'held_out_before': one.held_out_before,
+             'held_out_after': one.held_out_after, 'reason': one.reason}
+            for one in self.run.steps])
+
+    def plot(self) -> Figure:
+        """Return a picture: the error of every drive before all, after all, and the noise.
+
+        Raises
+        ------
+        RefusedError
+            Where nothing was adopted.
+        """
+        if not self.run.adopted:
+            raise RefusedError(f'nothing was adopted: {self.run.reason}')
+        return _plot(self.run.adopted[0], self.run.adopted[-1])
+
+
+def adopt(model: Model, effect: str, recordings: Recordings, validate: Recordings = (), *,
+          force: bool = False, diagnosis: DiagnosisResult | None = None,
+          topic: str | None = None, progress: Progress | None = None) -> AdoptionResult:
+    """Add an effect to a model: fit it, check it on data it was not fitted to, take or refuse it.
+
+    Parameters
+    ----------
+    model : ForceModel or path
+    effect : str
+        Its name, on the drives that the recordings call for; or 'EFFECT:drive,drive'; or
+        'measured_curve:DRIVE@VARIABLE'.
+    recordings, validate : path, Recording, or a sequence of them
+        To fit to; and never fitted, optional.
+    force : bool
+        Take it in spite of objections.
+    diagnosis : DiagnosisResult, optional
+        Of this model on these recordings, where it is known: it is not made again.
+    topic, progress : optional
+        As in `compare`.
+
+    Returns
+    -------
+    AdoptionResult
+
+    Raises
+    ------
+    EffectRequestError
+        For an effect or a drive that does not exist, or does not act in the model.
+    PprsError
+        As `compare`.
+    """
+    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    request = requested(effect, inputs.model)
+    report = progress or (lambda what, share: None)
+    return AdoptionResult(inputs, adopt_effect(
+        inputs.model, request, inputs.fitted, inputs.held_out, force,
+        lambda share: report(f'adopting {request.name}', share),
+        None if diagnosis is None else diagnosis.diagnosis))
+
+
+def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *,
+              diagnosis: DiagnosisResult | None = None, topic: str | None = None,
+              progress: Progress | None = None) -> AdoptionRunResult:
+    """Diagnose and adopt until nothing more can be told.
+
+    Parameters
+    ----------
+    model, recordings, validate, diagnosis, topic, progress
+        As in `adopt`.
+
+    Returns
+    -------
+    AdoptionRunResult
+
+    Raises
+    ------
+    PprsError
+        As `compare`.
+    """
+    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    return AdoptionRunResult(inputs, adopt_effects(
+        inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
+        None if diagnosis is None else diagnosis.diagnosis))
+
+
+def _plot(first: Adoption, last: Adoption) -> Figure:
+    from pprs_dynamics.app.report.plots import plot_errors
+
+    before, after = first.residuals_before, last.residuals_after
+    rows: Mapping[str, Mapping[str, float]] = {
+        'before': rms_by_drive(before),
+        'after': rms_by_drive(after), 'noise': last.noise_floors}
+    return plot_errors(rows, last.unit)

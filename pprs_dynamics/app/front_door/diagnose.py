@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which physical effect a model lacks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.rivals import rival_effects
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.diagnosis.what_if import what_if
+from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from pprs_dynamics.app.report.page import Page
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class DiagnosisResult(Result):
+    """What `pprs diagnose` says.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Model and recordings.
+    diagnosis : Diagnosis
+        The answer with all that it was decided from.
+    """
+
+    inputs: Inputs
+    diagnosis: Diagnosis
+
+    @property
+    def verdict(self) -> str:
+        """One of 'adequate', 'effect', 'ambiguous', 'unknown'."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[FoundEffect, ...]:
+        """What is missing, in the order of adoption."""
+        return self.diagnosis.effects
+
+    @property
+    def fitted(self) -> ForceModel:
+        """The model with what is missing, not checked as `adopt` does."""
+        return self.diagnosis.adopted
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `pprs diagnose --json` writes."""
+        return self.diagnosis.to_dict()
+
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows."""
+        from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+
+        return diagnosis_view(self.diagnosis, self._words, details)
+
+    def page(self) -> Page:
+        """Return the page of `pprs diagnose --report`."""
+        from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+
+        after, _ = measure_residuals(self.fitted, self.inputs.fitted)
+        return diagnosis_page(
+            self.diagnosis, self._words, after, [one.name for one in self.inputs.fitted],
+            [one.name for one in self.inputs.held_out], self._rivals, what_if(self.diagnosis))
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
+        return data_frame([
+            {'effect': found.name, 'parameter': key, 'value': one.value, 'std': one.std,
+             'unit': one.unit, 'evidence': found.evidence}
+            for found in self.effects for key, one in found.parameters.items()])
+
+    def plot(self) -> Figure:
+        """Return a picture: the error of every drive before, with the effects, and the noise."""
+        from pprs_dynamics.app.report.plots import plot_errors
+
+        residuals = self.diagnosis.residuals
+        after = replace(residuals, model=residuals.measured - self.diagnosis.remaining)
+        return plot_errors(
+            {'before': rms_by_drive(residuals), 'with what is missing': rms_by_drive(after),
+             'noise': self.diagnosis.noise_floors}, residuals.unit)
+
+    @cached_property
+    def _rivals(self) -> Any:
+        return rival_effects(self.diagnosis, self.inputs.held_out)
+
+    @cached_property
+    def _words(self) -> Any:
+        return word_diagnosis(self.diagnosis, self.inputs.files, self._rivals)
+
+
+def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
+             topic: str | None = None, progress: Progress | None = None) -> DiagnosisResult:
+    """Find the physical effect that a model lacks, as far as recordings can tell.
+
+    Parameters
+    ----------
+    model : ForceModel or path
+    recordings : path, Recording, or a sequence of them
+        To fit to.
+    validate : path, Recording, or a sequence of them, optional
+        Of other motions, never fitted: held-out errors are taken on them, instead of on blocks.
+    topic, progress : optional
+        As in `compare`.
+
+    Returns
+    -------
+    DiagnosisResult
+
+    Raises
+    ------
+    PprsError
+        As `compare`.
+    """
+    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    report = progress or (lambda what, share: None)
+    return DiagnosisResult(inputs, diagnose_recordings(
+        inputs.model, inputs.fitted, inputs.held_out, lambda share: report('diagnosing', share)))

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The base model that recordings call for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
+from pprs_dynamics.physics.mechanism.units import common_effort
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_writer import write_model
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from pprs_dynamics.app.report.page import Page
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class FitResult(Result):
+    """What `pprs fit` says.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Model and recordings.
+    fit : BaseFit
+        The numbers, and the errors before, after and held out.
+    """
+
+    inputs: Inputs
+    fit: BaseFit
+
+    @property
+    def model(self) -> ForceModel:
+        """The fitted model."""
+        return self.fit.model
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model file, with the comments and further keys of the one that was given.
+
+        Raises
+        ------
+        PprsError
+            Where it cannot be written, or is the file that was given.
+        """
+        write_model(path, self.model.values, self.inputs.base)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `pprs fit --json` writes."""
+        return self.fit.to_dict()
+
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows."""
+        from pprs_dynamics.app.report.fit_tables import fit_view
+
+        return fit_view(self.inputs.model, self.fit, details)
+
+    def page(self) -> Page:
+        """Return the page of `pprs fit --report`."""
+        from pprs_dynamics.app.report.fit_page import fit_page
+
+        return fit_page(self.inputs.model, self.fit, [one.name for one in self.inputs.fitted],
+                        [one.name for one in self.inputs.held_out])
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per fitted number: before, after, std, unit."""
+        return data_frame([one.to_dict() for one in self.fit.numbers])
+
+    def plot(self) -> Figure:
+        """Return a picture: the error of every drive before, after and held out."""
+        from pprs_dynamics.app.report.plots import plot_errors
+
+        return plot_errors({'before': self.fit.before, 'after': self.fit.after,
+                            'held out': self.fit.held_out},
+                           common_effort(self.inputs.model.units))
+
+
+def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
+        topic: str | None = None, progress: Progress | None = None) -> FitResult:
+    """Fit a base model: an arm's inertia and friction, or what `tolerances` leave open.
+
+    Parameters
+    ----------
+    model, recordings, validate, topic, progress
+        As in `diagnose`; recordings of free motion.
+
+    Returns
+    -------
+    FitResult
+
+    Raises
+    ------
+    FitError
+        Where nothing is left open.
+    PprsError
+        As `compare`.
+    """
+    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    report = progress or (lambda what, share: None)
+    return FitResult(inputs, fit_base(inputs.model, inputs.fitted, inputs.held_out,
+                                      lambda share: report('fitting', share)))

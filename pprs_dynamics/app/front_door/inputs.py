@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Models and recordings as callers give them: files or what is in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+from pprs_dynamics.errors import PprsError, UnreadableFileError
+from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles
+from pprs_dynamics.measurement.files.recording import Recording, read_for
+from pprs_dynamics.measurement.files.repeats import find_repeat
+from pprs_dynamics.measurement.residuals.conventions import find_mistakes
+from pprs_dynamics.measurement.residuals.readings import POSITION_UNIT
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.system.plain_text import displayed
+
+File = str | PathLike[str]
+Model = ForceModel | File
+Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
+
+
+class InputError(PprsError, ValueError):
+    """Recordings that are not there."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """A model and the recordings it is held against, read and checked.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings, validation : mapping of str to Recording
+        To fit to, and never fitted; by path, or by name where they came from no file.
+    paths : frozenset of str
+        Which of those names are paths.
+    base : Path or None
+        The model's file; None for a model from memory.
+    model_path : str
+        As given; '' for the default or from memory.
+    topic : str
+        As given; '' for none.
+    """
+
+    model: ForceModel
+    recordings: Mapping[str, Recording]
+    validation: Mapping[str, Recording]
+    paths: frozenset[str] = frozenset()
+    base: Path | None = None
+    model_path: str = ''
+    topic: str = ''
+
+    @classmethod
+    def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
+           topic: str | None = None, progress: Progress | None = None) -> Inputs:
+        """Read what is given as a path, and take what is in memory as it is.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where a file cannot be read, holds the samples of another, or positions that are no
+            metres.
+        ModelError
+            Where the model is none.
+        """
+        if isinstance(recordings, Inputs):
+            return recordings
+        found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+        base = Path(found.source) if found.source and Path(found.source).is_file() else None
+        shipped = base is not None and base == find_file(DEFAULT_MODEL)
+        given = base or '' if isinstance(model, ForceModel) else model
+        name = '' if shipped else str(given)
+        fitted = _read_all(found, recordings, topic, progress)
+        held_out = [] if isinstance(validate, Inputs) else _read_all(
+            found, validate, topic, progress)
+        _refuse_repeats(fitted, [], 'every recording may be given once')
+        _refuse_repeats(held_out, fitted, 'what is held out must be another recording')
+        paths = frozenset(one.name for one in (*fitted, *held_out) if one.is_path)
+        return cls(found, _named(fitted), _named(held_out), paths, base, name, topic or '')
+
+    def require_recordings(self) -> Inputs:
+        """Return this, or raise InputError where there is no recording to fit to."""
+        if not self.recordings:
+            raise InputError('no recording is given, must be at least one')
+        return self
+
+    @property
+    def fitted(self) -> list[Recording]:
+        """The recordings to fit to."""
+        return list(self.recordings.values())
+
+    @property
+    def held_out(self) -> list[Recording]:
+        """The recordings that are never fitted."""
+        return list(self.validation.values())
+
+    @property
+    def files(self) -> GivenFiles:
+        """Their names, for commands that can be copied; placeholders for what has no file."""
+        if not {*self.recordings, *self.validation} <= self.paths:
+            return replace(PLACEHOLDERS, model=self.model_path)
+        return GivenFiles(tuple(self.recordings), tuple(self.validation), self.model_path,
+                          self.topic)
+
+    @property
+    def ledger(self) -> LedgerBook:
+        """What enters adoptions on these recordings into a model's ledger."""
+        def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
+            return tuple(RecordingEntry.of(name, one) if name in self.paths
+                         else RecordingEntry.of_samples(one) for name, one in recordings.items())
+        return LedgerBook(entries(self.recordings), entries(self.validation))
+
+
+Recordings = File | Recording | Sequence[File | Recording] | Inputs
+
+
+def read_checked(model: ForceModel, path: File, topic: str | None = None,
+                 progress: Progress | None = None) -> Recording:
+    """Read a recording of a model's drives; what its numbers rather mean is in its findings."""
+    report, stage = progress or (lambda what, share: None), f'reading {displayed(path)}'
+    return with_mistakes(model, read_for(model, path, topic, lambda done, total: report(
+        stage, done / total if total else 0.0)))
+
+
+def with_mistakes(model: ForceModel, recording: Recording) -> Recording:
+    """Return a recording with what its numbers rather mean among its findings."""
+    return replace(recording, findings=(*find_mistakes(model, recording), *recording.findings))
+
+
+def refuse_other_units(model: ForceModel, path: File, recording: Recording) -> None:
+    """Raise UnreadableFileError for positions of the 3-PPRS that are no metres."""
+    for finding in recording.findings:
+        if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
+            raise UnreadableFileError(path, f'{finding.what}, must be metres')
+
+
+class _Read(NamedTuple):
+    name: str
+    recording: Recording
+    is_path: bool
+
+
+def _read_all(model: ForceModel, given: File | Recording | Sequence[File | Recording],
+              topic: str | None, progress: Progress | None) -> list[_Read]:
+    found = []
+    for one in [given] if isinstance(given, (str, PathLike, Recording)) else given:
+        if isinstance(one, Recording):
+            found.append(_Read(one.name, one, False))
+            continue
+        recording = read_checked(model, one, topic, progress)
+        refuse_other_units(model, one, recording)
+        found.append(_Read(str(one), recording, True))
+    return found
+
+
+def _named(found: Sequence[_Read]) -> dict[str, Recording]:
+    """Return recordings by name; of those from memory two may have the same."""
+    named: dict[str, Recording] = {}
+    for one in found:
+        same = sum(other.name == one.name for other in found[:len(named)])
+        named[f'{one.name} ({same + 1})' if same else one.name] = one.recording
+    return named
+
+
+def _refuse_repeats(found: Sequence[_Read], earlier: Sequence[_Read], rule: str) -> None:
+    repeat = find_repeat([one.recording for one in found], [one.recording for one in earlier])
+    if repeat is not None:
+        index, clause = repeat
+        raise UnreadableFileError(found[index].name, f'{clause}, but {rule}')

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The motion that tells most about what recordings leave open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pprs_dynamics.app.front_door.inputs import InputError, Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
+from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
+from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
+from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
+from pprs_dynamics.measurement.files.motion_files import write_motion
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from pprs_dynamics.app.report.page import Page
+
+RATE = 100.0  # [Hz], the default of play_trajectory
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ExperimentResult(Result):
+    """What `pprs next-experiment` designs.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        Model and recordings.
+    design : Experiment or ArmExcitation
+        The motion at any time, and what it promises.
+    motion : PlatformMotion or JointMotion
+        Sampled.
+    purpose : {'separate', 'commission'}
+    seed : int
+        Of the search.
+    rate : float
+        Of the samples [Hz].
+    """
+
+    inputs: Inputs
+    design: Experiment | ArmExcitation
+    motion: PlatformMotion | JointMotion
+    purpose: str
+    seed: int
+    rate: float
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the motion as a CSV that `play_trajectory` plays.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where it cannot be written.
+        """
+        write_motion(path, self.inputs.model.drives, self.motion)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `pprs next-experiment --json` writes, but for the file's name."""
+        return {**self.design.to_dict(), 'purpose': self.purpose, 'seed': self.seed,
+                'rate': self.rate}
+
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows."""
+        from pprs_dynamics.app.report.experiment_tables import excitation_view, experiment_view
+
+        if isinstance(self.design, ArmExcitation):
+            return excitation_view(self.design)
+        return experiment_view(self.design)
+
+    def page(self, command: str = '') -> Page:
+        """Return the page of `pprs next-experiment --report`, with the command that plays it."""
+        from pprs_dynamics.app.report.experiment_page import excitation_page, experiment_page
+
+        if isinstance(self.design, ArmExcitation):
+            return excitation_page(self.design)
+        return experiment_page(self.design, self.motion, command)
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per pair of effects: what a diagnosis would say if the first were true."""
+        if isinstance(self.design, ArmExcitation):
+            return data_frame([{'limit': name, 'use': share}
+                               for name, share in self.design.limits.items()])
+        return data_frame([one.to_dict() for one in self.design.contests])
+
+    def plot(self) -> Figure:
+        """Return a picture: where the platform or every joint goes."""
+        from pprs_dynamics.app.report.plots import plot_over_time
+
+        motion = self.motion
+        assert motion.time is not None
+        if isinstance(motion, JointMotion):
+            return plot_over_time(motion.time, {
+                'position': dict(zip(self.inputs.model.drives, motion.position.T, strict=True))})
+        return plot_over_time(motion.time, {
+            'position [m]': dict(zip('xyz', motion.position.T, strict=True)),
+            'velocity [m/s]': dict(zip('xyz', motion.linear_velocity.T, strict=True))})
+
+
+def next_experiment(
+    model: Model, recordings: Recordings = (), *, purpose: str = 'separate',
+    limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
+    noise: float = 0.05, rate: float = RATE, topic: str | None = None,
+    progress: Progress | None = None,
+) -> ExperimentResult:
+    """Design the motion that tells most about what recordings leave open.
+
+    Parameters
+    ----------
+    model : ForceModel or path
+    recordings : path, Recording, or a sequence of them
+    purpose : {'separate', 'commission'}
+        What the recordings leave open; or a first motion of a new robot, without recordings.
+    limits : MotionLimits or ArmLimits, optional
+        Beside those of the model file or the URDF.
+    duration : float
+        [s]
+    seed : int
+        Of the search.
+    noise : float
+        Standard deviation of means of the effort over 0.01 s [N]; for 'commission' without
+        recordings.
+    rate : float
+        Of the samples [Hz].
+    topic, progress : optional
+        As in `compare`.
+
+    Returns
+    -------
+    ExperimentResult
+
+    Raises
+    ------
+    PurposeError
+        For 'separate' without recordings.
+    NoMotionError
+        Where the limits leave no room.
+    PprsError
+        As `diagnose`.
+    """
+    inputs = Inputs.of(model, recordings, (), topic, progress)
+    check_purpose(purpose, inputs.fitted)
+    found = inputs.model
+    report = progress or (lambda what, share: None)
+
+    def share_done(share: float) -> None:
+        report('designing', share)
+    designed: Experiment | ArmExcitation
+    kind = ArmLimits if isinstance(found, ArmModel) else MotionLimits
+    if limits is not None and not isinstance(limits, kind):
+        raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
+                         f'{found.title}')
+    if isinstance(found, ArmModel) and purpose == 'commission':
+        designed = excite_arm(found, limits if isinstance(limits, ArmLimits) else ArmLimits(),
+                              duration, seed, share_done)
+    elif isinstance(found, (ArmModel, DriveModel)):
+        designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise,
+                          share_done)
+    else:
+        raise InputError(f'no motions are designed for {found.title}')
+    count = int(duration * rate + 1e-9) + 1
+    return ExperimentResult(inputs, designed, designed.motion(np.arange(count) / rate), purpose,
+                            seed, rate)

@@ -1,0 +1,215 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings of a simulated robot with hidden effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pprs_dynamics.app.front_door.inputs import Model, Progress
+from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.errors import MotionError
+from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.parameter_file import find_file
+from pprs_dynamics.simulation.drive_control import ControlSettings, Note
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from pprs_dynamics.app.report.page import Page
+
+RATE = 500.0  # [Hz], of the 3-PPRS
+NOISE = 0.08  # [N], of its efforts
+FEEDFORWARDS = ('friction', 'rigid_body', 'none')
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class SimulationResult(Result):
+    """What `pprs simulate` makes.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recording : Recording
+        What the sensors said.
+    effects : tuple of dict
+        What was hidden: name, drives, parameters and form of each effect.
+    notes : tuple of Note
+        What happened on the way.
+    motion : PlatformMotion or JointMotion
+        Where the robot was meant to go.
+    rate : float
+        Of the samples [Hz].
+    seed : int
+    """
+
+    model: ForceModel
+    recording: Recording
+    effects: tuple[dict[str, Any], ...]
+    notes: tuple[Note, ...]
+    motion: PlatformMotion | JointMotion
+    rate: float
+    seed: int
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the recording as .csv, .mcap, .db3, or a rosbag2 folder of any other name.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where it cannot be written.
+        """
+        write_recording(path, self.recording)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `pprs simulate --json` writes, but for the file's name."""
+        return {'samples': len(self.recording.time), 'rate': self.rate, 'seed': self.seed,
+                'effects': list(self.effects),
+                'notes': [{'time': note.time, 'code': note.code, 'message': note.message}
+                          for note in self.notes]}
+
+    def view(self, details: bool = False) -> Any:
+        """Return what the terminal shows; what was hidden is not told."""
+        from pprs_dynamics.app.report.tables import simulation_view
+
+        return simulation_view(len(self.recording.time), self.rate, len(self.effects), self.notes)
+
+    def page(self) -> Page:
+        """Return the page of `pprs simulate --report`: the moving robot."""
+        from pprs_dynamics.app.report.page import Page
+        from pprs_dynamics.app.report.robot_view import robot_page
+
+        if isinstance(self.model, DriveModel) and isinstance(self.motion, PlatformMotion):
+            return robot_page(self.model, self.motion, 'The simulated motion')
+        page = Page('The simulated motion')
+        page.text(f'{len(self.recording.time)} samples at {self.rate:g} Hz.', 'lead')
+        return page
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per drive: range of position, velocity and effort."""
+        drives = describe(self.recording).drives
+        return data_frame([{'lowest_position': one.position[0],
+                            'highest_position': one.position[1],
+                            'lowest_effort': (one.effort or (np.nan, np.nan))[0],
+                            'highest_effort': (one.effort or (np.nan, np.nan))[1]}
+                           for one in drives.values()], list(drives), 'drive')
+
+    def plot(self) -> Figure:
+        """Return a picture: positions and efforts over time."""
+        from pprs_dynamics.app.report.plots import plot_over_time
+
+        names = self.recording.drives
+        return plot_over_time(self.recording.time, {
+            'position': dict(zip(names, self.recording.position.T, strict=True)),
+            'effort': dict(zip(names, self.recording.effort.T, strict=True))})
+
+
+def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
+             scale: float = 1.0, motion: PlatformMotion | None = None, duration: float = 40.0,
+             path_seed: int = 0, noise: float | None = None, feedforward: str = 'friction',
+             progress: Progress | None = None) -> SimulationResult:
+    """Record a robot of a physics engine that has effects which its model does not know of.
+
+    Parameters
+    ----------
+    model : ForceModel or path
+    effects : str or sequence of str
+        Names of effects, drawn from the seed; 'random' draws the names, too.
+    seed : int
+        Of effects and noise.
+    scale : float
+        Multiplies the strength of the effects.
+    motion : PlatformMotion, optional
+        At 500 Hz; a random one from rest to rest by default. Of an arm always that.
+    duration : float
+        Of the random motion [s].
+    path_seed : int
+        Of the random motion.
+    noise : float, optional
+        Standard deviation of the efforts [N]; 0.08, and of an arm half a percent of the largest
+        [N m, N].
+    feedforward : {'friction', 'rigid_body', 'none'}
+        What the 3-PPRS is driven with.
+    progress : callable, optional
+        Called with what is being done and the share of it that is done.
+
+    Returns
+    -------
+    SimulationResult
+
+    Raises
+    ------
+    MissingLibraryError
+        Where mujoco is not installed.
+    PprsError
+        For an unknown effect, a motion beyond the strokes, or a model that cannot be simulated.
+    """
+    found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+    names = [effects] if isinstance(effects, str) else list(effects)
+    report = progress or (lambda what, share: None)
+
+    def share_done(share: float) -> None:
+        report('simulating', share)
+    if isinstance(found, ArmModel):
+        return _simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done)
+    if not isinstance(found, DriveModel):
+        raise MotionError('model', f'it is of {found.title}', 'be of a 3-PPRS or an arm', 'shape')
+    if feedforward not in FEEDFORWARDS:
+        raise MotionError('feedforward', repr(feedforward),
+                          f'be one of {", ".join(FEEDFORWARDS)}', 'shape')
+    return _simulate_platform(found, names, seed, scale, motion or _excitation(
+        duration, path_seed), NOISE if noise is None else noise, feedforward, share_done)
+
+
+def _excitation(duration: float, seed: int) -> PlatformMotion:
+    path = Excitation(duration=duration, seed=seed)
+    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
+
+
+def _simulate_platform(model: DriveModel, names: Sequence[str], seed: int, scale: float,
+                       motion: PlatformMotion, noise: float, feedforward: str,
+                       progress: Any) -> SimulationResult:
+    from pprs_dynamics.simulation.hidden_effects import draw_effects
+    from pprs_dynamics.simulation.run import DriveReference
+    from pprs_dynamics.simulation.run import simulate as simulate_robot
+    from pprs_dynamics.simulation.sensors import SensorSettings
+
+    forces = model.drive_forces(motion)
+    model.limits.check_strokes(forces.mechanism.position)
+    effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
+    run = simulate_robot(
+        model, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
+                              effort[feedforward]),
+        draw_effects(list(names), np.random.default_rng(seed), scale), seed=seed, rate=RATE,
+        truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
+        sensors=SensorSettings.with_effort_noise(noise), progress=progress)
+    recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort)
+    return SimulationResult(model, recording, tuple(run.effects), tuple(run.notes), motion, RATE,
+                            seed)
+
+
+def _simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float,
+                  noise: float | None, duration: float, path_seed: int,
+                  progress: Any) -> SimulationResult:
+    from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
+    from pprs_dynamics.simulation.arm_run import simulate_arm
+
+    run = simulate_arm(model, names, seed, scale, noise, duration, path_seed, progress)
+    assert run.motion.time is not None
+    recording = Recording.from_arrays('simulated', run.motion.time, run.position, None, run.effort,
+                                      model.drives)
+    return SimulationResult(model, recording, run.effects, (), run.motion, ARM_RATE, seed)
