@@ -60,6 +60,8 @@ setup(
         # Tables by columns of the model file: pandas finds separators, pyarrow reads Parquet.
         'tables': ['pandas>=2', 'pyarrow>=17'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
+        # Results in a notebook: tables of pandas, pictures, and what the terminal shows.
+        'notebook': ['rich>=13', 'matplotlib>=3.8', 'pandas>=2'],
         # The site of the documentation: Markdown and notebooks, in a theme that reads on a phone.
         'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',

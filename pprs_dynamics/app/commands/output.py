@@ -7,16 +7,20 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.result import Result
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import shown
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
+
+if TYPE_CHECKING:
+    from pprs_dynamics.app.front_door.result import Result
+    from pprs_dynamics.app.report.page import Page
 
 
 def make_folder(path: str | PathLike[str]) -> Path:
@@ -38,16 +42,17 @@ def write_json(path: str | PathLike[str], content: Any) -> None:
     write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + '\n')
 
 
-def tell(result: Result, options: argparse.Namespace, screen: Any) -> None:
-    """Print a result, and write what --json and --report ask for."""
+def tell(result: Result, options: argparse.Namespace, screen: Any,
+         page: Callable[[], Page] | None = None) -> None:
+    """Print a result, and write what --json and --report ask for: its page by default."""
     screen.print(result.view(options.details))
     if options.json:
         write_json(options.json, result.to_dict())
     if options.report:
         with staged_bar(screen) as progress:
             progress('page', 0.0)
-            page = result.report(options.report)
-        screen.print(f'page: {shown(page)}')
+            written = (page or result.page)().write(options.report)
+        screen.print(f'page: {shown(written)}')
 
 
 def _plain(content: Any) -> Any:

@@ -9,11 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
-from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
-from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles
 from pprs_dynamics.measurement.files.recording import Recording, read_for
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.measurement.residuals.conventions import find_mistakes
@@ -23,6 +21,10 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.system.plain_text import displayed
+
+if TYPE_CHECKING:
+    from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+    from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 
 File = str | PathLike[str]
 Model = ForceModel | File
@@ -107,6 +109,9 @@ class Inputs:
     @property
     def files(self) -> GivenFiles:
         """Their names, for commands that can be copied; placeholders for what has no file."""
+        # Here and below: reading alone, as `pprs info` does, needs no statistics.
+        from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles
+
         if not {*self.recordings, *self.validation} <= self.paths:
             return replace(PLACEHOLDERS, model=self.model_path)
         return GivenFiles(tuple(self.recordings), tuple(self.validation), self.model_path,
@@ -115,6 +120,8 @@ class Inputs:
     @property
     def ledger(self) -> LedgerBook:
         """What enters adoptions on these recordings into a model's ledger."""
+        from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
             return tuple(RecordingEntry.of(name, one) if name in self.paths
                          else RecordingEntry.of_samples(one) for name, one in recordings.items())

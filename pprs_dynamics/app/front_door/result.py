@@ -81,6 +81,12 @@ class Result(ABC):
 
         return as_text(self.view(), WIDTH)
 
+    def __repr__(self) -> str:
+        try:
+            return str(self)
+        except MissingLibraryError:
+            return object.__repr__(self)
+
     def _repr_html_(self) -> str:
         from pprs_dynamics.app.report.terminal import as_html
 

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.inference.diagnosis.comparison import Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent
-from pprs_dynamics.measurement.files.recording import Summary
-from pprs_dynamics.physics.mechanism.units import DriveUnits
-from pprs_dynamics.physics.model.reproduction import Claim
-from pprs_dynamics.simulation.drive_control import Note
+
+if TYPE_CHECKING:
+    from pprs_dynamics.inference.diagnosis.comparison import Comparison
+    from pprs_dynamics.measurement.files.recording import Summary
+    from pprs_dynamics.physics.mechanism.units import DriveUnits
+    from pprs_dynamics.physics.model.reproduction import Claim
+    from pprs_dynamics.simulation.drive_control import Note
 
 # Lines that places take without --details, and characters of a line of 80 columns, which words
 # seldom fill.

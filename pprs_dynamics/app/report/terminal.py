@@ -15,7 +15,7 @@ from pprs_dynamics.system.plain_text import PLAIN, displayed
 HTML = '<pre style="line-height:1.2;white-space:pre;overflow-x:auto">{code}</pre>'
 
 
-def console() -> Any:
+def console(**options: Any) -> Any:
     """Return rich's console, or raise MissingLibraryError."""
     try:
         from rich.console import Console
@@ -30,12 +30,12 @@ def console() -> Any:
             return super().render_str(plain, *args, **options)
 
     # A name such as a:bug:.csv is no picture.
-    return PlainConsole(emoji=False)
+    return PlainConsole(emoji=False, **options)
 
 
 def as_text(view: Any, width: int) -> str:
     """Return what the terminal would show, without colours."""
-    screen = console()
+    screen = console(force_jupyter=False)
     screen.width = width
     with screen.capture() as captured:
         screen.print(view)
@@ -47,7 +47,9 @@ def as_html(view: Any, width: int) -> str:
     console()  # says what is missing
     from rich.console import Console
 
-    screen = Console(record=True, width=width, file=io.StringIO(), emoji=False)
+    # In a notebook rich would show it at once, too.
+    screen = Console(record=True, width=width, file=io.StringIO(), emoji=False,
+                     force_jupyter=False)
     screen.print(view)
     return screen.export_html(inline_styles=True, code_format=HTML)
 

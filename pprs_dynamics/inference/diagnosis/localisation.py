@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm, rankdata
+from scipy.special import ndtri
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
@@ -220,7 +220,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
     known = series.known
     scores = np.zeros(len(white))
     n = int(known.sum())
-    ranked = norm.ppf((rankdata(np.abs(white[known])) - 0.5) / n)
+    ranked = ndtri((_ranks(np.abs(white[known])) - 0.5) / n)
     # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
     scores[known] = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
     best: tuple[float, str, Pattern, Array] | None = None
@@ -257,3 +257,10 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
     price = library.prices.of_pattern(1, 1, 1)
     score = worth * (gain + price) - price
     return (variable, pattern, column, score) if score > 0 else None
+
+
+def _ranks(values: Array) -> Array:
+    """Return ranks from 1; equal values share the mean of theirs."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    ranks: Array = (np.cumsum(count) - (count - 1) / 2)[place]
+    return ranks

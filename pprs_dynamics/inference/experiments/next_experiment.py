@@ -11,7 +11,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
@@ -281,7 +281,7 @@ def _expected(contest: Contest, known: Array, after: Array) -> list[ExpectedEvid
     """Return what a motion promises for every pair of effects of a contest."""
     expected, gained = contest.evidence(known, after), contest.gained(known, after)
     # Twice a log-likelihood ratio scatters by twice the root of its mean.
-    sure = float(norm.cdf((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
+    sure = float(ndtr((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
     return [ExpectedEvidence(truth, rival, contest.now, expected, sure)
             for truth, rival in product(*contest.sides)]
 

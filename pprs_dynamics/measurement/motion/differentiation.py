@@ -54,7 +54,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import oaconvolve
 
 from pprs_dynamics.arrays import Array
 
@@ -67,7 +66,7 @@ REFERENCE_RATIO = 0.75
 HOPELESS = 10.0  # times the least error squared
 # Looked at for the choice of the window: enough to know an rms to a few per cent.
 STRETCHES, STRETCH_SAMPLES = 20, 4000
-LONG = 10_000  # samples
+LONG = 10_000  # samples, from which on FFTs are faster
 
 
 @dataclass(frozen=True)
@@ -121,11 +120,9 @@ class LocalPolynomial:
         """Return a derivative (0, 1, 2) of values (N, D), without the edges: (N - 2 half, D)."""
         weights = self.coefficients[derivative][::-1]
         middle = values[len(values) // 2]  # large constants would cost digits
-        # By FFT where that is faster; both are exact to rounding.
-        convolve = oaconvolve if len(values) > LONG else np.convolve
         result = np.empty((len(values) - 2 * self.half, values.shape[1]))
         for drive in range(values.shape[1]):
-            result[:, drive] = convolve(values[:, drive] - middle[drive], weights, 'valid')
+            result[:, drive] = convolve_valid(values[:, drive] - middle[drive], weights)
         return result + middle if derivative == 0 else result
 
     def differentiated(self, values: Array) -> tuple[Array, Array, Array]:
@@ -325,3 +322,32 @@ def _odd(samples: float) -> int:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values * values)))
+
+
+def convolve_valid(values: Array, weights: Array) -> Array:
+    """Return the convolution where the weights overlap completely, by FFT where that is faster.
+
+    Blocks are transformed one by one (overlap-save): digits are lost to the largest value of a
+    block alone, not of the recording. `scipy.signal.oaconvolve` does the same, but importing it
+    takes a second, longer than most commands.
+
+    Parameters
+    ----------
+    values : (N,) array
+    weights : (W,) array, W <= N
+
+    Returns
+    -------
+    (N - W + 1,) array
+    """
+    if len(values) <= LONG:
+        return np.convolve(values, weights, 'valid')
+    size = 1 << (8 * len(weights)).bit_length()
+    step, count = size - len(weights) + 1, len(values) - len(weights) + 1
+    blocks = -(-count // step)
+    padded = np.zeros((blocks - 1) * step + size)
+    padded[:len(values)] = values
+    windows = np.lib.stride_tricks.sliding_window_view(padded, size)[::step]
+    product = np.fft.irfft(np.fft.rfft(windows) * np.fft.rfft(weights, size), size)
+    result: Array = product[:, len(weights) - 1:].ravel()[:count]
+    return result

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from pprs_dynamics.arrays import Array
 
@@ -25,6 +24,9 @@ def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[
     speed : float
         A drive stands that moves less than this, in the mean over `SHORTEST_REST` [rad/s, m/s].
     """
+    # Here and not above: only arms need it, and it takes long to import.
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     window = max(2, round(SHORTEST_REST / step))
     if len(position) < window:
         return np.zeros(position.shape, dtype=bool)

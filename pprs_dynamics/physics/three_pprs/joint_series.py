@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.linalg import null_space
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -20,6 +19,9 @@ GRID = 512  # points of a period at which peaks are looked for
 @cache
 def resting_series(harmonics: tuple[int, ...]) -> Array:
     """Return a basis of all (a, b) that start and end at rest, each of unit peak, (2 K, p)."""
+    # Here and not above: only designed and played motions need it, commands start sooner.
+    from scipy.linalg import null_space
+
     k = np.array(harmonics, dtype=float)
     zero = np.zeros_like(k)
     conditions = np.stack([np.concatenate(row) for row in (

@@ -1,0 +1,267 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""`from pprs_dynamics import …`: the loop in Python, and that the commands say the same."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pprs_dynamics
+from pprs_dynamics import (
+    ComparisonResult,
+    Excitation,
+    PprsError,
+    Recording,
+    UnreadableFileError,
+    adopt,
+    build_model,
+    compare,
+    load_model,
+    next_experiment,
+    simulate,
+    write_recording,
+)
+from pprs_dynamics.app.commands.pprs import main
+
+ROOT = Path(__file__).parents[2]
+VISCOUS = 12.0  # [N s/m], on slide_2; the model lacks it
+HEAVY = {'numpy', 'scipy', 'pandas', 'rich', 'matplotlib', 'plotly', 'rclpy'}
+
+
+def record(name: str, seed: int, seconds: float = 8.0) -> Recording:
+    given = load_model('config/paper.yaml')
+    robot = build_model({**given.values, 'effects.active': ['viscous_friction'],
+                         'effects.viscous_friction.slide_2.coefficient': VISCOUS})
+    motion = Excitation(seconds, seed).motion(np.arange(0.0, seconds, 0.005))
+    forces = robot.drive_forces(motion)
+    noise = np.random.default_rng(seed).normal(0.0, 0.05, forces.total.shape)
+    return Recording.from_arrays(name, motion.time, forces.mechanism.position,
+                                 forces.mechanism.velocity, forces.total + noise)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('door')
+    write_recording(folder / 'run.csv', record('run', 1))
+    write_recording(folder / 'other.csv', record('other', 2))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def compared(folder: Path) -> ComparisonResult:
+    return compare('config/paper.yaml', folder / 'run.csv')
+
+
+def modules_after(code: str) -> set[str]:
+    said = subprocess.run([sys.executable, '-c', f'import sys\n{code}\nprint(*sys.modules)'],
+                          capture_output=True, text=True, check=True)
+    return {name.split('.')[0] for name in said.stdout.split()}
+
+
+def test_every_name_is_there_and_imports_for_type_checkers_are_those_that_run() -> None:
+    tree = ast.parse(Path(pprs_dynamics.__file__).read_text(encoding='utf-8'))
+    typed = {alias.name: node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+             and str(node.module).startswith('pprs_dynamics.') for alias in node.names}
+    assert typed == pprs_dynamics._MODULES
+    assert sorted(typed) == pprs_dynamics.__all__
+    for name in pprs_dynamics.__all__:
+        thing = getattr(pprs_dynamics, name)
+        assert name == 'Array' or thing.__doc__
+    assert set(pprs_dynamics.__all__) <= set(dir(pprs_dynamics))
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    assert not modules_after('import pprs_dynamics') & HEAVY
+    assert not modules_after('from pprs_dynamics import PprsError, ModelError') & HEAVY
+
+
+def test_a_comparison_needs_neither_terminal_nor_pictures_before_it_is_shown() -> None:
+    loaded = modules_after('from pprs_dynamics import adopt, compare, diagnose, fit')
+    assert not loaded & {'pandas', 'rich', 'matplotlib', 'plotly', 'rclpy', 'starlette'}
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match='no attribute'):
+        getattr(pprs_dynamics, 'compaer')  # noqa: B009
+
+
+@pytest.mark.parametrize('file', sorted((ROOT / 'docs/example_effect').glob('*.py')),
+                         ids=lambda file: file.stem)
+def test_effects_of_ones_own_import_nothing_deeper(file: Path) -> None:
+    tree = ast.parse(file.read_text(encoding='utf-8'))
+    used = {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert {name for name in used if name.startswith('pprs_dynamics')} == {'pprs_dynamics'}
+
+
+@pytest.mark.parametrize('name', ['loop', 'workbench_session'])
+def test_notebooks_import_nothing_deeper(name: str) -> None:
+    notebook = json.loads((ROOT / f'docs/{name}.ipynb').read_text(encoding='utf-8'))
+    code = '\n'.join(''.join(cell['source']) for cell in notebook['cells']
+                     if cell['cell_type'] == 'code')
+    used = {str(node.module) for node in ast.walk(ast.parse(code))
+            if isinstance(node, ast.ImportFrom)}
+    assert {one for one in used if one.startswith('pprs_dynamics')} == {'pprs_dynamics'}
+
+
+def test_a_comparison_says_where_the_model_fails(compared: ComparisonResult) -> None:
+    table = compared.table()
+    assert table['rms'].idxmax() == 'slide_2'
+    assert table.loc['slide_2', 'rms'] > 3 * table.loc['slide_2', 'noise']
+    others = table.drop('slide_2')
+    # White noise of 0.05 N, less what the smoothing takes off.
+    assert (others['rms'] < 0.06).all()
+    assert compared.where[0].drive == 'slide_2'
+    # The table is the numbers of the residuals, pooled.
+    error = compared.residuals.error
+    assert compared.rms == pytest.approx(np.sqrt(np.nanmean(error ** 2)))
+    assert table['rms'].to_numpy() == pytest.approx(np.sqrt(np.nanmean(error ** 2, axis=0)))
+
+
+def test_the_command_writes_the_dictionary_and_prints_the_text(
+    compared: ComparisonResult, folder: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv('COLUMNS', '100')
+    assert main(['compare', str(folder / 'run.csv'), '--json', str(folder / 'run.json')]) == 0
+    assert json.loads((folder / 'run.json').read_text()) == json.loads(
+        json.dumps(compared.to_dict()))
+    printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert printed[:8] == [line.strip() for line in str(compared).splitlines()[:8]]
+
+
+def test_a_result_shows_itself(compared: ComparisonResult, folder: Path) -> None:
+    html = compared._repr_html_()
+    assert html.startswith('<pre')
+    assert 'slide_2' in html
+    assert '\x1b' not in str(compared)
+    figure: Any = compared.plot()
+    assert figure._repr_png_().startswith(b'\x89PNG')
+    bars, curves = figure.axes
+    assert [label.get_text() for label in bars.get_xticklabels()] == list(compared.residuals.drives)
+    assert len(bars.patches) == 12
+    drawn = curves.get_lines()[1].get_ydata()
+    step = int(np.ceil(len(compared.residuals.time) / len(drawn)))
+    assert drawn == pytest.approx(compared.residuals.error[::step, 1], nan_ok=True)
+    page = compared.report(folder / 'page.html')
+    assert 'slide_2' in page.read_text(encoding='utf-8')
+
+
+def test_results_are_frozen(compared: ComparisonResult) -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        compared.notes = ()  # type: ignore[misc]
+
+
+def test_recordings_from_memory_and_from_files_are_one(
+    compared: ComparisonResult, folder: Path,
+) -> None:
+    model = load_model('config/paper.yaml')
+    again = compare(model, pprs_dynamics.read_recording(folder / 'run.csv'))
+    assert again.rms == pytest.approx(compared.rms, rel=1e-12)
+    assert 'RECORDING' in str(again)
+    assert str(folder / 'run.csv')[:40] in str(compared).replace('\n', '')
+
+
+def test_what_cannot_be_read_or_is_given_twice_is_refused(folder: Path) -> None:
+    run = folder / 'run.csv'
+    for given, validate in (([run, run], ()), ([run], [run])):
+        with pytest.raises(UnreadableFileError, match=r'run\.csv'):
+            pprs_dynamics.diagnose('config/paper.yaml', given, validate)
+    with pytest.raises(PprsError, match='no recording is given'):
+        compare('config/paper.yaml', [])
+    with pytest.raises(PprsError, match=r'nothing\.csv'):
+        compare('config/paper.yaml', folder / 'nothing.csv')
+    with pytest.raises(PprsError, match='viscous_friction'):
+        adopt('config/paper.yaml', 'viscous_fricton', run)
+
+
+def test_a_missing_library_is_named(compared: ComparisonResult,
+                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'pandas', None)
+    monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
+    for show, library in ((compared.table, 'pandas'), (compared.plot, 'matplotlib')):
+        with pytest.raises(pprs_dynamics.MissingLibraryError, match=library):
+            show()
+
+
+def test_an_experiment_that_has_nothing_to_read_from_is_refused() -> None:
+    with pytest.raises(PprsError, match='no recording'):
+        next_experiment('config/paper.yaml')
+    with pytest.raises(PprsError, match='must be MotionLimits'):
+        next_experiment('config/paper.yaml', purpose='commission',
+                        limits=pprs_dynamics.ArmLimits())
+
+
+def test_a_simulation_hides_what_it_says_and_is_written(tmp_path: Path) -> None:
+    run = simulate('config/paper.yaml', 'effort_offset', seed=3, duration=2.0)
+    plain = simulate('config/paper.yaml', seed=3, duration=2.0)
+    (hidden,) = run.effects
+    assert hidden['name'] == 'effort_offset'
+    difference = np.abs((run.recording.effort - plain.recording.effort).mean(axis=0))
+    drives = [run.recording.drives[d] for d in np.flatnonzero(difference > 0.05)]
+    assert drives == hidden['drives']
+    run.save(tmp_path / 'run.csv')
+    read = pprs_dynamics.read_recording(tmp_path / 'run.csv')
+    assert read.effort == pytest.approx(run.recording.effort)
+    assert run.to_dict()['samples'] == len(read.time)
+    with pytest.raises(PprsError, match='feedforward'):
+        simulate('config/paper.yaml', feedforward='all')
+
+
+@pytest.fixture(scope='module')
+def loop(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Run the notebook of the loop in a namespace of its own, and return what it made."""
+    notebook = json.loads((ROOT / 'docs/loop.ipynb').read_text(encoding='utf-8'))
+    names: dict[str, Any] = {'__name__': '__main__'}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp('notebook'))
+        for cell in notebook['cells']:
+            if cell['cell_type'] == 'code':
+                exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
+        names['saved'] = load_model('better.yaml')
+    return names
+
+
+def test_the_loop_finds_what_was_hidden_and_the_error_falls(loop: dict[str, Any]) -> None:
+    found, answer, (hidden,) = loop['found'], loop['answer'], loop['run'].effects
+    assert found.verdict == 'effect'
+    assert [one.name for one in found.effects] == [hidden['name']]
+    assert list(found.effects[0].drives) == hidden['drives']
+    assert answer.adopted
+    assert loop['after'].rms < 0.7 * loop['before'].rms
+    assert loop['saved'].values == answer.model.values
+    assert [key for key in loop['saved'].values if key.startswith('history.step_01')]
+    assert found.to_dict()['verdict'] == 'effect'
+    rows = found.table().set_index('parameter')
+    (drive,) = hidden['drives']
+    force = rows.loc[f'{drive}.force']
+    assert abs(force['value'] - hidden['parameters'][drive]['force']) < 4 * force['std']
+
+
+def test_results_of_the_loop_show_themselves(loop: dict[str, Any], tmp_path: Path) -> None:
+    for name in ('run', 'before', 'found', 'answer', 'after'):
+        result = loop[name]
+        assert result._repr_html_().startswith('<pre')
+        assert len(result.table())
+        assert result.plot().axes[0].has_data()
+        json.dumps(result.to_dict())
+        assert result.report(tmp_path / f'{name}.html').stat().st_size > 1000
+
+
+def test_the_notebook_of_the_loop_is_short_and_holds_what_it_printed() -> None:
+    cells = json.loads((ROOT / 'docs/loop.ipynb').read_text(encoding='utf-8'))['cells']
+    code = [cell for cell in cells if cell['cell_type'] == 'code']
+    lines = [line for cell in code for line in ''.join(cell['source']).splitlines() if line]
+    assert len(lines) <= 20
+    assert all(cell['outputs'] for cell in code)
+    kinds = {kind for cell in code for output in cell['outputs'] for kind in output.get('data', ())}
+    assert {'image/png', 'text/html'} <= kinds
