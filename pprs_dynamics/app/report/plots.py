@@ -72,7 +72,7 @@ def plot_errors(errors: Mapping[str, Mapping[str, float]], unit: str, rows: int 
                  label=name, color=COLOURS.get(name) or next(others))
     axis.set_xticks(range(len(drives)), drives)
     axis.set_ylabel(f'rms [{unit}]')
-    axis.legend(frameon=False)
+    axis.legend(frameon=False, loc='upper left', bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
