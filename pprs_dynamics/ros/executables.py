@@ -71,8 +71,8 @@ def _check_arguments(name: str, arguments: list[str]) -> None:
         name, f'{name} [--ros-args [--params-file FILE] [-p NAME:=VALUE] [-r FROM:=TO] ...]',
         add_help=False, allow_abbrev=False,
         description='A ROS 2 node. Files, parameters and remappings stand after --ros-args.',
-        epilog=f'README.md lists the parameters, and so does `ros2 param describe /{name} '
-               'PARAMETER` while the node runs.')
+        epilog=f'docs/nodes.md lists topics and parameters; `ros2 param describe /{name} '
+               'PARAMETER` explains one while the node runs.')
     parser.add_argument('-h', '--help', action='help', help='show this and exit')
     _, stray = parser.parse_known_args(_outside_ros_args(arguments))
     if stray:

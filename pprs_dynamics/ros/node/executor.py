@@ -43,7 +43,9 @@ class PromptExecutor(SingleThreadedExecutor):
     rclpy builds a task, a coroutine and a new wait set of every entity and every event handler
     for each message, which costs more than the model. Here messages and timers are served at
     once, and only services and guard conditions go that way. Event handlers, which tell of QoS
-    that does not fit, are looked at once a second. With an rclpy whose internals have changed,
+    that does not fit, are looked at once a second. At 500 Hz an echo node takes 0.35 ms of
+    processor time a message with it and 0.76 ms with rclpy's; with the EventsExecutor of rclpy 9.1.2
+    it answers nothing, and takes a quarter of a core while nothing comes. With an rclpy whose internals have changed,
     everything goes rclpy's way.
     """
 
