@@ -248,7 +248,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def _on_stale(self) -> None:
         own, done = self._settings.own, self._do_timeout_action()
-        if self._feedforward.has_come_to_rest(own['command_timeout']):
+        if self._feedforward.has_come_to_rest:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
             return
         self._counters['stale'] += 1

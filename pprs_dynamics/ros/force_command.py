@@ -123,24 +123,17 @@ class Feedforward:
         self._remembers = memory.has_memory
         return memory
 
-    def has_come_to_rest(self, within: float) -> bool:
-        """Return whether the last accepted trajectory ended there, and did not merely break off.
+    @property
+    def has_come_to_rest(self) -> bool:
+        """Whether the last accepted trajectory ended at rest, and did not merely break off.
 
-        At rest is what moves less than the speed in which friction turns over. Several points
-        have a last one; a single one of a stream may be a reversal, and must stay at rest.
-
-        Parameters
-        ----------
-        within : float
-            For how long after a single point [s].
+        At rest is what moves less than the speed in which friction turns over. Accelerations say
+        nothing: the paper's path, as many profiles, still brakes at its last point.
         """
         if self._last is None:
             return False
-        _, velocity, acceleration = self._last.forces.drive_motion
-        speed = abs(velocity[-1])
-        if len(velocity) == 1:
-            speed = speed + abs(acceleration[-1]) * within
-        return bool((speed <= self._model.values[REVERSAL_VELOCITY]).all())
+        _, velocity, _ = self._last.forces.drive_motion
+        return bool((abs(velocity[-1]) <= self._model.values[REVERSAL_VELOCITY]).all())
 
     def hold(self, gravity: bool) -> ForceCommand:
         """Return what goes out to hold the last accepted pose at rest, or zeros.

@@ -11,14 +11,13 @@ from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motio
 from rosgraph_msgs.msg import Clock
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
 
 TIMEOUT = 0.15  # [s]
 POSE = PlatformMotion.at_rest([[0.02, 0.0, 0.5]], [[0.0, 0.0, 0.0, 1.0]])
-ZERO = np.zeros((1, 3))
 
 
 def held(motion: PlatformMotion) -> np.ndarray:
@@ -54,12 +53,16 @@ def test_the_end_of_a_path_does_the_timeouts_action(action: str) -> None:
         assert node.wait_for_status(code='STALE')['level'] == 'STALE'
 
 
-def test_a_stream_that_breaks_off_where_it_turns_round_is_stale() -> None:
-    turning = PlatformMotion([[0.02, 0.0, 0.5]], [[0, 0, 0, 1.0]], ZERO, ZERO,
-                             np.array([[1.0, 0.0, 0.0]]), ZERO)
+@pytest.mark.parametrize('path', [HelicalPath(), Excitation(duration=1.0, seed=0)])
+def test_a_streams_last_pose_is_done_and_one_on_the_way_is_stale(
+    path: HelicalPath | Excitation,
+) -> None:
+    motion = path.motion(np.array([0.0, 0.3 * path.duration, path.duration + 0.01]))
     with feedforward_bench(command_timeout=TIMEOUT) as node:
-        node.answer(message_of(turning))
+        node.answer(message_of(motion[1:2]))
         assert node.wait_for_status(code='STALE')['level'] == 'STALE'
+        node.answer(message_of(motion[2:]))
+        assert node.wait_for_status(code='DONE')['level'] == 'OK'
 
 
 @pytest.mark.parametrize('stamped', [False, True], ids=['no stamp', 'stamp of this day'])

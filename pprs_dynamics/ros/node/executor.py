@@ -44,9 +44,9 @@ class PromptExecutor(SingleThreadedExecutor):
     for each message, which costs more than the model. Here messages and timers are served at
     once, and only services and guard conditions go that way. Event handlers, which tell of QoS
     that does not fit, are looked at once a second. At 500 Hz an echo node takes 0.35 ms of
-    processor time a message with it and 0.76 ms with rclpy's; with the EventsExecutor of rclpy 9.1.2
-    it answers nothing, and takes a quarter of a core while nothing comes. With an rclpy whose internals have changed,
-    everything goes rclpy's way.
+    processor time a message with it, 0.76 ms with rclpy's; with the EventsExecutor of rclpy 9.1.2
+    it answers nothing, and takes a quarter of a core while nothing comes. With an rclpy whose
+    internals have changed, everything goes rclpy's way.
     """
 
     def __init__(self, **options: Any) -> None:
