@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -252,12 +253,24 @@ def test_without_a_place_to_keep_compiled_code_nothing_is_compiled(monkeypatch):
 def test_compiled_code_of_other_sources_is_another(tmp_path, monkeypatch):
     compilation._digest.cache_clear()
     before = compilation._digest()
-    monkeypatch.setattr(compilation, 'MODEL', tmp_path)
-    (tmp_path / 'one_pass.py').write_text('changed')
-    compilation._digest.cache_clear()
-    changed = compilation._digest()
-    compilation._digest.cache_clear()
-    assert changed != before
+    copy = tmp_path / 'physics'
+    shutil.copytree(compilation.PHYSICS, copy, ignore=shutil.ignore_patterns('__pycache__'))
+    monkeypatch.setattr(compilation, 'PHYSICS', copy)
+
+    def digest() -> str:
+        compilation._digest.cache_clear()
+        return compilation._digest()
+
+    try:
+        assert digest() == before
+        seen = {before}
+        for place in ('model/limits.py', 'three_pprs/closure.py', 'effects/laws/passive_friction.py'):
+            with (copy / place).open('a') as file:
+                file.write('# changed\n')
+            assert digest() not in seen, place
+            seen.add(digest())
+    finally:
+        compilation._digest.cache_clear()
 
 
 def test_importing_and_loading_a_model_imports_no_compiler():

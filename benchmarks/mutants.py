@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Do the tests see a mistake in the equations? Mutants of the modules that decide, by Cosmic Ray.
+
+Of every module a fixed sample of mutants is tried, each in a copy of the sources, against that
+module's focused tests alone. Compiled kernels are run uncompiled: each mutant would compile anew.
+
+    python benchmarks/mutants.py [MODULE ...] [--count 12] [--json output/mutants.json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import random
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from cosmic_ray.commands import init
+from cosmic_ray.mutating import mutate_and_test
+from cosmic_ray.work_db import WorkDB, use_db
+from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome
+
+ROOT = Path(__file__).parents[1]
+COPIED = ('pprs_dynamics', 'config', 'test', 'benchmarks', 'demo', 'docs')
+SEED = 25  # of the sample
+COUNT = 12  # mutants of a module
+TIMEOUT = 240.0  # [s] for the tests of a mutant; one that hangs them is killed
+# Substitutes that no hand would write and any test would see: they would only flatter the share.
+CHEAP = ('LShift', 'RShift', 'BitAnd', 'BitOr', 'BitXor', '_Invert', 'USub_Not', 'RemoveDecorator')
+# No module of these is imported by pytest before a test asks for it.
+UNCOMPILED = "import sys\nsys.modules['numba'] = None\n"
+
+# Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
+TESTS = {
+    'physics/three_pprs/inverse_kinematics.py': ('physics/test_kinematics.py',),
+    'physics/three_pprs/jacobians.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
+    'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
+    'physics/effects/laws/passive_friction.py': ('physics/test_dynamics.py',),
+    'physics/effects/guard.py': ('physics/test_user_effects.py',),
+    'physics/model/limits.py': ('physics/test_limits.py',),
+    'physics/model/ledger.py': ('physics/test_ledger.py',),
+    'measurement/residuals/noise.py': ('measurement/test_noise.py',),
+    'measurement/residuals/paired_errors.py': ('inference/test_gates.py',),
+    'inference/regression/joint_fit.py': ('inference/test_joint_fit.py',
+                                          'measurement/test_noise.py'),
+    'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
+    'inference/search/allowance.py': ('inference/test_gates.py',),
+    'inference/search/search.py': ('inference/test_search.py',),
+    'inference/adoption/objections.py': ('inference/test_gates.py',),
+    'app/workbench/server/guard.py': ('app/test_workbench_safety.py',),
+    'app/fleet/changes.py': ('app/test_changes.py',),
+}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change of a module, and what became of it.
+
+    Parameters
+    ----------
+    module, operator, function : str
+    line : int
+    outcome : {'killed', 'survived', 'incompetent'}
+    change : str
+        The lines that differ.
+    """
+
+    module: str
+    operator: str
+    function: str
+    line: int
+    outcome: str
+    change: str
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print a table of what was killed, and every mutant that survived."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('modules', nargs='*', metavar='MODULE', help='by default all')
+    parser.add_argument('--count', type=int, default=COUNT, help='mutants of a module')
+    parser.add_argument('--workers', type=int, default=1, help='modules at a time')
+    parser.add_argument('--json', type=Path, help='file for every mutant')
+    options = parser.parse_args(arguments)
+    modules = [name for name in TESTS
+               if not options.modules or any(part in name for part in options.modules)]
+    found: list[Mutant] = []
+    with ThreadPoolExecutor(options.workers) as pool:
+        for mutants in pool.map(lambda name: list(_tried(name, options.count)), modules):
+            found += mutants
+            print(_row(mutants), flush=True)
+            if options.json:
+                options.json.write_text(json.dumps([asdict(one) for one in found], indent=1))
+    killed = sum(one.outcome != 'survived' for one in found)
+    print(f'{killed} of {len(found)} killed')
+    for one in found:
+        if one.outcome == 'survived':
+            print(f'\n{one.module}:{one.line} {one.function} ({one.operator})\n{one.change}')
+
+
+def _row(mutants: Sequence[Mutant]) -> str:
+    counts = Counter(one.outcome for one in mutants)
+    return f'{mutants[0].module:48}{len(mutants) - counts["survived"]:4} of {len(mutants)}'
+
+
+def _tried(module: str, count: int) -> Iterator[Mutant]:
+    """Yield a sample of a module's mutants after their tests, in a copy of the sources."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder)
+        for name in COPIED:
+            shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns('__pycache__'))
+        shutil.copy(ROOT / 'pyproject.toml', copy)
+        (copy / 'uncompiled.py').write_text(UNCOMPILED)
+        path = copy / 'pprs_dynamics' / module
+        tests = [str(copy / 'test' / name) for name in TESTS[module]]
+        sources = ':'.join(str(copy / part) for part in (
+            '', 'test', 'test/support', 'demo', 'benchmarks'))
+        command = (f'env PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 {sys.executable} -m pytest '
+                   f'-x -q -p uncompiled -p no:cacheprovider --rootdir {copy} {" ".join(tests)}')
+        for mutation in _sample(path, module, count):
+            result = mutate_and_test([mutation], command, TIMEOUT)
+            if result.worker_outcome is not WorkerOutcome.NORMAL:
+                raise RuntimeError(result.output)
+            change = '\n'.join(line for line in (result.diff or '').splitlines()
+                               if line[:1] in '+-' and line[:3] not in ('+++', '---'))
+            outcome = result.test_outcome or TestOutcome.INCOMPETENT
+            yield Mutant(module, mutation.operator_name.removeprefix('core/'),
+                         mutation.definition_name or '', mutation.start_pos[0], outcome.value,
+                         change)
+
+
+def _sample(path: Path, module: str, count: int) -> list[MutationSpec]:
+    """Return mutations, one place at most once, none in what is not evaluated."""
+    with use_db(':memory:', WorkDB.Mode.create) as database:
+        init([path], database, {})
+        every = [item.mutations[0] for item in database.work_items]
+    annotations = set(_annotations(ast.parse(path.read_text())))
+    by_place: dict[tuple[int, int], list[MutationSpec]] = {}
+    for mutation in every:
+        if mutation.start_pos not in annotations and not any(
+                part in mutation.operator_name for part in CHEAP):
+            by_place.setdefault(mutation.start_pos, []).append(mutation)
+    # An operator between two numbers has a dozen substitutes, a condition one: places first.
+    chance = random.Random(f'{SEED} {module}')
+    places = chance.sample(sorted(by_place), min(count, len(by_place)))
+    return [chance.choice(by_place[place]) for place in places]
+
+
+def _annotations(tree: ast.AST) -> Iterator[tuple[int, int]]:
+    """Yield every place within annotations, which are never evaluated."""
+    for node in ast.walk(tree):
+        for part in (getattr(node, 'annotation', None), getattr(node, 'returns', None)):
+            if isinstance(part, ast.expr):
+                lines = range(part.lineno, (part.end_lineno or part.lineno) + 1)
+                yield from ((line, column) for line in lines for column in range(200)
+                            if (part.lineno, part.col_offset) <= (line, column)
+                            < (part.end_lineno or 0, part.end_col_offset or 0))
+
+
+if __name__ == '__main__':
+    main()

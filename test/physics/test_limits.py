@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Limits of drives: what is within passes untouched, and the first that is not is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import LimitError, WorkspaceError
+from pprs_dynamics.physics.model.limits import DriveLimits, JointLimits, Limits
+
+PAPER = replace(DriveModel.load().limits, slide_stroke=(-0.3, 0.2), lift_stroke=(-0.1, 0.8),
+                effort=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0))
+ARM = JointLimits(('elbow', 'rail'), ('rad', 'm'), ('N m', 'N'), np.array([-2.0, 0.0]),
+                  np.array([1.0, 0.5]), np.array([7.0, 300.0]))
+EACH = pytest.mark.parametrize('limits', [PAPER, ARM], ids=['3-PPRS', 'arm'])
+
+
+def middle(limits: DriveLimits, samples: int = 4) -> np.ndarray:
+    """Return positions within all strokes, (N, D)."""
+    lower, upper = limits.strokes
+    return np.tile((lower + upper) / 2, (samples, 1))
+
+
+def test_the_strokes_of_a_3_pprs_are_those_of_slides_and_lifts() -> None:
+    lower, upper = PAPER.strokes
+    assert lower.tolist() == [-0.3] * 3 + [-0.1] * 3
+    assert upper.tolist() == [0.2] * 3 + [0.8] * 3
+    assert [PAPER.stroke_source(drive) for drive in range(6)] == (
+        ['limits.slide_stroke'] * 3 + ['limits.lift_stroke'] * 3)
+    assert PAPER.position_units == ('m',) * 6
+    assert PAPER.effort_units == ('N',) * 6
+    assert PAPER.efforts.tolist() == [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
+
+
+@EACH
+def test_efforts_are_moved_to_the_limit_where_they_are_over_it(limits: DriveLimits) -> None:
+    efforts = limits.efforts
+    given = np.array([0.5, -0.5, 1.0, -1.0, 1.5, -1.5])[:, None] * efforts
+    wanted = np.array([0.5, -0.5, 1.0, -1.0, 1.0, -1.0])[:, None] * efforts
+    assert np.array_equal(limits.clamped(given), wanted)
+
+
+@EACH
+def test_the_smaller_of_two_efforts_counts(limits: DriveLimits) -> None:
+    count = len(limits.drives)
+    other = limits.efforts * np.where(np.arange(count) % 2, 2.0, 0.5)
+    expected = limits.efforts * np.where(np.arange(count) % 2, 1.0, 0.5)
+    narrower = limits.with_efforts(other.tolist())
+    assert isinstance(narrower, type(limits))
+    assert narrower.efforts == pytest.approx(expected)
+    assert np.array_equal(narrower.strokes, limits.strokes)
+
+
+@EACH
+def test_the_first_position_outside_its_stroke_is_named(limits: DriveLimits) -> None:
+    lower, upper = limits.strokes
+    edges = middle(limits)
+    edges[0], edges[1] = lower, upper
+    limits.check_strokes(edges)
+    for drive, name in enumerate(limits.drives):
+        for end, out in ((lower, -0.01), (upper, 0.01)):
+            bad = middle(limits)
+            bad[2:, drive] = end[drive] + out
+            with pytest.raises(WorkspaceError) as caught:
+                limits.check_strokes(bad)
+            assert caught.value.sample == 2
+            unit = limits.position_units[drive]
+            text = str(caught.value)
+            assert f'{name} would have to be at {end[drive] + out:.6g} {unit}' in text
+            assert (f'{limits.stroke_source(drive)} is [{lower[drive]:g}, {upper[drive]:g}] {unit}'
+                    ) in text
+    bad = middle(limits)
+    bad[1, 0] = np.nan
+    with pytest.raises(WorkspaceError):
+        limits.check_strokes(bad)
+
+
+@EACH
+def test_the_first_effort_over_its_limit_is_named(limits: DriveLimits) -> None:
+    efforts = np.tile(limits.efforts, (4, 1)) * np.array([1.0, -1.0, 0.0, 1.0])[:, None]
+    limits.check_efforts(efforts)
+    for drive, name in enumerate(limits.drives):
+        for wrong in (1.01 * limits.efforts[drive], -1.01 * limits.efforts[drive], np.nan):
+            bad = efforts.copy()
+            bad[2:, drive] = wrong
+            with pytest.raises(LimitError) as caught:
+                limits.check_efforts(bad)
+            assert caught.value.sample == 2
+            assert name in str(caught.value)
+            assert f'{limits.efforts[drive]:g} {limits.effort_units[drive]}' in str(caught.value)
+            assert limits.effort_source in str(caught.value)
+
+
+@EACH
+def test_what_is_allowed_is_finite_and_within_all_limits(limits: DriveLimits) -> None:
+    lower, upper = limits.strokes
+    rates = np.ones_like(middle(limits))
+    efforts = np.tile(limits.efforts, (4, 1))
+
+    def allowed(force: np.ndarray, position: np.ndarray, velocity: np.ndarray = rates,
+                acceleration: np.ndarray = rates) -> bool:
+        return bool(limits.allow(force, (position, velocity, acceleration)))
+
+    def changed(table: np.ndarray, drive: int, value: float) -> np.ndarray:
+        other = table.copy()
+        other[3, drive] = value
+        return other
+
+    assert allowed(efforts, np.tile(lower, (4, 1)))
+    assert allowed(-efforts, np.tile(upper, (4, 1)))
+    for drive in range(len(limits.drives)):
+        assert not allowed(changed(efforts, drive, 1.001 * limits.efforts[drive]), middle(limits))
+        assert not allowed(changed(efforts, drive, -1.001 * limits.efforts[drive]), middle(limits))
+        assert not allowed(efforts, changed(middle(limits), drive, lower[drive] - 1e-3))
+        assert not allowed(efforts, changed(middle(limits), drive, upper[drive] + 1e-3))
+        for bad in (np.nan, np.inf, -np.inf):
+            assert not allowed(changed(efforts, drive, bad), middle(limits))
+            assert not allowed(efforts, changed(middle(limits), drive, bad))
+            assert not allowed(efforts, middle(limits), changed(rates, drive, bad))
+            assert not allowed(efforts, middle(limits), rates, changed(rates, drive, bad))
+
+
+def test_an_arm_without_limits_in_its_urdf_is_allowed_everything_finite() -> None:
+    free = replace(ARM, lower=np.full(2, -np.inf), upper=np.full(2, np.inf),
+                   effort=np.full(2, np.inf))
+    table = np.full((2, 2), 1e12)
+    assert free.allow(table, (table, table, table))
+    assert not free.allow(table * np.inf, (table, table, table))
+    assert ARM.stroke_source(0) == 'its range in the URDF'
+    assert isinstance(PAPER, Limits)
