@@ -26,6 +26,7 @@ from pathlib import Path
 
 from cosmic_ray.commands import init
 from cosmic_ray.mutating import mutate_and_test
+from cosmic_ray.testing import run_tests
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome
 
@@ -123,18 +124,22 @@ def _tried(module: str, count: int) -> Iterator[Mutant]:
         tests = [str(copy / 'test' / name) for name in TESTS[module]]
         sources = ':'.join(str(copy / part) for part in (
             '', 'test', 'test/support', 'demo', 'benchmarks'))
-        command = (f'env PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 {sys.executable} -m pytest '
-                   f'-x -q -p uncompiled -p no:cacheprovider --rootdir {copy} {" ".join(tests)}')
+        # From the copy's folder: `python -m` finds modules there before all others.
+        command = (f'env -C {copy} PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 {sys.executable} '
+                   f'-m pytest -x -q -p uncompiled -p no:cacheprovider --rootdir {copy} '
+                   f'{" ".join(tests)}')
+        outcome, output = run_tests(command, TIMEOUT)
+        if outcome is not TestOutcome.SURVIVED:
+            raise RuntimeError(f'{module}: its tests fail without any mutant: {output[-2000:]}')
         for mutation in _sample(path, module, count):
             result = mutate_and_test([mutation], command, TIMEOUT)
             if result.worker_outcome is not WorkerOutcome.NORMAL:
                 raise RuntimeError(result.output)
             change = '\n'.join(line for line in (result.diff or '').splitlines()
                                if line[:1] in '+-' and line[:3] not in ('+++', '---'))
-            outcome = result.test_outcome or TestOutcome.INCOMPETENT
+            what = result.test_outcome or TestOutcome.INCOMPETENT
             yield Mutant(module, mutation.operator_name.removeprefix('core/'),
-                         mutation.definition_name or '', mutation.start_pos[0], outcome.value,
-                         change)
+                         mutation.definition_name or '', mutation.start_pos[0], what.value, change)
 
 
 def _sample(path: Path, module: str, count: int) -> list[MutationSpec]:

@@ -18,7 +18,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +29,6 @@ from pprs_dynamics import ArmModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.physics.mechanism.urdf import pinocchio
-from pprs_dynamics.physics.model.arm_sample import ArmSample
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -166,17 +164,6 @@ def ripple_rows(found: dict[str, Any]) -> tuple[list[list[str]], int]:
     return rows, near
 
 
-def seconds_of(call: Callable[[], object], count: int = 3000, rounds: int = 15) -> float:
-    """Return the least mean time of a call [s]."""
-    best = np.inf
-    for _ in range(rounds):
-        begin = time.perf_counter()
-        for _ in range(count):
-            call()
-        best = min(best, (time.perf_counter() - begin) / count)
-    return float(best)
-
-
 def draw(path: Path, drives: Sequence[str], curves: dict[str, Any], ylabel: str) -> None:
     """Draw one row per joint."""
     figure, axes = pyplot.subplots(len(drives), 1, figsize=(8, 1.5 * len(drives)), sharex=True,
@@ -234,11 +221,6 @@ def tell(bench: Bench) -> dict[str, str]:
                                       f'{name}.yaml') for name in ('base', 'better', 'again'))
     ripples, near = ripple_rows(free) if free else ([], 0)
     held = fit['held_out']
-    q, v, a = np.random.default_rng(0).normal(size=(3, len(base.drives)))
-    sample, bare, data = ArmSample(base), base.arm.model, base.arm.model.createData()
-    sample(q, v, a)
-    rnea = seconds_of(lambda: pinocchio().rnea(bare, data, q, v, a))
-    whole = seconds_of(lambda: sample(q, v, a))
     mass = next((one['parameters']['mass'] for one in load['effects']
                  if one['name'] == 'payload_mass'), None)
     claimed = {one['name'] for one in free.get('effects', ())} & {
@@ -267,7 +249,6 @@ def tell(bench: Bench) -> dict[str, str]:
          f'{right} of {len(zeros)}; {first_named} named first with any value'],
         ['pitch of the ripple within 0.5 % of π/101 rad', '≥ 3 joints', f'{near} joints'],
         ['50 s, six joints, processor time', '≤ 10 s', f'{seconds[0]:.0f} to {seconds[-1]:.0f} s'],
-        ['one sample with friction / bare `pin.rnea`', '≤ 1.5', f'{whole / rnea:.2f}'],
     ]
     sys.path.insert(0, str(DOCS.parent))
     from benchmarks.scores import arms as arm_score

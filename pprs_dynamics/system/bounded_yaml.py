@@ -20,9 +20,12 @@ import yaml
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.system.input_files import require_file
 
-LARGEST = 300_000  # bytes: sixty times the paper's robot, or a ledger of dozens of steps
+LARGEST = 5_000_000  # bytes: a ledger of a thousand steps
+MOST_VALUES = 100_000  # what takes the time; the paper's robot has 150, a step some 70
 DEEPEST = 20  # /** and ros__parameters included, a model file has 7
 LONGEST = 1_000  # characters of a value without quotes: no number is that long
+# 10 and 90 for YAML 1.1, words for ROS 2.
+ANCIENT_NUMBER = re.compile(r'[-+]?[0-9][0-9_.]*(_[0-9_.]*|(:[0-5]?[0-9])+(\.[0-9_]*)?)', re.ASCII)
 STRING_TAG = 'tag:yaml.org,2002:str'
 
 # The parser in C is ten times faster, and not everywhere.
@@ -43,9 +46,7 @@ def read_text(path: str | PathLike[str]) -> str:
             content = file.read(LARGEST + 1)
     except OSError as error:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
-    if len(content) > LARGEST:
-        raise UnreadableFileError(
-            path, f'it is larger than {LARGEST // 1000} kB, which no parameter file needs')
+    check_size(content, path)
     try:
         text = content.decode('utf-8')
     except UnicodeDecodeError:
@@ -54,17 +55,29 @@ def read_text(path: str | PathLike[str]) -> str:
     return text
 
 
+def check_size(content: bytes, path: str | PathLike[str] = '') -> None:
+    """Raise UnreadableFileError for more than is read."""
+    if len(content) > LARGEST:
+        raise UnreadableFileError(
+            path, f'it is larger than {LARGEST // 1_000_000} MB, which no parameter file needs')
+
+
 def check_bounds(text: str, path: str | PathLike[str] = '') -> None:
     """Raise UnreadableFileError where a text is no YAML, or holds what may not be there.
 
     The parser's events are looked at one by one: nothing is built, and the first that is out of
     bounds ends it.
     """
-    depth = 0
+    depth = values = 0
     try:
         events: Iterator[Any] = yaml.parse(text, Loader=_SafeLoader)
         for event in events:
             line = event.start_mark.line + 1
+            values += isinstance(event, yaml.ScalarEvent)
+            if values > MOST_VALUES:
+                raise UnreadableFileError(
+                    path, f'line {line}: it has more than {MOST_VALUES} keys and values, which no '
+                    'parameter file needs')
             if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
                 depth += 1
             elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
@@ -80,13 +93,21 @@ def check_bounds(text: str, path: str | PathLike[str] = '') -> None:
                 raise UnreadableFileError(
                     path, f'line {line}: {event.tag} is a tag, which ROS 2 parameter files do not '
                     'know: write the value alone')
-            if (isinstance(event, yaml.ScalarEvent) and not event.style
-                    and len(event.value) > LONGEST):
-                raise UnreadableFileError(
-                    path, f'line {line}: a value has {len(event.value)} characters, but without '
-                    f'quotes it must have at most {LONGEST}')
+            if isinstance(event, yaml.ScalarEvent) and not event.style:
+                _check_unquoted(event.value, line, path)
     except yaml.YAMLError as error:
         raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
+
+
+def _check_unquoted(value: str, line: int, path: str | PathLike[str]) -> None:
+    if len(value) > LONGEST:
+        raise UnreadableFileError(
+            path, f'line {line}: a value has {len(value)} characters, but without quotes it must '
+            f'have at most {LONGEST}')
+    if ANCIENT_NUMBER.fullmatch(value):
+        raise UnreadableFileError(
+            path, f'line {line}: {value:.20} is a number for YAML and a word for ROS 2: write '
+            'digits alone, or quotes around a word')
 
 
 def parse(text: str, path: str | PathLike[str] = '') -> Any:
@@ -127,5 +148,5 @@ class _StrictLoader(_SafeLoader):  # type: ignore[misc]
 
 # ROS 2 reads 1e-3 and 1.0e2 as numbers; YAML 1.1, which PyYAML follows, as words.
 _StrictLoader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$'),
+    'tag:yaml.org,2002:float', re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$', re.ASCII),
     list('-+0123456789.'))

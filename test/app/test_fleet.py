@@ -10,7 +10,7 @@ import json
 import os
 import re
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +21,16 @@ import pytest
 from benchmarks.fleets.cluster_kills import write_axis
 from pprs_dynamics import __version__
 from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.fleet import engine
 from pprs_dynamics.app.fleet.changes import find_changes
-from pprs_dynamics.app.fleet.engine import cluster, run_survey
+from pprs_dynamics.app.fleet.engine import cluster, run_each, run_survey
 from pprs_dynamics.app.fleet.manifest import Entry, ManifestError, entries, find_recordings
 from pprs_dynamics.app.fleet.store import DONE, FAILED, Store, key_of, schema
 from pprs_dynamics.app.fleet.survey import Job, examine, identify
 from pprs_dynamics.app.fleet.trend import FALSE_ALARMS, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 
@@ -305,6 +307,44 @@ def test_a_killed_worker_changes_nothing(recordings: Path, client, tmp_path: Pat
     again = list(run_survey(client, jobs, store))
     assert sum(one is not None for one in again) == 1
     assert store.read(('recording',)).num_rows == len(table)
+
+
+@pytest.mark.parametrize('damage', [lambda part: part[:300], lambda part: b'',
+                                    lambda part: part[:900] + b'~' * 60 + part[960:]])
+def test_a_torn_part_is_done_again(damage: Callable[[bytes], bytes], client,
+                                   tmp_path: Path) -> None:
+    store, path = Store(str(tmp_path / 'store')), write_axis(tmp_path / 'robot' / 'a.csv')
+    assert len([one for one in run_survey(client, [job(path)], store) if one]) == 1
+    part = next(Path(store.path).rglob(f'*{DONE}'))
+    whole = store.read(('recording', 'value')).to_pylist()
+    part.write_bytes(damage(part.read_bytes()))
+    assert len([one for one in run_survey(client, [job(path)], store) if one]) == 1
+    assert store.read(('recording', 'value')).to_pylist() == whole
+    assert list(run_survey(client, [job(path)], store)) == [None]
+
+
+def test_a_worker_that_stands_still_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, 'SILENCE', '3s')
+    with cluster(1) as client:
+        results = run_each(client, str, range(8))
+        found = [next(results)]
+        # Of the cluster that this test has started itself.
+        os.kill(client.run(os.getpid).popitem()[1], signal.SIGSTOP)
+        found += results
+        assert sorted(value for _, value, error in found if error is None) == list('01234567')
+
+
+def test_no_name_is_no_recording_of_the_present_folder(tmp_path: Path,
+                                                       monkeypatch: pytest.MonkeyPatch,
+                                                       capsys: pytest.CaptureFixture[str]) -> None:
+    write_recording(tmp_path / 'bag', Recording.from_arrays(
+        'x', np.arange(9.0), np.zeros((9, 1)), None, np.zeros((9, 1)), ('axis',)))
+    monkeypatch.chdir(tmp_path / 'bag')
+    for command in (['info', ''], ['info', '.', '--model', ''], ['survey', '', '--output', 'x']):
+        status = main([command[0], *command[1:], *(
+            [] if '--model' in command else ['--model', MODEL])])
+        assert status == 2, command
+        assert "''" in capsys.readouterr().err
 
 
 def test_the_command_says_what_it_did(recordings: Path, tmp_path: Path,

@@ -540,9 +540,18 @@ def test_a_changed_byte_in_a_bag_is_an_error_of_ours_or_none(
     data = bytearray(path.read_bytes())
     data[int(share * (len(data) - 1))] ^= value
     path.write_bytes(data)
-    # Bytes of values are data like any other; only a traceback would be a fault.
-    with contextlib.suppress(UnreadableFileError):
-        read_recording(path)
+    try:
+        recording = read_recording(path)
+    except UnreadableFileError as told:
+        assert str(told).startswith(f'{path}: ')
+        assert '\n' not in str(told)
+    else:
+        # Bytes of values are data like any other, but a recording is one nevertheless.
+        assert 0 < len(recording.time) <= 60
+        assert np.isfinite(recording.time).all()
+        assert (np.diff(recording.time) > 0).all()
+        assert recording.position.shape == recording.effort.shape == (len(recording.time), 6)
+        assert np.isfinite(recording.position).all()
 
 
 # ------------------------------------------------------------------------------ description

@@ -6,15 +6,18 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from ros_processes import executable
 
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.physics.model.ledger import (
     Step,
     original_values,
@@ -24,7 +27,11 @@ from pprs_dynamics.physics.model.ledger import (
 )
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
-from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
+from pprs_dynamics.physics.model.parameter_file import (
+    LEDGER,
+    default_parameters,
+    read_parameters,
+)
 
 STEP = Step(
     effect='coulomb_friction', error_before=0.2, error_after=0.1, held_out_before=0.21,
@@ -88,7 +95,10 @@ def test_tolerances_count_from_the_numbers_of_the_first_file(stages: list[dict[s
 
 
 DAMAGE = {
-    'history.step_01.error_before': ('a lot', 'be a number'),
+    'history.step_01.error_before': ('a lot', 'be a finite number'),
+    'history.step_01.error_after': (-math.inf, 'be a finite number'),
+    'history.step_01.spans': ([0.0, math.nan], 'be a finite number'),
+    'history.step_01.noise_floor': (10 ** 400, 'be a finite number'),
     'history.step_01.forced': (0.5, 'be true or false'),
     'history.step_01.recordings': ('a.csv', 'be a list'),
     'history.step_01.weather': ('fine', 'unknown key history.step_01.weather'),
@@ -161,6 +171,79 @@ def test_a_mistake_is_one_line_and_status_2(
     assert done.returncode == 2
     assert MISTAKES[options] in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+OLD = Path(__file__).parents[2] / 'config/paper.yaml'
+
+
+def in_the_old_place(text: str) -> str:
+    """Return a file as it was written before the ledger had a section of its own."""
+    model, _, ledger = text.partition(f'{LEDGER}:\n  ros__parameters:\n')
+    assert ledger
+    return model + ledger
+
+
+def test_the_ledger_has_a_section_of_its_own(
+    stages: list[dict[str, Any]], tmp_path: Path,
+) -> None:
+    file = tmp_path / 'model.yaml'
+    write_model(file, stages[2], OLD)
+    sections = yaml.safe_load(file.read_text())
+    assert list(sections) == ['/**', LEDGER]
+    assert 'history' not in sections['/**']['ros__parameters']
+    assert set(sections[LEDGER]['ros__parameters']['history']) == {'step_01', 'step_02'}
+
+
+def test_a_ledger_in_the_old_place_is_read_and_moved(
+    stages: list[dict[str, Any]], tmp_path: Path,
+) -> None:
+    old, new, back = (tmp_path / f'{name}.yaml' for name in ('old', 'new', 'back'))
+    write_model(new, stages[2], OLD)
+    old.write_text(in_the_old_place(new.read_text()))
+    assert model_values(read_parameters(old)) == stages[2]
+    write_model(back, stages[2], old)
+    # No line is lost; effects may stand on the other side of a comment.
+    assert sorted(back.read_text().splitlines()) == sorted(new.read_text().splitlines())
+    assert read_parameters(back) == read_parameters(new)
+    done = pprs('history', str(old), '--undo', '--output', str(tmp_path / 'undone.yaml'))
+    assert done.returncode == 0, done.stderr
+    assert model_values(read_parameters(tmp_path / 'undone.yaml')) == stages[1]
+    assert (tmp_path / 'undone.yaml').read_text().count(LEDGER) == 1
+    # In both places there is no telling which one counts.
+    new.write_text(in_the_old_place(new.read_text()) + new.read_text()[
+        new.read_text().index(LEDGER):])
+    with pytest.raises(ModelError, match=r'history.step_01.effect .* must stand once'):
+        read_parameters(new)
+
+
+def test_nothing_but_a_ledger_stands_in_its_section(tmp_path: Path) -> None:
+    file = tmp_path / 'model.yaml'
+    file.write_text(OLD.read_text() + f'{LEDGER}:\n  ros__parameters:\n    gravity: [0.0]\n')
+    with pytest.raises(ModelError, match='holds history alone'):
+        read_parameters(file)
+
+
+def test_a_ledger_of_hundreds_of_steps_is_written_and_read(tmp_path: Path) -> None:
+    """Of dozens of recordings each, it outgrew what was read of a file."""
+    step = replace(STEP, recordings=tuple(f'{k}.csv' for k in range(30)), sha256=('f' * 64,) * 30,
+                   spans=(0.0,) * 60)
+    values = {**default_parameters(), **{
+        key: value for k in range(1, 401)
+        for key, value in step.as_values(f'history.step_{k:02d}').items()}}
+    file = tmp_path / 'model.yaml'
+    write_model(file, values, OLD)
+    assert file.stat().st_size > 1_000_000
+    start = time.process_time()
+    assert len(read_steps(read_parameters(file))) == 400
+    assert time.process_time() - start < 5.0
+
+
+def test_a_ledger_that_could_not_be_read_again_is_not_written(tmp_path: Path) -> None:
+    step = replace(STEP, recordings=('a' * 5000,) * 1001)
+    file = tmp_path / 'model.yaml'
+    with pytest.raises(UnreadableFileError, match='larger than 5 MB'):
+        write_model(file, {**default_parameters(), **step.as_values('history.step_01')}, OLD)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_model_without_steps_has_none_to_take_back(tmp_path: Path) -> None:

@@ -140,6 +140,8 @@ BROKEN = {
     'no_class': (GOOD, '{module}:Thine', 'cannot be imported (AttributeError'),
     'fails': ('raise OSError("no licence\\nserver")', '{module}:Mine',
               'cannot be imported (OSError: no licence server)'),
+    'paints': ('raise OSError("\x1b[2J\x1b]0;mine\x07")', '{module}:Mine',
+               r'cannot be imported (OSError: \x1b[2J\x1b]0;mine\x07'),
     'quits': ('raise SystemExit(3)', '{module}:Mine', 'cannot be imported (SystemExit: 3)'),
     'no_effect': ('class Mine: pass', '{module}:Mine', 'a class derived from CatalogueEffect'),
     'no_card': (GOOD.replace('card = ', 'chart = '), '{module}:Mine', 'Mine must have card'),

@@ -40,6 +40,9 @@ FILES = {
     'an open list': (f'{HEAD}    a: {"[" * 100_000}\n', f'more than {DEEPEST}'),
     'nested blocks': (block(300), f'more than {DEEPEST}'),
     'size': (HEAD + '    a: 1.0\n' * (LARGEST // 5), 'larger than'),
+    'values': (f'{HEAD}    a: [{"1," * 100_001}]\n', 'more than 100000 keys and values'),
+    'a number of groups': (f'{HEAD}    gravity: [0.0, 1_0, 0.0]\n', 'line 3: 1_0 is a number'),
+    'hours and minutes': (f'{HEAD}    gravity: [0.0, 1:30, -1:30.5]\n', 'line 3: 1:30 is a'),
     'a number of any length': (f'{HEAD}    gravity: {"9" * 5000}\n', 'has 5000 characters'),
     'a number to base 60': (f'{HEAD}    gravity: {":".join(["1"] * 50_000)}\n', 'characters'),
     'a tagged time': (f'{HEAD}    gravity: !!timestamp soon\n', 'is a tag'),
@@ -62,7 +65,8 @@ def test_files_out_of_bounds_are_one_sentence_within_a_second(
     assert '\n' not in str(caught.value)
 
 
-@pytest.mark.parametrize('number', [':'.join(['59'] * 300) + '.5', '0x' + 'f' * 900, '9' * 900])
+@pytest.mark.parametrize('number', [
+    ':'.join(['59'] * 300) + '.5', '\uff11.5', '1.\uff10e3', '0x' + 'f' * 900, '9' * 900])
 def test_numbers_within_bounds_that_are_none_are_one_sentence(
     tmp_path: Path, number: str,
 ) -> None:

@@ -57,7 +57,8 @@ def _ended(given: Sequence[str]) -> int:
         check_files(options)
         status: int = _module(options.command).run(options)
     except PprsError as error:
-        _say(str(error), given)
+        # What other packages and files say may hold what a terminal would obey.
+        _say(displayed(error), given)
         return 2
     except KeyboardInterrupt:
         _say('interrupted', given)

@@ -28,6 +28,9 @@ PER_WORKER = 4  # items in the cluster for each worker: enough that none waits
 ALLOWED_FAILURES = 2
 ASKED_EVERY = 5.0  # [s], for workers that have come or gone
 REACHED_WITHIN = '15s'  # the scheduler
+# Without a word from a worker of a cluster of its own, which tells of itself twice a second: it is
+# killed and started again, and others do its work.
+SILENCE = '60s'
 
 
 class SchedulerError(PprsError, ConnectionError):
@@ -67,7 +70,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
             return
         settings = {'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
                     # Workers that are killed with their nannies are nobody's to restart.
-                    'distributed.worker.daemon': True}
+                    'distributed.worker.daemon': True,
+                    'distributed.scheduler.worker-ttl': SILENCE}
         with dask.config.set(settings), _workers_spared():
             try:
                 local = library.LocalCluster(

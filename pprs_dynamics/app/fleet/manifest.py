@@ -179,11 +179,13 @@ def find_recordings(patterns: Sequence[str]) -> Iterator[Entry]:
             found = True
             yield Entry(path, PurePosixPath(path.rpartition('://')[2]).parent.name or 'robot')
         if not found:
-            raise UnreadableFileError(pattern, 'there is no recording: no file, no folder with '
-                                      f'{", ".join(ENDINGS)} or bags, and no match')
+            raise UnreadableFileError(pattern or "''", 'there is no recording: no file, no '
+                                      f'folder with {", ".join(ENDINGS)} or bags, and no match')
 
 
 def _matching(pattern: str) -> Iterator[str]:
+    if not pattern:  # which would be the present folder
+        return
     system, root = filesystem(pattern)
     named = system.unstrip_protocol if is_remote(pattern) else str
     with reached(pattern):

@@ -109,10 +109,17 @@ class Store:
             system.makedirs(path, exist_ok=True)
 
     def has(self, robot: str, key: str) -> bool:
-        """Return whether a recording is done."""
-        system, path = filesystem(self.place(robot, key))
+        """Return whether a recording is done: its part is there, and whole."""
+        pa, (system, path) = arrow(), filesystem(self.place(robot, key))
         with reached(self.path):
-            return bool(system.exists(path))
+            if not system.exists(path):
+                return False
+            content = system.cat_file(path)
+        try:
+            pa.parquet.read_table(BytesIO(content), schema=schema())
+        except (pa.ArrowException, OSError):  # torn, or bytes flipped: done again
+            return False
+        return True
 
     def write(self, robot: str, key: str, rows: Sequence[Mapping[str, Any]],
               failed: bool = False) -> None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -226,6 +227,8 @@ def read_recording(
     MissingLibraryError
         For a bag, where rosbags is not installed.
     """
+    if not os.fspath(path):  # which would be the present folder
+        raise UnreadableFileError("''", 'the name of a recording must not be empty')
     path = Path(path)
     try:
         # A name that promises a bag is read as one, for the reason why it is none.

@@ -180,23 +180,10 @@ class NoiseSpectrum:
         return values
 
     @property
-    def slow_rms(self) -> float:
-        """Root of the mean square of what has a corner far below the highest [N]."""
-        return self._rms_of(np.concatenate(([False], self._is_slow)))
-
-    @property
     def fast_rms(self) -> float:
-        """Root of the mean square of the rest [N]."""
-        return self._rms_of(np.concatenate(([True], ~self._is_slow)))
-
-    @property
-    def _is_slow(self) -> np.typing.NDArray[np.bool_]:
-        slow: np.typing.NDArray[np.bool_] = self.corners < SLOW_SHARE * self.corners[-1]
-        return slow
-
-    def _rms_of(self, chosen: np.typing.NDArray[np.bool_]) -> float:
-        part = replace(self, amplitudes=np.where(chosen, self.amplitudes, 0.0))
-        return part.rms
+        """Root of the mean square of what has no corner far below the highest [N]."""
+        fast = np.concatenate(([True], self.corners >= SLOW_SHARE * self.corners[-1]))
+        return replace(self, amplitudes=np.where(fast, self.amplitudes, 0.0)).rms
 
 
 def _shapes(corners: Array, frequency: Array) -> Array:

@@ -47,6 +47,7 @@ from pprs_dynamics.physics.effects.laws.spherical_friction import SphericalFrict
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
+from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -113,7 +114,8 @@ def catalogue() -> dict[str, type[CatalogueEffect]]:
         try:
             effect = _load(point, effects)
         except _UnusableEffectError as error:
-            warnings.warn(f'{_origin(point)} is left out: {error}', RuntimeWarning, stacklevel=2)
+            warnings.warn(displayed(f'{_origin(point)} is left out: {error}'), RuntimeWarning,
+                          stacklevel=2)
         else:
             effects[effect.name] = effect
     return effects

@@ -26,6 +26,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
 from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
 from pprs_dynamics.physics.three_pprs.robot import Robot
 from pprs_dynamics.physics.three_pprs.state import DriveStates, MechanismState
+from pprs_dynamics.system.plain_text import displayed
 
 # Errors that an effect may raise on purpose: a file's values are wrong ...
 OF_FILES = (ModelError,)
@@ -64,7 +65,8 @@ def _guarded(
         except _WrongResultError as error:
             raise EffectError(effect.name, f'{method.__name__} returned {error}') from None
         except (Exception, SystemExit) as error:  # another package's code may do anything
-            reason = ' '.join(f'{type(error).__name__}: {error}'.split()).removesuffix(':')
+            reason = displayed(' '.join(
+                f'{type(error).__name__}: {error}'.split())).removesuffix(':')
             raise EffectError(
                 effect.name, f'{method.__name__} raised {reason}{_place(effect, error)}') from error
 

@@ -36,7 +36,7 @@ from pprs_dynamics.physics.model.force_model import (
 )
 from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism
 from pprs_dynamics.physics.model.limits import Limits
-from pprs_dynamics.physics.model.one_pass import FORCES, OnePass
+from pprs_dynamics.physics.model.one_pass import OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
@@ -63,36 +63,10 @@ class DriveForces(Forces):
 
     mechanism: MechanismState
 
-    @classmethod
-    def of_one_pass(
-        cls, one_pass: OnePass, motion: PlatformMotion, table: Array,
-    ) -> DriveForces:
-        """Return the forces in a table of `OnePass.forces`.
-
-        Of one sample, parts and mechanism would take as long as the calculation: they are made
-        when somebody looks at them.
-        """
-        forces = object.__new__(cls)
-        own = forces.__dict__
-        own['total'], own['_origin'] = table[0], (one_pass, motion, table)
-        return forces
-
-    @cached_property
+    @property
     def drive_motion(self) -> tuple[Array, ...]:
         """Position, velocity and acceleration of the drives [m, m/s, m/s^2], (N, 6) each."""
-        if '_origin' in self.__dict__:
-            table = self.__dict__['_origin'][2]
-            if len(table) > FORCES:
-                return tuple(table[FORCES:])
         return self.mechanism.kinematics.drive_motion
-
-    def __getattr__(self, name: str) -> Any:
-        origin = self.__dict__.get('_origin')
-        if origin is None or name not in ('parts', 'mechanism'):
-            raise AttributeError(f'{type(self).__name__!r} object has no attribute {name!r}')
-        one_pass, motion, table = origin
-        made = _parts(table) if name == 'parts' else one_pass.mechanism(motion, table)
-        return self.__dict__.setdefault(name, made)
 
 
 def _parts(table: Array) -> dict[str, Array]:
@@ -223,10 +197,10 @@ class DriveModel(ForceModel):
         table = None if one_pass is None else one_pass.forces(motion)
         if one_pass is None or table is None:
             return self.forces_at(self.mechanism(motion), state)
+        parts, mechanism = _parts(table), one_pass.mechanism(motion, table)
         added = self.effects[2:]
-        if not added:
-            return DriveForces.of_one_pass(one_pass, motion, table)
-        return self._with_effects(added, _parts(table), one_pass.mechanism(motion, table), state)
+        return (self._with_effects(added, parts, mechanism, state) if added
+                else DriveForces(table[0], parts, mechanism))
 
     @cached_property
     def _one_pass(self) -> OnePass | None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.model.keys import as_list
+from pprs_dynamics.physics.model.keys import LARGEST, as_list
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
@@ -210,14 +210,15 @@ def _read_step(prefix: str, block: Mapping[str, Any]) -> Step:
 
 
 def _checked(key: str, value: Any, kind: str) -> Any:
-    rules = {'str': 'a word', 'bool': 'true or false', 'float': 'a number'}
+    rules = {'str': 'a word', 'bool': 'true or false', 'float': 'a finite number'}
     element = kind.removeprefix('tuple[').removesuffix(', ...]')
     if kind != element:
         if isinstance(value, str) or not isinstance(value, Sequence):
             raise ModelError(key, value, 'be a list')
         return tuple(_checked(key, item, element) for item in value)
     right = {'str': isinstance(value, str), 'bool': isinstance(value, bool),
-             'float': isinstance(value, (int, float)) and not isinstance(value, bool)}[element]
+             'float': isinstance(value, (int, float)) and not isinstance(value, bool)
+             and -LARGEST <= value <= LARGEST}[element]
     if not right:
         raise ModelError(key, value, f'be {rules[element]}')
     return float(value) if element == 'float' else value

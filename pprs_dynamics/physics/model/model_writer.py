@@ -5,7 +5,7 @@
 
 A file that exists is edited: what does not change keeps its place and its comments, so that a
 diff against the old one shows what was changed and nothing else. The blocks `effects` and
-`history`, which commands write, are written anew at the end.
+the ledger, which commands write, are written anew at the end of the model and of the file.
 
 A library that keeps comments, ruamel.yaml, formats the whole file anew. Of 15 forms in which a
 model file may be written it changed untouched lines in nine: four spaces of indentation (40
@@ -36,16 +36,19 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     mechanism_block,
 )
+from pprs_dynamics.physics.model.ledger import BLOCK
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import (
+    LEDGER,
     other_nodes,
     parse_parameters,
     read_parameters,
 )
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
 from pprs_dynamics.system.output_files import write_text
 
-WRITTEN = ('effects', 'history')  # blocks of commands; the rest is people's
+WRITTEN = ('effects', BLOCK)  # blocks of commands; the rest is people's
 INDENT = '  '
 DEPTH = 2  # of the keys, below /** and ros__parameters
 COMMENT_COLUMN = 46
@@ -81,11 +84,15 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
             urdf = Path(base or path).absolute().parent / values[key]
             values = {**values, key: os.path.relpath(urdf, folder)}
     if base is None:
-        write_text(path, format_model(values, str(path)))
-        return
-    refuse_same_file(path, base)
-    write_text(path, edit_model(Path(base).read_text(encoding='utf-8'),
-                                {**kept_parameters(base), **values}, str(path)))
+        text = format_model(values, str(path))
+    else:
+        refuse_same_file(path, base)
+        text = edit_model(Path(base).read_text(encoding='utf-8'),
+                          {**kept_parameters(base), **values}, str(path))
+    # What could not be read again is not written.
+    check_size(text.encode('utf-8'), path)
+    check_bounds(text, path)
+    write_text(path, text)
 
 
 def refuse_same_file(path: str | PathLike[str], base: str | PathLike[str]) -> None:
@@ -123,7 +130,7 @@ def format_model(values: Mapping[str, Any], path: str = '') -> str:
     ordered.update((key, value) for key, value in values.items() if key not in ordered
                    and not key.startswith(tuple(f'{block}.' for block in WRITTEN)))
     lines = ['/**:', f'{INDENT}ros__parameters:', *_lines(ordered, DEPTH, keys),
-             *_written_blocks(values)]
+             *_effects_block(values), *_ledger_section(values)]
     return _verified('\n'.join(lines) + '\n', values)
 
 
@@ -166,7 +173,7 @@ class _NotEditableError(Exception):
 
 
 def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    root: Any = yaml.compose(text, Loader=yaml.SafeLoader)
     block = _model_block(root)
     if block.flow_style or not block.value:
         raise _NotEditableError
@@ -188,10 +195,10 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
                             _value(value)))
         else:
             changes.append(_replacement(text, node, _value(value)))
-    # The written blocks go, with their lines, and come anew after the last key.
+    # The written blocks go, with their lines, and come anew after the last key and at the end.
     end = max(_last_line(node) for key, node in block.value) + 1
-    for key, node in block.value:
-        if key.value.split('.')[0] in WRITTEN:
+    for key, node in (*block.value, *root.value):
+        if key.value.split('.')[0] in (*WRITTEN, LEDGER):
             changes.append((starts[key.start_mark.line], starts[_last_line(node) + 1], ''))
     indent = block.value[0][0].start_mark.column
     there = {key.value.split('.')[0] for key, _ in block.value}
@@ -203,12 +210,14 @@ def _edited(text: str, old: Mapping[str, Any], wanted: Mapping[str, Any]) -> str
         *(f'{" " * indent}{key}: {_value(value)}' for key, value in new.items()
           if key not in whole),
         *(shift + line for line in _lines(whole, DEPTH, keys)),
-        *_written_blocks(wanted, indent)])
+        *_effects_block(wanted, indent)])
     if not text.endswith('\n') and end == len(lines):
         blocks = '\n' + blocks
     changes.append((starts[end], starts[end], blocks + '\n' * bool(blocks)))
     for start, stop, change in sorted(changes, key=lambda change: change[:2], reverse=True):
         text = text[:start] + change + text[stop:]
+    if ledger := _ledger_section(wanted):
+        text += '\n' * (not text.endswith('\n')) + '\n'.join(ledger) + '\n'
     return text
 
 
@@ -250,24 +259,27 @@ def _last_line(node: yaml.Node) -> int:
     return int(mark.line - (mark.column == 0 and mark.line > node.start_mark.line))
 
 
-def _written_blocks(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
-    found = {key: values[key] for block in WRITTEN for key in sorted(
-        (key for key in values if key.startswith(f'{block}.')),
+def _ledger_section(values: Mapping[str, Any]) -> list[str]:
+    found = {key: value for key, value in values.items() if key.startswith(f'{BLOCK}.')}
+    return [f'{LEDGER}:', f'{INDENT}ros__parameters:', *_lines(found, DEPTH, {})] if found else []
+
+
+def _effects_block(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
+    found = {key: values[key] for key in sorted(
+        (key for key in values if key.startswith('effects.')),
         key=lambda key: _rank(key, values))}
     return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
 
 
 def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return where a key of the written blocks stands: effects as added, drives in order.
+    """Return where a key of the effects stands: effects as added, drives in order.
 
     `effects.active` is the last of its block: `ros2 param load` sets one key after the other,
     and a node takes no effect whose parameters it does not have.
     """
     active, drives = values.get('effects.active') or (), values.get(
         drives_key(mechanism_block(values)), DRIVES)
-    block, name, *rest = key.split('.')
-    if block != 'effects':
-        return (2,)
+    _, name, *rest = key.split('.')
     if not rest:
         return (1,)
     order = active.index(name) if name in active else len(active)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from os import PathLike
@@ -16,6 +17,9 @@ from pprs_dynamics.physics.model.keys import ADDED, NAMES
 from pprs_dynamics.system.bounded_yaml import parse, read_text
 
 DEFAULT_MODEL = 'config/paper.yaml'
+# Section of the ledger. ROS 2 reads only sections of nodes; no node has this name, so that the
+# ledger is no node's parameter. Files of before have it among the model's keys.
+LEDGER = '/pprs_dynamics/ledger'
 
 
 def find_file(path: str | PathLike[str]) -> Path:
@@ -26,6 +30,8 @@ def find_file(path: str | PathLike[str]) -> Path:
     UnreadableFileError
         Where there is neither.
     """
+    if not os.fspath(path):  # which would be the present folder
+        raise UnreadableFileError("''", 'the name of a model file must not be empty')
     given = Path(path)
     if given.exists() or given.is_absolute():
         return given
@@ -62,9 +68,11 @@ def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
 def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any]:
     """Return the flat keys and values of a parameter file's text; `path` is named in errors."""
     flat: dict[str, Any] = {}
-    for key, value in _flatten(_parameters_block(path, parse(text, path))):
+    model, ledger = _parameters_blocks(path, parse(text, path))
+    for key, value in (*_flatten(model), *_flatten(ledger)):
         if key in flat:
-            raise ModelError(key, value, 'stand once: it is given nested and with dots', str(path))
+            raise ModelError(key, value, 'stand once: nested, with dots, or in a section of its '
+                             'own', str(path))
         flat[key] = value
         if isinstance(value, list) and len({type(element) for element in value}) > 1:
             raise ModelError(key, value, 'hold elements of one type, as ROS 2 demands '
@@ -75,12 +83,13 @@ def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any
 def other_nodes(text: str) -> dict[str, Any]:
     """Return the blocks of a parameter file's text that are for single nodes, not the model."""
     content = parse(text)
-    chosen = _parameters_block('', content)
+    chosen = _parameters_blocks('', content)
     return {node: block for node, block in content.items()
-            if block['ros__parameters'] is not chosen}
+            if not any(block['ros__parameters'] is one for one in chosen)}
 
 
-def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
+def _parameters_blocks(path: object, content: Any) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Return the block of the model and that of its ledger."""
     if not isinstance(content, Mapping) or not content:
         raise UnreadableFileError(path, 'not a model file: it must map /** to ros__parameters')
     blocks: dict[str, Mapping[str, Any]] = {}
@@ -89,6 +98,11 @@ def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
             raise UnreadableFileError(
                 path, f'not a model file: {node} must hold a mapping ros__parameters')
         blocks[node] = block['ros__parameters']
+    ledger = blocks.pop(LEDGER, {})
+    for key, value in _flatten(ledger):
+        if not key.startswith('history'):
+            raise ModelError(key, value, f'not stand under {LEDGER}, which holds history alone',
+                             str(path))
     if '/**' in blocks:
         for node, block in blocks.items():
             for key, _ in _flatten(block) if node != '/**' else ():
@@ -96,11 +110,11 @@ def _parameters_block(path: object, content: Any) -> Mapping[str, Any]:
                     raise UnreadableFileError(
                         path, f'{key} of the model stands under {node}: put it under /**, for '
                         'every node and command alike')
-        return blocks['/**']
-    if len(blocks) > 1:
+        return blocks['/**'], ledger
+    if len(blocks) != 1:
         raise UnreadableFileError(
             path, f'parameters of {len(blocks)} nodes and none for all: put the model under /**')
-    return next(iter(blocks.values()))
+    return next(iter(blocks.values())), ledger
 
 
 def _flatten(block: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:

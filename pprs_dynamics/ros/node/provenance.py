@@ -14,7 +14,7 @@ from typing import Any
 
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import FILES
-from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, LEDGER, find_file
 from pprs_dynamics.system.bounded_yaml import parse, read_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -69,7 +69,7 @@ def folder_of(name: str, arguments: Sequence[str] | None = None) -> Path:
 
 def _names_in(path: Path) -> list[str]:
     return [name.partition(BLOCK)[2] for name in _flat(parse(read_text(path), path))
-            if BLOCK in name]
+            if BLOCK in name and not name.startswith(LEDGER)]
 
 
 def _names_on(arguments: Sequence[str]) -> list[str]:
