@@ -242,6 +242,9 @@ def _messages(
 ) -> Iterator[tuple[int, bytes]]:
     try:
         for _, stamp, data in reader.messages(connections):
+            if not (isinstance(stamp, int) and isinstance(data, bytes)):
+                # A cell of sqlite is of any type, and a flipped bit makes it another one.
+                raise TypeError('a message is no bytes')
             yield stamp, data
     except Exception as error:
         raise UnreadableFileError(path, _damaged(error)) from None
