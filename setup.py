@@ -35,7 +35,7 @@ setup(
     maintainer='The pprs_dynamics founders',
     maintainer_email='pprs-dynamics@example.org',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['py.typed', 'app/browser/*',
+    package_data={package_name: ['py.typed', 'config/*.yaml', 'app/browser/*',
                                  'app/report/plotly-basic.*', 'app/report/uplot.*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
@@ -67,6 +67,7 @@ setup(
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',
+                 'cosmic-ray>=8.3',  # make mutants
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
                  'colcon-common-extensions', 'colcon-ros',
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.

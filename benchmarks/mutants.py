@@ -46,7 +46,7 @@ TESTS = {
     'physics/three_pprs/jacobians.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
     'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
     'physics/effects/laws/passive_friction.py': ('physics/test_dynamics.py',),
-    'physics/effects/guard.py': ('physics/test_user_effects.py',),
+    'physics/effects/foreign_effects.py': ('physics/test_user_effects.py',),
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
     'measurement/residuals/noise.py': ('measurement/test_noise.py',),
@@ -99,6 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             found += mutants
             print(_row(mutants), flush=True)
             if options.json:
+                options.json.parent.mkdir(parents=True, exist_ok=True)
                 options.json.write_text(json.dumps([asdict(one) for one in found], indent=1))
     killed = sum(one.outcome != 'survived' for one in found)
     print(f'{killed} of {len(found)} killed')

@@ -32,7 +32,7 @@ from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects
-from pprs_dynamics.simulation.robot import SimulatedRobot
+from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 LEAD_IN = 2.0  # [s] from the home pose to the path's start, not counted
 AHEAD = 0.05  # [s] that each pose is sent before its moment, as a trajectory controller is fed

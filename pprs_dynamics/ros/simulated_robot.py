@@ -29,8 +29,8 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects
-from pprs_dynamics.simulation.robot import SimulatedRobot
 from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 PARAMETERS = (
     NodeParameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),

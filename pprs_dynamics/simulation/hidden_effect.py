@@ -22,7 +22,7 @@ from pprs_dynamics.errors import PprsError
 
 if TYPE_CHECKING:
     from pprs_dynamics.simulation.closed_chains import ClosedChains
-    from pprs_dynamics.simulation.joint_friction import JointFriction
+    from pprs_dynamics.simulation.engine_friction import EngineFriction
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 """Names of the drives, in the interface's order."""
@@ -201,7 +201,7 @@ class DriveForce(DriveBound):
 
     steep: ClassVar[bool] = False
 
-    def prepare(self, friction: JointFriction) -> None:
+    def prepare(self, friction: EngineFriction) -> None:
         """Take note of the robot's own friction before it starts; by default not."""
         return
 
@@ -214,7 +214,7 @@ class DriveForce(DriveBound):
         return
 
 
-class PassiveFriction(HiddenEffect):
+class HiddenJointFriction(HiddenEffect):
     """Friction in the passive joints; `joint` is 'revolute' or 'spherical'."""
 
     joint: ClassVar[str]

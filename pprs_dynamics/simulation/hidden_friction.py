@@ -10,13 +10,13 @@ from typing import ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     DriveForce,
     DriveMoment,
-    PassiveFriction,
+    HiddenJointFriction,
     Range,
 )
-from pprs_dynamics.simulation.joint_friction import JointFriction
 
 WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
@@ -140,7 +140,7 @@ class Hysteresis(DriveForce):
         'distance': Range('m', 0.0003, 0.002, 'log', scales=True, neutral=1.0),
         'power': Range('1', 1.0, 2.5, neutral=1.0)}
 
-    def prepare(self, friction: JointFriction) -> None:
+    def prepare(self, friction: EngineFriction) -> None:
         """Start from a relaxed contact."""
         self._coulomb, self._width = friction.dry[:6], friction.width[:6]
         self._z = np.zeros(6)
@@ -173,7 +173,7 @@ class FrictionDrift(DriveForce):
         'cooling_time': Range('s', 60.0, 200.0, 'log', neutral=1.0), 'width': WIDTH}
     steep: ClassVar[bool] = True
 
-    def prepare(self, friction: JointFriction) -> None:
+    def prepare(self, friction: EngineFriction) -> None:
         """Start cold."""
         # Heat per F, so that the fading does not depend on the strength: a path [m].
         self._heat = np.zeros(6)
@@ -191,7 +191,7 @@ class FrictionDrift(DriveForce):
         self._heat = self._heat + duration * (np.abs(moment.velocity) - cooling)
 
 
-class _PassiveJointFriction(PassiveFriction):
+class _PassiveJointFriction(HiddenJointFriction):
     form: ClassVar[str] = 'c s_1 asinh(s / s_1) + M s / sqrt(s^2 + w^2)'
     ranges: ClassVar[dict[str, Range]] = {
         'viscous': Range('N m s/rad', 0.04, 0.15, 'log', scales=True),

@@ -43,6 +43,7 @@ from pprs_dynamics.simulation.closed_chains import (
     ClosedChains,
     Equations,
 )
+from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveMoment,
@@ -50,7 +51,6 @@ from pprs_dynamics.simulation.hidden_effect import (
     PlatformMoment,
     StructureForce,
 )
-from pprs_dynamics.simulation.joint_friction import JointFriction
 from pprs_dynamics.simulation.resistance import Resistance
 
 LOAD_ROUNDS = 20
@@ -153,7 +153,7 @@ class Plant:
                                 values['limits.lift_stroke'][0]], 3)
         self.upper = np.repeat([values['limits.slide_stroke'][1],
                                 values['limits.lift_stroke'][1]], 3)
-        friction = JointFriction(
+        friction = EngineFriction(
             values, np.asarray(self.settings.drive_width), self.settings.passive_width,
             self.settings.friction)
         self.resistance = Resistance(friction, effects)

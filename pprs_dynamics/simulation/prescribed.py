@@ -33,6 +33,7 @@ from pprs_dynamics.simulation.closed_chains import (
     ClosedChains,
 )
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
+from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveForce,
@@ -40,7 +41,6 @@ from pprs_dynamics.simulation.hidden_effect import (
     HiddenEffect,
     StructureForce,
 )
-from pprs_dynamics.simulation.joint_friction import JointFriction
 from pprs_dynamics.simulation.plant import LOAD_ROUNDS, LOAD_TOLERANCE, PlantSettings
 from pprs_dynamics.simulation.resistance import JOINT_OF_RATE, Resistance
 from pprs_dynamics.simulation.sensors import SensorFaults
@@ -129,7 +129,7 @@ class PrescribedPlant:
             of the first sample.
         """
         motion, settings = self.motion, self.settings
-        friction = JointFriction(self.values, np.asarray(settings.drive_width),
+        friction = EngineFriction(self.values, np.asarray(settings.drive_width),
                                  settings.passive_width, settings.friction)
         resistance = Resistance(friction, effects)
         bodies = self._bodies_with([e for e in effects if isinstance(e, BodyChange)])

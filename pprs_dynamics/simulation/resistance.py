@@ -12,13 +12,13 @@ from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import Equations
+from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     DriveForce,
     DriveMoment,
     HiddenEffect,
-    PassiveFriction,
+    HiddenJointFriction,
 )
-from pprs_dynamics.simulation.joint_friction import JointFriction
 
 FORCE_TOLERANCE = 1e-8  # [N]
 # A Newton step shorter than this share of the width in which friction turns over leaves an
@@ -39,16 +39,16 @@ class Resistance:
 
     Parameters
     ----------
-    friction : JointFriction
+    friction : EngineFriction
         By the model file.
     effects : sequence of HiddenEffect
         Those of other kinds are left to others.
     """
 
-    def __init__(self, friction: JointFriction, effects: Sequence[HiddenEffect]) -> None:
+    def __init__(self, friction: EngineFriction, effects: Sequence[HiddenEffect]) -> None:
         self.friction = friction
         self.drive_forces = [e for e in effects if isinstance(e, DriveForce)]
-        self._passive_friction = [e for e in effects if isinstance(e, PassiveFriction)]
+        self._passive_friction = [e for e in effects if isinstance(e, HiddenJointFriction)]
         for force in self.drive_forces:
             force.prepare(friction)
         self._resolved = RESOLVED_SHARE * float(friction.width[:6].min())

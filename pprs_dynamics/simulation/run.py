@@ -17,8 +17,8 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.plant import PlantSettings, Truth
-from pprs_dynamics.simulation.robot import SimulatedRobot
 from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,7 @@ from ros_processes import executable
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.simulation.hidden_effects import draw_effects
-from pprs_dynamics.simulation.robot import SimulatedRobot
+from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 
 @pytest.mark.parametrize(('name', 'scale'), [

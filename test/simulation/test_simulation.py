@@ -28,9 +28,9 @@ from pprs_dynamics.simulation.hidden_effects import (
     draw_effect,
 )
 from pprs_dynamics.simulation.plant import Plant, PlantSettings
-from pprs_dynamics.simulation.robot import SimulatedRobot
 from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 MODEL = DriveModel.load('config/paper.yaml')
 QUIET = SensorSettings(quantisation=0.0, true_velocity=True, white_noise=0.0, coloured_noise=0.0)

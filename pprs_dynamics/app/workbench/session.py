@@ -426,7 +426,7 @@ class Session:
         with self._changing(revision):
             tick = self.view_state.ticks.get(effect)
             on = drives or (names_of(tick.best, self.drives) if tick else None)
-            request = EffectRequest.of(f'{effect}:{",".join(on)}' if on else effect, self.drives)
+            request = EffectRequest.named(effect, on or None, self.drives)
             request.require_place(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
                 raise SessionError(f'{self.jobs["adopt"].what} is being adopted, must end first')

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from pprs_dynamics.errors import PprsError
@@ -46,18 +47,31 @@ class EffectRequest:
             For an effect or a drive that does not exist.
         """
         name, colon, listed = text.partition(':')
+        return cls.named(name, [drive.strip() for drive in listed.split(',')] if colon else None,
+                         known)
+
+    @classmethod
+    def named(cls, name: str, on: Iterable[str] | None = None, known: tuple[str, ...] = DRIVES,
+              ) -> EffectRequest:
+        """Return the request of an effect by name, on some of the drives that are known.
+
+        Raises
+        ------
+        EffectRequestError
+            For an effect or a drive that does not exist.
+        """
         effect = find_effect(name)
         if effect is None:
             close = difflib.get_close_matches(name, list(catalogue()), 1)
             hint = f' (did you mean {close[0]}?)' if close else ''
             raise EffectRequestError(f'unknown effect {name!r}{hint}, must be one of '
                                      f'{", ".join(catalogue())}')
-        if not colon:
+        if on is None:
             return cls(effect)
-        drives = tuple(dict.fromkeys(drive.strip() for drive in listed.split(',')))
+        drives = tuple(dict.fromkeys(on))
         if not issubclass(effect, DriveEffect):
-            raise EffectRequestError(f'{text!r} names drives, but {name} is in the structure and '
-                                     'must stand alone')
+            raise EffectRequestError(f'{name} is in the structure and must stand alone, without '
+                                     f'{", ".join(drives) or "drives"}')
         for drive in drives:
             if drive not in known:
                 raise EffectRequestError(f'unknown drive {drive!r}, must be one of '

@@ -241,8 +241,8 @@ def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
 
 def treated_forces(
     model: ForceModel, reconstruction: Reconstruction, progress: Progress | None = None,
-    more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
-) -> dict[str, Array]:
+    more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
+) -> dict[Any, Array]:
     """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
 
     Effects with memory run through each segment and start afresh in the next.
@@ -262,7 +262,7 @@ def treated_forces(
     WorkspaceError, SingularityError
         See `DriveModel.drive_forces`.
     """
-    treated: dict[str, Array] = {}
+    treated: dict[Any, Array] = {}
     share = reconstruction.recorded_share(model)
     state = model.initial_state(reconstruction.start)
     for chunk in reconstruction.chunks():

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,10 +21,15 @@ from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOTION = ('position', 'velocity', 'acceleration')
-# Of the names in a table: variables that each drive has for itself, and those that all share.
-OWN, SHARED = 'own ', 'shared '
 # Between recordings [s], so that times of all together increase.
 PAUSE = 1.0
+
+
+class Variable(NamedTuple):
+    """Key of a variable in a table, beside the names of parts: of each drive, or shared by all."""
+
+    name: str
+    is_shared: bool = False
 
 
 def measure_residuals(
@@ -50,7 +55,7 @@ def measure_residuals(
     ResidualsError
         Where no effort was measured.
     """
-    tables: list[dict[str, Array]] = []
+    tables: list[dict[Any, Array]] = []
     notes: list[str] = []
     total = 2.0 * sum(len(recording.time) for recording in recordings)
     done = 0.0
@@ -78,7 +83,7 @@ def treated_table(
     model: ForceModel, reconstruction: Reconstruction,
     progress: Callable[[int, int], None] | None = None,
     more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
-) -> dict[str, Array]:
+) -> dict[Any, Array]:
     """Return all that a comparison needs of one recording, treated, by name.
 
     Parameters
@@ -89,10 +94,9 @@ def treated_table(
     more : callable, optional
         Gives further quantities to be treated, see `treated_forces`.
     """
-    def variables(forces: Any) -> dict[str, Array]:
-        found = model.variables(forces.mechanism)
-        return {(OWN if values.ndim > 1 else SHARED) + name: values.reshape(len(values), -1)
-                for name, values in found.items()}
+    def variables(forces: Any) -> dict[Variable, Array]:
+        return {Variable(name, values.ndim == 1): values.reshape(len(values), -1)
+                for name, values in model.variables(forces.mechanism).items()}
 
     treat = reconstruction.treat
     table = treated_forces(model, reconstruction, progress,
@@ -100,13 +104,13 @@ def treated_table(
     table['measured'] = treat(reconstruction.effort)
     table['time'] = treat(reconstruction.time[:, None])[:, 0]
     for name in MOTION:
-        table[OWN + name] = treat(getattr(reconstruction, name))
+        table[Variable(name)] = treat(getattr(reconstruction, name))
     edges = [segment.start for segment in reconstruction.segments]
     table['segment'] = np.searchsorted(edges, treat.starts, side='right').astype(float) - 1
     return table
 
 
-def join_tables(model: ForceModel, tables: list[dict[str, Array]]) -> Residuals:
+def join_tables(model: ForceModel, tables: list[dict[Any, Array]]) -> Residuals:
     """Return the residuals of a model on recordings one after the other, from their tables."""
     start, segments = 0.0, 0.0
     for table in tables:
@@ -115,12 +119,10 @@ def join_tables(model: ForceModel, tables: list[dict[str, Array]]) -> Residuals:
         start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
     joined = (tables[0] if len(tables) == 1 else
               {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
-    variables = {name: joined.pop(OWN + name) for name in MOTION}
-    for name in list(joined):
-        if name.startswith(OWN):
-            variables[name.removeprefix(OWN)] = joined.pop(name)
-        elif name.startswith(SHARED):
-            variables[name.removeprefix(SHARED)] = joined.pop(name)[:, 0]
+    variables = {name: joined.pop(Variable(name)) for name in MOTION}
+    for key in [key for key in joined if isinstance(key, Variable)]:
+        values = joined.pop(key)
+        variables[key.name] = values[:, 0] if key.is_shared else values
     time, segment = joined.pop('time'), joined.pop('segment').astype(int)
     measured, total = joined.pop('measured'), joined.pop('total')
     steps = np.diff(time)[np.diff(segment) == 0]

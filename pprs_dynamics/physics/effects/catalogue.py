@@ -17,7 +17,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.guard import guard
+from pprs_dynamics.physics.effects.foreign_effects import guard
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction

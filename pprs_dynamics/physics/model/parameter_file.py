@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator, Mapping
+from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.physics.model.keys import ADDED, NAMES
 from pprs_dynamics.system.bounded_yaml import parse, read_text
 
+PACKAGE = 'pprs_dynamics'
 DEFAULT_MODEL = 'config/paper.yaml'
 # Section of the ledger. ROS 2 reads only sections of nodes; no node has this name, so that the
 # ledger is no node's parameter. Files of before have it among the model's keys.
@@ -35,15 +36,9 @@ def find_file(path: str | PathLike[str]) -> Path:
     given = Path(path)
     if given.exists() or given.is_absolute():
         return given
-    package = Path(__file__).resolve().parents[2]
-    # A source tree or an editable install; a `pip install --target`; a prefix or workspace,
-    # four folders above <prefix>/lib/pythonX.Y/site-packages/pprs_dynamics.
-    roots = [package.parent, package.parent / 'share/pprs_dynamics']
-    roots += [prefix / 'share/pprs_dynamics' for prefix in package.parents[2:5]]
-    roots.append(Path(sys.prefix) / 'share/pprs_dynamics')
-    for root in roots:
-        if (root / given).is_file():
-            return root / given
+    own = Path(str(files(PACKAGE) / str(given)))
+    if own.is_file():
+        return own
     raise UnreadableFileError(path, 'no such file, nor one of that name in the package')
 
 

@@ -23,7 +23,7 @@ from pprs_dynamics.arrays import Array
 SMALLEST_SHARE = 1e-6
 
 
-class JointFriction:
+class EngineFriction:
     """Friction of drives and passive joints.
 
     Parameters
