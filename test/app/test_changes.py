@@ -160,3 +160,14 @@ def test_a_bad_day_is_drawn_in_to_its_neighbours() -> None:
         assert find_changes(DAYS, bad, 1e-4).found == ()
     # Two good levels are no bad days.
     assert find_changes(DAYS, clean + 60.0 * (DAYS[27] <= DAYS), 1e-3).found
+
+
+@pytest.mark.parametrize('unit', [1e-3, 1e3])
+def test_changes_do_not_depend_on_the_unit(unit: float) -> None:
+    value = alternating() + 3.0 * (DAYS[14] <= DAYS)
+    value[20] += 40.0
+    here, there = find_changes(DAYS, value, 0.01), find_changes(DAYS, unit * value, 0.01)
+    assert there.probability == pytest.approx(here.probability, rel=1e-6)
+    assert [one.time for one in there.found] == [one.time for one in here.found]
+    assert [one.size for one in there.found] == pytest.approx(
+        [unit * one.size for one in here.found])

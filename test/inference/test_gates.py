@@ -259,6 +259,17 @@ def test_friction_must_not_push_in_a_tenth_of_the_moving_time(moving: float) -> 
     assert 'friction on lift_1 would push' in refused
 
 
+def test_what_is_no_friction_does_not_push() -> None:
+    """Inertia gives back what it took: no matter how much of it is beside the friction."""
+    both = build_model({**FRICTION.values, 'effects.active': ['coulomb_friction', 'drive_inertia'],
+                        'effects.drive_inertia.lift_2.mass': 1.0})
+    given = friction_residuals(0.0)
+    pulling = replace(given, parts={**given.parts,
+                                    'drive_inertia': -10 * given.parts['active_friction']})
+    one = fit('coulomb_friction', parameters={'lift_2.force': Estimate(-1.0, 0.1, 'N')}, model=both)
+    assert objections.of_physics(one, pulling) == []
+
+
 def test_friction_in_joints_must_not_give_power_to_the_robot() -> None:
     one = fit('revolute_friction', None, parameters={'torque': Estimate(-1.0, 0.1, 'N m')})
     assert objections.of_physics(one, friction_residuals(0.09)) == []
@@ -344,6 +355,15 @@ def test_an_idealised_effect_may_leave_a_tenth_in_another_and_a_fiftieth_in_an_e
     # And leaves nothing itself.
     found = set_of(a=('drive_inertia', 100.0, 1.0), b=('coulomb_friction', 20.0, 1.0))
     assert share(found, 1)[0] > 1e100
+
+
+def test_lack_of_fit_stays_on_its_drives() -> None:
+    found = set_of(a=('drive_spring', 100.0, 1.0), b=('coulomb_friction', 20.0, 1.0))
+    block = found.candidates[0].blocks[0]
+    block.rows[1] = block.rows.pop(0)
+    size, names = share(found, 1)
+    assert size > 1e100
+    assert names == ()
 
 
 def test_lack_of_fit_adds_up_in_squares_and_counts_that_of_the_model() -> None:
