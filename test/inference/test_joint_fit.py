@@ -124,3 +124,18 @@ def test_too_short_a_recording_is_a_sentence() -> None:
                           {}, {}, PERIOD)
     with pytest.raises(ResidualsError, match=r'at most 40 samples .* must hold at least 100'):
         Regression(residuals)
+
+
+def test_what_remains_is_the_error_less_all_that_is_fitted() -> None:
+    regression, blocks = made_up()
+    fit = regression.fit(blocks)
+    for d, series in regression.series.items():
+        rest = series.transform(series.error)
+        for k, column in enumerate(regression.columns):
+            if d in column.rows:
+                rest = rest - fit.coefficients[k] * series.transform(column.rows[d])
+        for block in blocks:
+            if d in block.rows:
+                size = np.ones(1) if block.is_fixed else fit.coefficients[fit.places[block]]
+                rest = rest - size @ block.rows[d]
+        assert regression.remaining(fit, d) == pytest.approx(rest, abs=1e-9)

@@ -208,3 +208,10 @@ def test_a_drive_without_any_noise_has_finite_noise() -> None:
         weights = 1 / (found @ shapes.at_bands) ** 2
     assert np.isfinite(weights).all()
     assert (found > 0).all()
+
+
+def test_the_covariance_at_lag_0_is_the_variance_of_the_samples() -> None:
+    noise = NoiseSpectrum(np.array([0.5, 4.0]), np.array([0.3, 40.0, 9.0]), PERIOD)
+    for period in (PERIOD, 4 * PERIOD):
+        assert noise.covariance(5, period)[0] == pytest.approx(noise.rms_at(period) ** 2)
+        assert abs(noise.rms_at(period) - 1) > 0.1

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,15 +23,19 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 from pprs_dynamics.physics.model.keys import is_gain
 
-COLUMN = 'column '
+
+class Column(NamedTuple):
+    """Key of columns in a table, beside parts and variables."""
+
+    name: str
 
 
-def stacked_columns(tables: list[dict[str, Array]], count: int) -> dict[str, Array]:
+def stacked_columns(tables: list[dict[Any, Array]], count: int) -> dict[str, Array]:
     """Take the columns out of tables, (k, D, M) each by name."""
     stacked: dict[str, Array] = {}
-    for name in [name for name in tables[0] if name.startswith(COLUMN)]:
-        flat = np.concatenate([table.pop(name) for table in tables])
-        stacked[name.removeprefix(COLUMN)] = flat.reshape(len(flat), -1, count).transpose(1, 2, 0)
+    for key in [key for key in tables[0] if isinstance(key, Column)]:
+        flat = np.concatenate([table.pop(key) for table in tables])
+        stacked[key.name] = flat.reshape(len(flat), -1, count).transpose(1, 2, 0)
     return stacked
 
 
@@ -59,14 +63,15 @@ class ColumnCollector:
                         if isinstance(effect, MeasurementEffect)]
         self.kept: list[tuple[Array, ...]] = []
 
-    def __call__(self, forces: Forces) -> dict[str, Array]:
+    def __call__(self, forces: Forces) -> dict[Column, Array]:
         s: Any = forces.mechanism
         effort = forces.total - sum((forces.parts[name] for name in self.sensors),
                                     np.zeros_like(forces.total))
         self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
         columns = self.sensitivities.columns(forces)
         columns[NUMBERS][self.without_gain] = 0.0
-        return {COLUMN + name: (self.share * column).transpose(1, 0, 2).reshape(len(s.velocity), -1)
+        return {Column(name):
+                (self.share * column).transpose(1, 0, 2).reshape(len(s.velocity), -1)
                 for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -153,7 +154,7 @@ class Design:
                    reconstructions: tuple[Reconstruction, ...],
                    progress: Callable[[float], None] | None) -> Design:
         sensitivities = sensitivities_of(model, given)
-        tables: list[dict[str, Array]] = []
+        tables: list[dict[Any, Array]] = []
         full: list[FullRate] = []
         notes: list[str] = []
         for k, reconstruction in enumerate(reconstructions):

@@ -82,7 +82,7 @@ def measure_residuals(
 def treated_table(
     model: ForceModel, reconstruction: Reconstruction,
     progress: Callable[[int, int], None] | None = None,
-    more: Callable[[Any], Mapping[str, Array]] = lambda forces: {},
+    more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
 ) -> dict[Any, Array]:
     """Return all that a comparison needs of one recording, treated, by name.
 

@@ -139,6 +139,29 @@ class Mechanism:
         """Return the derivatives of the efforts by `inertial`, (N, D, 10 B)."""
         return self.at(position, velocity, acceleration).regressor(self)
 
+    def tool_positions(self, position: Array) -> Array:
+        """Return where the tool is in the base's frame, (N, 3) [m]."""
+        rest = np.zeros_like(position)
+        return self.at(position, rest, rest).frame_of(self.structure.tool).p
+
+
+@dataclass(frozen=True, eq=False)
+class Linkage:
+    """The motion of all links of a structure, at N samples.
+
+    Parameters
+    ----------
+    structure : Structure
+    motion : Motion
+    drives : tuple of (N, D) arrays
+        What it was computed for: position, velocity and acceleration.
+    """
+
+    structure: Structure
+    motion: Motion
+    drives: tuple[Array, Array, Array]
+
+    @classmethod
     def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
            ) -> Linkage:
         """Return the motion, or raise as `Mechanism.at`."""
