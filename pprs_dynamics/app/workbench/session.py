@@ -269,8 +269,7 @@ class Session:
         StaleError
             Where the session is at another revision.
         """
-        text = effect if drives is None else f'{effect}:{",".join(drives)}'
-        request = EffectRequest.of(text, self.drives)
+        request = EffectRequest.named(effect, drives, self.drives)
         request.require_place(self.model)
         with self._changing(revision):
             view = self.view_state
@@ -282,8 +281,9 @@ class Session:
                 rest = [tick.best for name, tick in view.ticks.items() if name != effect]
                 offer = self.fits.offered(request.effect, asked, self.fits.at(rest, view.free))
             if offer is None:
-                raise SessionError(f'{text} has nothing to act on in these recordings, or the '
-                                   'model has it already')
+                on = f' on {", ".join(drives)}' if drives else ''
+                raise SessionError(f'{effect}{on} has nothing to act on in these recordings, or '
+                                   'the model has it already')
             return self._linear({**view.ticks, effect: Tick(offer)})
 
     def untick(self, effect: str, revision: int | None = None) -> ViewState:
