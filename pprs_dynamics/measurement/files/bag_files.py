@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -129,10 +129,10 @@ def _merged(path: Path, reader: Reader, connections: list[Connection], drives: t
         f'rosbag2, {topics}', (*findings, *merged.findings))
 
 
-def write_bag(path: Path, samples: Samples, topic: str) -> None:
+def write_bag(path: Path, topics: Mapping[str, Samples]) -> None:
     """Write a bare .mcap or .db3 file by the suffix, or else a bag directory with MCAP.
 
-    Stamps are rounded to 1 ns; they stand in the headers.
+    Every topic gets joint states. Stamps are rounded to 1 ns; they stand in the headers.
 
     Raises
     ------
@@ -141,41 +141,47 @@ def write_bag(path: Path, samples: Samples, topic: str) -> None:
     MissingLibraryError
         Where rosbags is not installed.
     """
-    stamps = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
-    if len(stamps) and (stamps.min() < 0 or stamps.max() >= 2**31 * 10**9):
-        raise UnreadableFileError(
-            path, f'cannot be written: ROS stamps run from 0 to {2**31} s, but the time is '
-            f'{samples.epoch + samples.time.min():.6g} to '
-            f'{samples.epoch + samples.time.max():.6g} s')
+    for samples in topics.values():
+        stamps = _stamps(samples)
+        if len(stamps) and (stamps.min() < 0 or stamps.max() >= 2**31 * 10**9):
+            raise UnreadableFileError(
+                path, f'cannot be written: ROS stamps run from 0 to {2**31} s, but the time is '
+                f'{samples.epoch + samples.time.min():.6g} to '
+                f'{samples.epoch + samples.time.max():.6g} s')
     if path.suffix not in STORAGE:
         with new_folder(path) as folder:
-            _write_directory(folder, samples, stamps, topic, '.mcap')
+            _write_directory(folder, topics, '.mcap')
         return
     target = writable_file(path)
     with scratch_folder(target) as scratch:
-        _write_directory(scratch / 'bag', samples, stamps, topic, path.suffix)
+        _write_directory(scratch / 'bag', topics, path.suffix)
         (scratch / 'bag' / f'bag{path.suffix}').replace(target)
 
 
-def _write_directory(
-    path: Path, samples: Samples, stamps: Indices, topic: str, suffix: str,
-) -> None:
+def _stamps(samples: Samples) -> Indices:
+    stamps: Indices = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
+    return stamps
+
+
+def _write_directory(path: Path, topics: Mapping[str, Samples], suffix: str) -> None:
     _require_rosbags('writing rosbag2 files')
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
-    # A bag is read in the order of recording: it must not follow a clock that is set back.
-    recorded = np.maximum.accumulate(stamps)
     with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
-        connection = writer.add_connection(
-            topic, MESSAGE_TYPE, typestore=get_typestore(Stores.ROS2_KILTED))
-        for start in range(0, len(stamps), BLOCK):
-            part = slice(start, start + BLOCK)
-            velocity = None if samples.velocity is None else samples.velocity[part]
-            rows = serialised(samples.drives, stamps[part], samples.position[part], velocity,
-                              samples.effort[part])
-            for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
-                writer.write(connection, stamp, row.tobytes())
+        for topic, samples in topics.items():
+            stamps = _stamps(samples)
+            # A bag is read in the order of recording: it must not follow a clock that is set back.
+            recorded = np.maximum.accumulate(stamps)
+            connection = writer.add_connection(
+                topic, MESSAGE_TYPE, typestore=get_typestore(Stores.ROS2_KILTED))
+            for start in range(0, len(stamps), BLOCK):
+                part = slice(start, start + BLOCK)
+                velocity = None if samples.velocity is None else samples.velocity[part]
+                rows = serialised(samples.drives, stamps[part], samples.position[part], velocity,
+                                  samples.effort[part])
+                for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
+                    writer.write(connection, stamp, row.tobytes())
 
 
 def _require_rosbags(purpose: str) -> None:

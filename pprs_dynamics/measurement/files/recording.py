@@ -302,7 +302,7 @@ def write_recording(
     if path.suffix == '.csv':
         write_csv(path, recording.samples)
     else:
-        write_bag(path, recording.samples, topic)
+        write_bag(path, {topic: recording.samples})
 
 
 def describe(recording: Recording) -> Summary:

@@ -239,13 +239,28 @@ def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
     return effort
 
 
+def sensed_forces(
+    model: ForceModel, reconstruction: Reconstruction,
+) -> Iterator[tuple[Chunk, Any, dict[str, Array]]]:
+    """Yield chunk by chunk what the model returns, and its efforts as the sensors would see them.
+
+    Effects with memory run through each segment and start afresh in the next.
+    """
+    share = reconstruction.recorded_share(model)
+    state = model.initial_state(reconstruction.start)
+    for chunk in reconstruction.chunks():
+        if chunk.is_start:
+            state = model.initial_state(reconstruction.start)
+        forces = model.measured(model.drive_forces(chunk.motion, state), state)
+        yield chunk, forces, {name: values * share for name, values in {
+            **forces.parts, 'total': forces.total}.items()}
+
+
 def treated_forces(
     model: ForceModel, reconstruction: Reconstruction, progress: Progress | None = None,
     more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
 ) -> dict[Any, Array]:
     """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
-
-    Effects with memory run through each segment and start afresh in the next.
 
     Parameters
     ----------
@@ -263,14 +278,7 @@ def treated_forces(
         See `DriveModel.drive_forces`.
     """
     treated: dict[Any, Array] = {}
-    share = reconstruction.recorded_share(model)
-    state = model.initial_state(reconstruction.start)
-    for chunk in reconstruction.chunks():
-        if chunk.is_start:
-            state = model.initial_state(reconstruction.start)
-        forces = model.measured(model.drive_forces(chunk.motion, state), state)
-        efforts = {name: values * share
-                   for name, values in {**forces.parts, 'total': forces.total}.items()}
+    for chunk, forces, efforts in sensed_forces(model, reconstruction):
         for name, values in {**efforts, **more(forces)}.items():
             if name not in treated:
                 treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
