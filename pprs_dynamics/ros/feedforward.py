@@ -23,6 +23,7 @@ from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.ros.messages.rejection import CODES, Rejection
 from pprs_dynamics.ros.messages.request_reader import reader_for
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
@@ -60,8 +61,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._settings = ModelParameters(self, parameters, self._use_settings)
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
-        self._reader = reader_for(self._settings.model)
-        self._written = command_writer(self._settings.model.drives)
+        names = RobotNames.of(self._settings.model, own['frame_id'])
+        self._reader = reader_for(self._settings.model, names)
+        self._written = command_writer(names)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(CODES, 0)}

@@ -13,9 +13,12 @@ from pprs_dynamics.ros.node.parameters import NodeParameter
 CLAMP = 'clamp'
 HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
 
+FRAME = NodeParameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform')
+
 _PARAMETERS = (
     NodeParameter('autostart', True, 'true: active at once; false: a supervisor configures and '
                   'activates the node'),
+    FRAME,
     NodeParameter('max_age', 0.0, 'oldest header stamp that is accepted [s]; 0: any', lower=0),
     NodeParameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '
                   'reject the message, or take them from a spline through the points',

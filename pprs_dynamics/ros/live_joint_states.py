@@ -33,6 +33,7 @@ from pprs_dynamics.measurement.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.node.qos import UNANSWERED
 
 NAME = 'workbench'
@@ -86,7 +87,8 @@ class LiveJointStates(Node):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            stamp, position, effort = conversions.read_measured(data, self.model.drives)
+            stamp, position, effort = conversions.read_measured(
+                data, RobotNames.of(self.model).joints)
         except Rejection as rejection:
             self._counters['rejected'] += 1
             self._trouble = str(rejection)

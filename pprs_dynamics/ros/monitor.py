@@ -24,8 +24,10 @@ from pprs_dynamics.measurement.residuals.live import (
 from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
+from pprs_dynamics.ros.feedforward_settings import FRAME
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.rejection import CODES, Rejection
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides
@@ -35,6 +37,7 @@ from pprs_dynamics.ros.node.qos import LATCHED, publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 
 PARAMETERS = (
+    FRAME,
     NodeParameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
                   'answers lag by half of it [s]', lower=0.01, upper=2.0),
     NodeParameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
@@ -55,14 +58,16 @@ class MonitorNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
-        parameters = PARAMETERS
+        parameters: tuple[NodeParameter, ...] = PARAMETERS
         if is_mechanism(overrides(self)):
-            parameters = (replace(PARAMETERS[0], default=ARM_WINDOW), *PARAMETERS[1:])
+            parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
+                               for one in PARAMETERS)
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use)
         prepare_beside(self, self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])
+        self._names = RobotNames.of(self._settings.model, own['frame_id'])
         self._begins_anew = self._cannot_begin = False
         self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}
         self._origin: int | None = None
@@ -86,7 +91,7 @@ class MonitorNode(ExplainsRefusals):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            stamp, position, effort = conversions.read_measured(data, self._settings.model.drives)
+            stamp, position, effort = conversions.read_measured(data, self._names.joints)
         except Rejection as rejection:
             self._reject(rejection)
             return
@@ -159,7 +164,7 @@ class MonitorNode(ExplainsRefusals):
                 for time, effort in zip(compared.time, efforts, strict=True):
                     stamp = self._origin + round(time * conversions.NANOSECONDS)
                     topic.publish(conversions.joint_state(
-                        stamp, effort, drives=self._settings.model.drives))
+                        stamp, effort, names=self._names))
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1

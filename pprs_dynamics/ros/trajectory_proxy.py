@@ -29,6 +29,7 @@ from pprs_dynamics.ros.messages.command_cdr import CommandBytes
 from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.request_reader import reader_for
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
@@ -118,7 +119,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         model, own = self._settings.model, self._settings.own
         feedforward = Feedforward(model, own)
         answer = feedforward.answer(self._request(model, goal))
-        trajectory = deserialize_message(CommandBytes(model.drives).joint_trajectory(
+        trajectory = deserialize_message(CommandBytes(RobotNames.of(model)).joint_trajectory(
             0, answer.request.offsets, answer.forces, answer.effort), JointTrajectory)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives
@@ -135,7 +136,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
             return reader_for(model).read(
                 serialize_message(goal.multi_dof_trajectory), now, 0.0, missing)
         # Drives' positions: the platform's motion follows from them.
-        request = read_joint_trajectory(goal.trajectory, model.drives, now, 0.0, missing)
+        request = read_joint_trajectory(
+            goal.trajectory, RobotNames.of(model).joints, now, 0.0, missing)
         drives: Any = request.motion
         found = solve_forward_motion(
             model.robot.geometry, drives.position, drives.velocity, drives.acceleration)

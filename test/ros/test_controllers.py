@@ -13,6 +13,7 @@ import pytest
 import yaml
 from controller_rules import ControllerSettings, objection
 from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics import DriveModel
@@ -21,7 +22,9 @@ from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.request_reader import reader_for
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
@@ -49,7 +52,7 @@ def forwarded(points: int, ahead: float, sample: int = 100) -> JointTrajectory:
         [round(k * 1e9 / RATE) for k in range(points)])
     request = reader_for(model).read(serialize_message(message), NOW, 0.0, 'reject')
     answer = Feedforward(model, OWN).answer(request)
-    found = deserialize_message(CommandBytes(model.drives).joint_trajectory(
+    found = deserialize_message(CommandBytes(conversions.PAPER).joint_trajectory(
         request.start, request.offsets, answer.forces, answer.effort), JointTrajectory)
     assert isinstance(found, JointTrajectory)
     return found
@@ -185,3 +188,26 @@ def controller(action: Any) -> Any:
             server.destroy()
 
     return running()
+
+
+def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
+    model = DriveModel.from_parameters({
+        **DriveModel.load().values, 'joint_prefix': 'left_', 'joint_map.lift_3': 'z_axis'})
+    names = RobotNames.of(model, 'left_base')
+    motion = HelicalPath().motion(np.array([1.0]))
+    for frame, accepted in (('left_base', True), ('', True), ('base', False)):
+        message = conversions.write_trajectory(motion, conversions.time(NOW), [0], frame)
+        read = reader_for(model, names).read
+        if not accepted:
+            with pytest.raises(Rejection, match='left_base'):
+                read(serialize_message(message), NOW, 0.0, 'reject')
+            continue
+        request = read(serialize_message(message), NOW, 0.0, 'reject')
+    answer = Feedforward(model, OWN).answer(request)
+    state = deserialize_message(CommandBytes(names).joint_state(NOW, answer.effort[0]), JointState)
+    assert list(state.name) == ['left_slide_1', 'left_slide_2', 'left_slide_3', 'left_lift_1',
+                                'left_lift_2', 'z_axis']
+    assert state.header.frame_id == 'left_base'
+    measured = conversions.joint_state(NOW, answer.effort[0], np.arange(6.0), np.zeros(6), names)
+    _, position, _ = conversions.read_measured(serialize_message(measured), names.joints)
+    assert position.tolist() == list(range(6))

@@ -24,6 +24,7 @@ from pprs_dynamics.ros.messages import conversions, serialisation
 from pprs_dynamics.ros.messages.cdr_validation import is_whole, message_in
 from pprs_dynamics.ros.messages.command_cdr import CommandBytes
 from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.trajectory_cdr import read_points
 from pprs_dynamics.ros.messages.trajectory_request import read_serialised, read_trajectory
 
@@ -130,15 +131,16 @@ def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected() -> None:
 def test_answers_are_the_messages_that_rclpy_would_send(points: int) -> None:
     forces = DriveModel.load().drive_forces(random_motion(np.random.default_rng(3), points))
     mechanism, effort = forces.mechanism, forces.total
+    written = CommandBytes(conversions.PAPER)
     for stamp in (0, -1_500_000_000, 7_000_000_001, 2**31 * 10**9 + 5):
-        command = deserialize_message(CommandBytes(DRIVES).commands(effort[0]), Float64MultiArray)
+        command = deserialize_message(written.commands(effort[0]), Float64MultiArray)
         assert command == Float64MultiArray(data=effort[0].tolist())
         for values in ((effort[0],), (effort[0], mechanism.position[0], mechanism.velocity[0])):
-            data = CommandBytes(DRIVES).joint_state(stamp, *values)
+            data = written.joint_state(stamp, *values)
             state = deserialize_message(data, JointState)
             assert state == conversions.joint_state(stamp, *values)
         offsets = np.arange(points) * 1_234_567_891
-        data = CommandBytes(DRIVES).joint_trajectory(stamp, offsets, forces, effort)
+        data = written.joint_trajectory(stamp, offsets, forces, effort)
         trajectory = deserialize_message(data, JointTrajectory)
         assert len(data) == len(serialize_message(trajectory))
         assert tuple(trajectory.joint_names) == DRIVES
@@ -221,15 +223,16 @@ def test_an_array_with_dimensions_is_whole() -> None:
 def test_bytes_are_used_where_rclpy_reads_them_and_objects_where_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert isinstance(serialisation.command_writer(DRIVES), CommandBytes)
-    assert isinstance(serialisation.command_writer(('axis',)), CommandBytes)
+    assert isinstance(serialisation.command_writer(conversions.PAPER), CommandBytes)
+    assert isinstance(serialisation.command_writer(RobotNames(('axis',), '')), CommandBytes)
     assert serialisation.trajectories_have_known_bytes()
     # A middleware whose messages have another length word, and one with another layout of points.
     for name in ('commands', 'joint_state', 'joint_trajectory'):
         with monkeypatch.context() as patch:
             known = getattr(CommandBytes, name)
             patch.setattr(CommandBytes, name, lambda *a, known=known: known(*a)[:-8])
-            assert isinstance(serialisation.command_writer(DRIVES), serialisation.CommandObjects)
+            assert isinstance(serialisation.command_writer(conversions.PAPER),
+                              serialisation.CommandObjects)
     monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
     assert not serialisation.trajectories_have_known_bytes()
 

@@ -335,7 +335,7 @@ NAMES = frozenset({*KEYS, *AXIS_KEYS, *mechanism_keys(ARM, 1), *mechanism_keys(R
 NODE_KEYS = frozenset({
     'max_age', 'source', 'file', 'rate', 'points', 'repeat', 'duration', 'seed', 'lead_in',
     'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
-    'window', 'error_span', 'update_rate', 'diagnose_every', 'diagnose_span',
+    'window', 'error_span', 'update_rate', 'diagnose_every', 'diagnose_span', 'frame_id',
     'encoder_resolution', 'effort_noise',
     'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',

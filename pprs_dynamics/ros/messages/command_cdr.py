@@ -6,14 +6,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.model.force_model import Forces
-from pprs_dynamics.ros.messages.conversions import LATEST_SECOND, NANOSECONDS, frame_of
+from pprs_dynamics.ros.messages.conversions import LATEST_SECOND, NANOSECONDS
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.system.cdr import LITTLE_ENDIAN, STAMP, WORD, padded, with_text
 
 
@@ -22,11 +22,11 @@ class CommandBytes:
 
     Parameters
     ----------
-    drives : sequence of D str
+    names : RobotNames
     """
 
-    def __init__(self, drives: Sequence[str]) -> None:
-        self._count = count = len(drives)
+    def __init__(self, names: RobotNames) -> None:
+        self._count = count = len(names.joints)
         self._values = struct.Struct(f'<{count}d')
         self._point = np.dtype([
             *((name, [('count', '<u4', 2), ('values', '<f8', count)])
@@ -34,7 +34,7 @@ class CommandBytes:
             ('sec', '<i4'), ('nanosec', '<u4')])
         # No dimensions, no offset, the numbers, and what aligns them.
         self._commands = padded(LITTLE_ENDIAN + WORD.pack(0) + WORD.pack(0) + WORD.pack(count), 8)
-        self._names = _names(drives)
+        self._names = _names(names)
 
     def commands(self, effort: Array) -> bytes:
         """Return a std_msgs/Float64MultiArray that holds the drives' efforts."""
@@ -87,10 +87,10 @@ def _stamp(moment: int) -> bytes:
     return STAMP.pack(min(seconds, LATEST_SECOND), rest)
 
 
-def _names(drives: Sequence[str]) -> bytes:
+def _names(names: RobotNames) -> bytes:
     """Return frame and names of the drives, as they follow a stamp."""
     start = LITTLE_ENDIAN + bytes(STAMP.size)
-    message = padded(with_text(start, frame_of(drives)), 4) + WORD.pack(len(drives))
-    for drive in drives:
+    message = padded(with_text(start, names.frame), 4) + WORD.pack(len(names.joints))
+    for drive in names.joints:
         message = with_text(message, drive)
     return message[len(start):]

@@ -19,15 +19,16 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.robot_names import BASE, RobotNames
 
 PLATFORM = 'platform'
-BASE_FRAMES = ('', 'base')
+PAPER = RobotNames(DRIVES, BASE)
 NANOSECONDS = 1_000_000_000
 LATEST_SECOND = 2 ** 31 - 1
 
 
 def write_trajectory(
-    motion: PlatformMotion, stamp: Time, offsets: Sequence[int],
+    motion: PlatformMotion, stamp: Time, offsets: Sequence[int], frame: str = BASE,
 ) -> MultiDOFJointTrajectory:
     """Return the message that asks for a platform motion.
 
@@ -37,9 +38,10 @@ def write_trajectory(
     stamp : builtin_interfaces/Time
     offsets : sequence of int
         time_from_start of every point [ns].
+    frame : str, optional
     """
     message = MultiDOFJointTrajectory(joint_names=[PLATFORM])
-    message.header.stamp, message.header.frame_id = stamp, BASE_FRAMES[1]
+    message.header.stamp, message.header.frame_id = stamp, frame
     for sample, offset in enumerate(offsets):
         x, y, z, w = motion.orientation[sample].tolist()
         message.points.append(MultiDOFJointTrajectoryPoint(
@@ -55,19 +57,14 @@ def write_trajectory(
 
 def joint_state(
     stamp: int, effort: Array, position: Array | None = None, velocity: Array | None = None,
-    drives: Sequence[str] = DRIVES,
+    names: RobotNames = PAPER,
 ) -> JointState:
     """Return efforts, and what else is known, at a time [ns]."""
-    message = JointState(name=list(drives), effort=doubles(effort))
+    message = JointState(name=list(names.joints), effort=doubles(effort))
     if position is not None and velocity is not None:
         message.position, message.velocity = doubles(position), doubles(velocity)
-    message.header.stamp, message.header.frame_id = time(stamp), frame_of(drives)
+    message.header.stamp, message.header.frame_id = time(stamp), names.frame
     return message
-
-
-def frame_of(drives: Sequence[str]) -> str:
-    """Return the frame of what drives say: a platform's `base`; that of joints means nothing."""
-    return BASE_FRAMES[1] if tuple(drives) == DRIVES else BASE_FRAMES[0]
 
 
 def read_drives(message: JointState, field: str, may_be_nan: bool = False,

@@ -14,6 +14,7 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.serialisation import trajectories_have_known_bytes
 from pprs_dynamics.ros.messages.trajectory_request import (
     TrajectoryRequest,
@@ -38,14 +39,17 @@ class RequestReader(NamedTuple):
     read: Callable[[bytes, int, float, str], TrajectoryRequest]
 
 
-def reader_for(model: ForceModel) -> RequestReader:
-    """Return how trajectories for a model arrive."""
+def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
+    """Return how trajectories for a model arrive, by the names of its robot."""
+    joints, frame = names or RobotNames.of(model)
     if not isinstance(model, ArmModel):
         if trajectories_have_known_bytes():
-            return RequestReader(MultiDOFJointTrajectory, read_serialised)
-        return RequestReader(MultiDOFJointTrajectory, lambda data, *rules: read_trajectory(
-            message_in(data, MultiDOFJointTrajectory), *rules))
-    joints = model.drives
+            return RequestReader(MultiDOFJointTrajectory,
+                                 lambda data, now, age, missing: read_serialised(
+                                     data, now, age, missing, frame))
+        return RequestReader(
+            MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
+                message_in(data, MultiDOFJointTrajectory), now, age, missing, frame))
 
     def read(data: bytes, now: int, max_age: float, missing: str) -> TrajectoryRequest:
         return read_joint_trajectory(

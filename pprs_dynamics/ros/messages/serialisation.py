@@ -9,7 +9,6 @@ then reads and writes message objects, which costs a long trajectory some 20 ms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,11 +27,11 @@ from pprs_dynamics.ros.messages.conversions import (
     NANOSECONDS,
     doubles,
     duration,
-    frame_of,
     joint_state,
     time,
     write_trajectory,
 )
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.trajectory_cdr import read_points
 
 SAMPLES = 2  # points after the first have another place than it
@@ -44,11 +43,11 @@ class CommandObjects:
 
     Parameters
     ----------
-    drives : sequence of D str
+    names : RobotNames
     """
 
-    def __init__(self, drives: Sequence[str]) -> None:
-        self._drives = tuple(drives)
+    def __init__(self, names: RobotNames) -> None:
+        self._names = names
 
     def commands(self, effort: Array) -> Float64MultiArray:
         """Return the drives' efforts."""
@@ -57,26 +56,26 @@ class CommandObjects:
     def joint_state(self, stamp: int, effort: Array, position: Array | None = None,
                     velocity: Array | None = None) -> JointState:
         """Return the drives at a time [ns]."""
-        return joint_state(stamp, effort, position, velocity, self._drives)
+        return joint_state(stamp, effort, position, velocity, self._names)
 
     def joint_trajectory(
         self, start: int, offsets: Indices, forces: Forces, effort: Array,
     ) -> JointTrajectory:
         """Return all samples; see `CommandBytes.joint_trajectory`."""
-        message = JointTrajectory(joint_names=list(self._drives), points=[
+        message = JointTrajectory(joint_names=list(self._names.joints), points=[
             JointTrajectoryPoint(positions=doubles(position), velocities=doubles(velocity),
                                  accelerations=doubles(acceleration), effort=doubles(efforts),
                                  time_from_start=duration(int(offset)))
             for position, velocity, acceleration, efforts, offset in zip(
                 *forces.drive_motion, effort, offsets, strict=True)])
-        message.header.stamp, message.header.frame_id = time(start), frame_of(self._drives)
+        message.header.stamp, message.header.frame_id = time(start), self._names.frame
         return message
 
 
-def command_writer(drives: Sequence[str]) -> CommandBytes | CommandObjects:
+def command_writer(names: RobotNames) -> CommandBytes | CommandObjects:
     """Return what writes the answers: bytes where rclpy reads from them what objects say."""
-    written, objects = CommandBytes(drives), CommandObjects(drives)
-    numbers = np.arange(4 * SAMPLES * len(drives), dtype=float).reshape(4, SAMPLES, -1) / 7
+    written, objects = CommandBytes(names), CommandObjects(names)
+    numbers = np.arange(4 * SAMPLES * len(names.joints), dtype=float).reshape(4, SAMPLES, -1) / 7
     forces: Any = SimpleNamespace(drive_motion=tuple(numbers[:3]))
     offsets = np.array([0, 1_500_000_000])
     samples = [

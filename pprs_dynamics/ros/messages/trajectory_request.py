@@ -17,8 +17,9 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
 from pprs_dynamics.ros.messages.cdr_validation import message_in
-from pprs_dynamics.ros.messages.conversions import BASE_FRAMES, NANOSECONDS, PLATFORM, nanoseconds
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, PLATFORM, nanoseconds
 from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.robot_names import BASE
 from pprs_dynamics.ros.messages.trajectory_cdr import read_points
 
 REJECT, SPLINE = 'reject', 'spline'
@@ -55,18 +56,20 @@ class TrajectoryRequest(NamedTuple):
 
 
 def read_serialised(
-    data: bytes, now: int, max_age: float = 0.0, missing: str = REJECT,
+    data: bytes, now: int, max_age: float = 0.0, missing: str = REJECT, frame: str = BASE,
 ) -> TrajectoryRequest:
     """Return what the bytes of a message ask for; see `read_trajectory`."""
-    points = read_points(data)
+    # The layout of the bytes is known for the frame's own name and for none.
+    points = read_points(data) if frame == BASE else None
     if points is not None:
         stamp, numbers, offsets = points
         return request_of(start_of(stamp, now, max_age), offsets, _motion_of(numbers))
-    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing)
+    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing, frame)
 
 
 def read_trajectory(
     message: MultiDOFJointTrajectory, now: int, max_age: float = 0.0, missing: str = REJECT,
+    frame: str = BASE,
 ) -> TrajectoryRequest:
     """Return the platform motion that a message asks for.
 
@@ -80,6 +83,8 @@ def read_trajectory(
     missing : {'reject', 'spline'}
         What to do where points have no velocities or no accelerations: 'spline' takes those
         that are missing from a spline through the poses.
+    frame : str
+        In which poses must be given.
 
     Raises
     ------
@@ -92,9 +97,9 @@ def read_trajectory(
     if list(message.joint_names) != [PLATFORM]:
         raise Rejection('NAMES', f'joint_names is {list(message.joint_names)!r:.100}, '
                         f'must be [{PLATFORM!r}]')
-    if message.header.frame_id not in BASE_FRAMES:
+    if message.header.frame_id not in ('', frame):
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
-                        "must be 'base' or empty")
+                        f'must be {frame!r} or empty')
     lacking = check_counts(points, missing)
     start = start_of(nanoseconds(message.header.stamp), now, max_age)
     offsets = offsets_of(points)
