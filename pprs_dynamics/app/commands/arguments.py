@@ -22,8 +22,8 @@ RECORDING = ('.csv', '.mcap', '.db3', '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report')
-INPUTS = ('model', 'recordings', 'validate', 'file', 'manifest', 'store', 'path')
+OUTPUTS = ('output', 'json', 'report', 'mcap')
+INPUTS = ('model', 'recordings', 'validate', 'beside', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
 

@@ -12,13 +12,18 @@ from pprs_dynamics.app.commands.output import tell
 from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
 from pprs_dynamics.app.front_door.compare import compare
 from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console
+from pprs_dynamics.app.report.terminal import console, shown
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser)
     add_details(parser)
+    parser.add_argument('--mcap', metavar='FILE.mcap', type=output_file('.mcap'),
+                        help='write measured effort, model, parts and residual as joint states, '
+                        'with layouts for PlotJuggler and Foxglove beside it')
+    parser.add_argument('--beside', metavar='FILE', help='another model file on the same '
+                        'recordings, or another recording: its errors stand beside')
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
                         help='write a page with all figures')
 
@@ -28,6 +33,11 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     inputs = read_inputs(options, screen)
     with staged_bar(screen) as progress:
-        result = compare(inputs.model, inputs, progress=progress)
+        result = compare(inputs.model, inputs, topic=options.topic, beside=options.beside,
+                         progress=progress)
     tell(result, options, screen)
+    if options.mcap:
+        with staged_bar(screen) as progress:
+            written = result.write_bag(options.mcap, progress)
+        screen.print(f'bag and layouts: {shown(", ".join(map(str, written)))}')
     return 0

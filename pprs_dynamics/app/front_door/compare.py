@@ -6,16 +6,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
 from pprs_dynamics.app.front_door.result import Result, data_frame
-from pprs_dynamics.inference.diagnosis.comparison import Comparison
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.measurement.files.recording import read_for
+from pprs_dynamics.measurement.residuals.comparison_bag import write_comparison
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.measurement.residuals.paired_errors import rms, rms_by_drive
 from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,12 +47,15 @@ class ComparisonResult(Result):
         The numbers.
     notes : tuple of str
         How it was computed.
+    beside : Beside, optional
+        Another model on the same recordings, or this one on another recording.
     """
 
     inputs: Inputs
     residuals: Residuals
     comparison: Comparison
     notes: tuple[str, ...]
+    beside: Beside | None = None
 
     @property
     def rms(self) -> float:
@@ -62,20 +74,53 @@ class ComparisonResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs compare --json` writes."""
-        return {**self.comparison.to_dict(), 'verdict': self.verdict}
+        content = {**self.comparison.to_dict(), 'verdict': self.verdict}
+        return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
         from pprs_dynamics.app.report.tables import comparison_view
 
-        return comparison_view(self.comparison, self._next, details)
+        return comparison_view(self.comparison, self._next, details, self.beside)
 
     def page(self) -> Page:
         """Return the page of `pprs compare --report`."""
         from pprs_dynamics.app.report.comparison_page import comparison_page
 
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
-                               self.comparison, self.notes, self._next)
+                               self.comparison, self.notes, self._next, self.beside)
+
+    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> list[Path]:
+        """Write measured effort, model, parts and residual as a bag, and layouts that open it.
+
+        Parameters
+        ----------
+        path : path
+            .mcap or .db3.
+        progress : callable, optional
+
+        Returns
+        -------
+        list of Path
+            The bag, and beside it the layouts of PlotJuggler (.plotjuggler.xml) and Foxglove
+            (.foxglove.json).
+
+        Raises
+        ------
+        PprsError
+            Where it cannot be written.
+        """
+        from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
+
+        report, bag = progress or (lambda what, share: None), Path(path)
+        write_comparison(bag, self.inputs.model, self.inputs.fitted,
+                         lambda share: report('bag', share))
+        written = [bag]
+        for suffix, layout in (('.plotjuggler.xml', plotjuggler_layout),
+                               ('.foxglove.json', foxglove_layout)):
+            written.append(bag.with_suffix(suffix))
+            write_text(written[-1], layout(self.residuals.drives))
+        return written
 
     def table(self) -> pd.DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
@@ -107,7 +152,8 @@ class ComparisonResult(Result):
 
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
-            progress: Progress | None = None) -> ComparisonResult:
+            beside: str | PathLike[str] | None = None, progress: Progress | None = None,
+            ) -> ComparisonResult:
     """Hold a model against recordings: how wrong it is, on which drive, in which situations.
 
     Parameters
@@ -117,6 +163,9 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         A path is read, and its units and signs are checked; a Recording is taken as it is.
     topic : str, optional
         Of sensor_msgs/JointState, where a bag holds several.
+    beside : path, optional
+        A model file (.yaml), to be held against the same recordings; or another recording, to be
+        held against the same model: before and after side by side.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -139,4 +188,19 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         inputs.model, inputs.fitted,
         lambda done, total: report('motion and model', done / total if total else 0.0))
     where = localise(residuals, progress=lambda share: report('where it fails', share))
-    return ComparisonResult(inputs, residuals, compare_residuals(residuals, where), tuple(notes))
+    return ComparisonResult(
+        inputs, residuals, compare_residuals(residuals, where), tuple(notes),
+        None if beside is None else _beside(inputs, Path(beside), topic))
+
+
+def _beside(inputs: Inputs, path: Path, topic: str | None) -> Beside:
+    """Return the errors of another model on the recordings, or of the model on another one."""
+    if path.suffix in ('.yaml', '.yml'):
+        other = load_model(path)
+        if other.drives != inputs.model.drives:
+            raise ModelError('--beside', displayed(path), 'have the drives of the model: '
+                             f'{", ".join(inputs.model.drives)}')
+        residuals, _ = measure_residuals(other, inputs.fitted)
+    else:
+        residuals, _ = measure_residuals(inputs.model, [read_for(inputs.model, path, topic)])
+    return Beside(displayed(path.name), rms_by_drive(residuals), rms(residuals), residuals.unit)

@@ -11,7 +11,7 @@ from pathlib import Path
 from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.tables import comparison_headings, comparison_rows
-from pprs_dynamics.inference.diagnosis.comparison import Comparison
+from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import sentence
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.residuals.residuals import Residuals
@@ -23,6 +23,7 @@ FIRST = 3  # statements on the first screen
 def comparison_page(
     model: ForceModel, recordings: Sequence[Recording], residuals: Residuals,
     comparison: Comparison, notes: Sequence[str], command: str = '',
+    beside: Beside | None = None,
 ) -> Page:
     """Return the page of one comparison: where it fails on one screen, the rest to be unfolded.
 
@@ -37,6 +38,8 @@ def comparison_page(
         How it was computed.
     command : str, optional
         That finds out why.
+    beside : Beside, optional
+        Drawn as what the error becomes.
     """
     page = Page('Model against measurement')
     page.text(sentence(comparison.verdict), 'lead')
@@ -45,9 +48,11 @@ def comparison_page(
     statements = comparison.where
     with page.columns():
         with page.block():
-            page.errors([ErrorRow(name, drive.rms, None, drive.noise_floor)
+            page.errors([ErrorRow(name, drive.rms, beside.drives.get(name) if beside else None,
+                                  drive.noise_floor)
                          for name, drive in comparison.drives.items()],
-                        f'Error, rms [{comparison.unit}]; dotted: the noise.')
+                        f'Error, rms [{comparison.unit}]; dotted: the noise.'
+                        + (f' Second bar: {beside.name}.' if beside else ''))
             if statements:
                 page.bullets([one.text for one in statements[:FIRST]], numbered=True)
             else:

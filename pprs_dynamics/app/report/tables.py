@@ -9,10 +9,10 @@ from collections.abc import Iterable, Sequence
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.inference.diagnosis.quantities import percent
+from pprs_dynamics.inference.diagnosis.quantities import percent, plain
 
 if TYPE_CHECKING:
-    from pprs_dynamics.inference.diagnosis.comparison import Comparison
+    from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
     from pprs_dynamics.measurement.files.recording import Summary
     from pprs_dynamics.physics.mechanism.units import DriveUnits
     from pprs_dynamics.physics.model.reproduction import Claim
@@ -94,7 +94,8 @@ def comparison_rows(comparison: Comparison) -> Sequence[tuple[str, ...]]:
             for name, drive in comparison.drives.items()]
 
 
-def comparison_view(comparison: Comparison, command: str, details: bool = False) -> Any:
+def comparison_view(comparison: Comparison, command: str, details: bool = False,
+                    beside: Beside | None = None) -> Any:
     """Return how wrong the model is, where, and what to do next.
 
     Parameters
@@ -104,6 +105,7 @@ def comparison_view(comparison: Comparison, command: str, details: bool = False)
         That finds out why.
     details : bool
         Everything, instead of at most 25 lines of 80 columns.
+    beside : Beside, optional
     """
     from rich.console import Group
     from rich.markup import escape
@@ -122,7 +124,24 @@ def comparison_view(comparison: Comparison, command: str, details: bool = False)
     if comparison.is_beyond_noise:
         parts += ['[bold]Next[/] Find out which physical effect is missing:',
                   f'  [bold cyan]{escape(command)}[/]']
+    if beside is not None:
+        parts.append(_beside_table(comparison, beside))
     return Group(*parts)
+
+
+def _beside_table(comparison: Comparison, beside: Beside) -> Any:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1))
+    for heading in ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'):
+        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
+    rows = [*((name, one.rms, beside.drives.get(name)) for name, one in comparison.drives.items()),
+            ('all', comparison.rms, beside.rms)]
+    for name, before, after in rows:
+        table.add_row(escape(name), plain(before), 'none' if after is None else plain(after),
+                      '' if not after or not before else f'{100 * (after / before - 1):+.0f}%')
+    return table
 
 
 def _comparison_table(comparison: Comparison) -> Any:
