@@ -110,7 +110,7 @@ def wrong_names(line: str) -> Iterator[str]:
     for parameter in re.findall(r'-p (\w+):=', line):
         if f"'{parameter}'" not in ros_sources():
             yield parameter
-    for found in re.findall(r'\b(?:geometry|masses|friction|limits)\.\w+(?:\.\w+)*', line):
+    for found in re.findall(r'(?<![\w/])(?:geometry|masses|friction|limits)\.\w+(?:\.\w+)*', line):
         # A sentence about an unknown key shows one.
         if 'unknown key' in line:
             break
