@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import block_diag
 
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
 
@@ -29,8 +29,10 @@ def made_up(seed: int = 0) -> tuple[Regression, list[Block]]:
     regression = Regression(residuals, base)
     blocks = [regression.block({0: rng.normal(size=(2, SAMPLES))}),
               regression.block({d: rng.normal(size=(1, SAMPLES)) for d in (0, 1)}),
-              regression.block({1: rng.normal(size=(1, SAMPLES))}, is_fixed=True,
-                               precision=np.zeros((0, 0)))]
+              regression.block({1: rng.normal(size=(1, SAMPLES))}, CERTAIN * np.eye(1),
+                               np.ones(1)),
+              regression.block({0: rng.normal(size=(1, SAMPLES))}, 9 * np.eye(1),
+                               np.array([0.4]))]
     return regression, blocks
 
 
@@ -39,6 +41,10 @@ def brute_force(regression: Regression, fit: JointFit) -> float:
     columns = regression.columns
     width = len(columns) + sum(block.size for block in fit.blocks)
     X, y, S = [], [], []
+    mean = np.zeros(width)
+    for block in fit.blocks:
+        if block.mean is not None:
+            mean[fit.places[block]] = block.mean
     for d, series in regression.series.items():
         part = np.zeros((len(series), width))
         for k, column in enumerate(columns):
@@ -46,15 +52,13 @@ def brute_force(regression: Regression, fit: JointFit) -> float:
                 part[:, k] = series.transform(column.rows[d])
         rest = series.transform(series.error)
         for block in fit.blocks:
-            if d in block.rows and block.is_fixed:
-                rest = rest - block.rows[d][0]
-            elif d in block.rows:
+            if d in block.rows:
                 part[:, fit.places[block]] = block.rows[d].T
         X.append(part)
-        y.append(rest)
+        y.append(rest - part @ mean)
         S.append(series.spread(1 / regression.weights(fit, d)))
     prior = block_diag(np.diag([1 / column.precision for column in columns]),
-                       *(np.linalg.inv(block.precision) for block in fit.blocks if block.size))
+                       *(np.linalg.inv(block.precision) for block in fit.blocks))
     X, y = np.concatenate(X), np.concatenate(y)
     covariance = np.diag(np.concatenate(S)) + X @ prior @ X.T
     sign, log_det = np.linalg.slogdet(covariance)
@@ -67,6 +71,9 @@ def test_the_deviance_is_the_likelihood_with_the_coefficients_integrated_out() -
     for chosen in ([], blocks[:1], blocks[:2], blocks):
         fit = regression.fit(chosen)
         assert fit.deviance == pytest.approx(brute_force(regression, fit), abs=1e-5)
+        for block in fit.blocks:
+            if block.precision[0, 0] == CERTAIN:
+                assert fit.of(block) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_the_gain_of_a_block_is_the_fall_of_the_deviance_at_the_same_noise() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.regression.joint_fit import CERTAIN, Regression
 from pprs_dynamics.inference.search.scan import Entry, Scan
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -34,13 +34,14 @@ def test_gains_of_a_scan_are_those_of_single_blocks(
         regression: Regression, rng: np.random.Generator) -> None:
     blocks = [regression.block({d: rng.normal(size=(k, SAMPLES)) for d in drives})
               for k, drives in ((1, (0, 1, 2)), (2, (0, 2)), (3, (1,)))]
-    fixed = regression.block({0: 0.1 * rng.normal(size=(1, SAMPLES))}, True, np.zeros((0, 0)))
+    fixed = regression.block({0: 0.1 * rng.normal(size=(1, SAMPLES))}, CERTAIN * np.eye(1),
+                             np.ones(1))
     beside = regression.block({d: rng.normal(size=(1, SAMPLES)) for d in (0, 1)})
     entries, rows, first = [], {d: [] for d in range(DRIVES)}, 0
     for block in (*blocks, fixed):
         size = len(next(iter(block.rows.values())))
-        entries.append(Entry(block, tuple(range(first, first + size)), block.is_fixed,
-                             block.precision))
+        entries.append(Entry(block, tuple(range(first, first + size)), block.precision,
+                             block.mean))
         for d in rows:
             rows[d].append(block.rows.get(d, np.zeros((size, SAMPLES))))
         first += size

@@ -92,15 +92,14 @@ def _terms(design: Design, regression: Regression, request: EffectRequest) -> It
 
 
 def _block(regression: Regression, term: Term) -> Block:
-    return regression.block(term.rows, term.is_fixed,
-                            np.zeros((0, 0)) if term.is_fixed else None)
+    return regression.term_block(term, term.names)
 
 
 def _rows(design: Design, regression: Regression, fit: JointFit, term: Term, block: Block,
           ) -> Iterator[dict[str, Any]]:
     drive = None if term.drive is None else design.drives[term.drive]
     place = {'drive': drive, 'effect': term.effect.name}
-    if not term.is_fixed:
+    if term.names:
         at = fit.places[block]
         values, covariance = fit.coefficients[at], fit.covariance[at, at]
         # What the deviance rises by without the effect, at the noise of the fit.

@@ -247,7 +247,7 @@ class TickFits:
                 linear = {parameter.name for parameter in candidate.effect.linear}
                 mine = {name: value for (d, name), value in chosen.items()
                         if d == placement.drive and name in linear}
-                if not mine or placement.block.is_fixed:
+                if not mine:
                     continue
                 c = found.coefficients(placement)
                 wanted = candidate.effect.to_coefficients({**placement.values(c), **mine})

@@ -101,9 +101,8 @@ def fit_effect(
     report(0.6)
     if found is None:
         return None
-    share = min(search.regression.own_share(without.fit, block)
-                for block in found.candidates[0].blocks if not block.is_fixed) if any(
-                    not block.is_fixed for block in found.candidates[0].blocks) else 1.0
+    share = min((search.regression.own_share(without.fit, block)
+                 for block in found.candidates[0].blocks if block.mean is None), default=1.0)
     before = hold_out(search, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.
     plain_set = replace(without, fit=search.regression.at((), found.fit.amplitudes))

@@ -177,16 +177,16 @@ class _System:
         blocks = [*self.unknown, *(block for one in self.placements.values()
                                    for block in self._blocks(one))]
         # Here fixed columns stand like others; a fit takes them with the coefficient 1.
-        standing = [replace(block, precision=np.eye(1), is_fixed=False) if block.is_fixed
-                    else block for block in blocks]
+        standing = [block if block.mean is None else replace(block, precision=np.eye(1))
+                    for block in blocks]
         self.equations = NormalEquations(self.search.regression, standing)
         self.columns: Mapping[Block, tuple[int, ...]] = {
             block: tuple(range(place.start, place.stop)) for block, place in zip(
                 blocks, (self.equations.places[one] for one in standing), strict=True)}
-        self.gram, self.side = self.equations.precision.copy(), np.zeros(
-            len(self.equations.precision))
+        self.gram, self.side = self.equations.prior.precision.copy(), np.zeros(
+            len(self.equations.prior.mean))
         for block in blocks:
-            if block.is_fixed:
+            if block.mean is not None:
                 self.gram[self.columns[block] * 2] = 0.0
         for d, drive, index in zip(self.search.regression.drives, self.equations.drives,
                                    self.equations.indices, strict=True):
@@ -229,7 +229,7 @@ class _System:
                 tuple(self._optional(placement) for (of, _), placement in sorted(
                     self.placements.items(), key=lambda item: item[0][1] or 0) if of == name))
                 for name in self.first_choice),
-            tuple(always), tuple(np.flatnonzero(self.equations.limited).tolist()),
+            tuple(always), tuple(np.flatnonzero(self.equations.prior.limited).tolist()),
             self.gram, self.side, prices.of_name(), -2 * log(search.decisions.wrong_sign_odds),
             tuple(prices.of_drives(count + 1) for count in range(len(search.regression.drives))),
             tuple(self._forces(d, drive, index) for d, drive, index in zip(
@@ -239,14 +239,15 @@ class _System:
     def _optional(self, placement: Placement) -> OptionalPlacement:
         effect, d = placement.term.effect, placement.drive
         own = self._blocks(placement)
-        free = [block for block in own if not block.is_fixed]
+        free = [block for block in own if block.mean is None]
         bounds = effect.unphysical_below
         return OptionalPlacement(
             None if d is None else self.search.design.drives[d],
             any(placement in one.placements for one in self.kept.effects),
             d in self.first_choice[effect.name],
             tuple(column for block in free for column in self.columns[block]),
-            tuple(column for block in own if block.is_fixed for column in self.columns[block]),
+            tuple(column for block in own if block.mean is not None
+                  for column in self.columns[block]),
             tuple((column, bounds[name]) for name, column in zip(
                 placement.names, self.columns[placement.block], strict=False) if name in bounds),
             placement.price - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),

@@ -247,7 +247,7 @@ class _Terms:
             first = c.placements[0]
             if c.drives is not None and c.name not in {one.name for one in truth.effects} and (
                     len(first.term.rows) == 1):
-                values = found.coefficients(first) * first.term.is_fixed
+                values = np.zeros(len(first.names)) if first.names else np.ones(1)
                 more += [self._once(FittedTerm(c.effect, d, first.term.shape, first.names, values))
                          for d in sorted(theirs - set(c.drives))]
         return more

@@ -304,7 +304,7 @@ class Design:
         ----------
         term : Term
         coefficients : (k,) array
-            By which its rows are multiplied; 1 where it is fixed.
+            By which its rows are multiplied.
         """
         assert term.drive is not None
         assert issubclass(term.effect, DriveEffect)

@@ -30,14 +30,18 @@ from pprs_dynamics.inference.regression.normal_equations import (
     NormalEquations,
     term_gains,
 )
+from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.measurement.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
 
+# Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
+CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less, or by less than this share of
 # what it lies above the one it is compared with; rounds are bounded.
 CONVERGED, HOPELESS, MOST_ROUNDS, NOISE_STEPS = 0.01, 0.005, 40, 60
+MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_EQUATIONS = 300  # of drives that are kept: some 0.1 to 0.5 MB each
 
 
@@ -71,8 +75,8 @@ class JointFit:
     places: Mapping[Block, slice] = field(repr=False)
 
     def of(self, block: Block) -> Array:
-        """Return the coefficients of a block; 1 for a fixed one."""
-        return np.ones(1) if block.is_fixed else self.coefficients[self.places[block]]
+        """Return the coefficients of a block."""
+        return self.coefficients[self.places[block]]
 
 
 class Regression:
@@ -110,7 +114,6 @@ class Regression:
             raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
                                  f'hold at least {LEAST_SAMPLES} of a drive')
         self.counts = np.stack([self.series[d].counts for d in self.drives])
-        self.precision = np.array([column.precision for column in self.columns])
         self.base_index = {d: np.array([k for k, column in enumerate(self.columns)
                                         if d in column.rows], dtype=int) for d in self.drives}
         # The error is the last row of each drive's base.
@@ -129,8 +132,8 @@ class Regression:
         """Samples of the drive that has most."""
         return max(len(series) for series in self.series.values())
 
-    def block(self, rows: Mapping[int, Array], is_fixed: bool = False,
-              precision: Array | None = None) -> Block:
+    def block(self, rows: Mapping[int, Array], precision: Array | None = None,
+              mean: Array | None = None) -> Block:
         """Return a block of rows in time, (k, M) by drive, by default with the g-prior.
 
         The g-prior lets the force of any combination of the rows be of the size of the error
@@ -139,14 +142,21 @@ class Regression:
         """
         return self.transformed_block(
             {d: self.series[d].transform(np.atleast_2d(values)) for d, values in rows.items()
-             if d in self.series}, is_fixed, precision)
+             if d in self.series}, precision, mean)
 
-    def transformed_block(self, rows: Mapping[int, Array], is_fixed: bool = False,
-                          precision: Array | None = None) -> Block:
+    def transformed_block(self, rows: Mapping[int, Array], precision: Array | None = None,
+                          mean: Array | None = None) -> Block:
         """Return a block of rows that are transformed already, (k, n) by drive."""
         if precision is None:
             precision = self.g_prior({d: values @ values.T for d, values in rows.items()})
-        return Block(rows, precision, is_fixed)
+        return Block(rows, precision, mean)
+
+    def term_block(self, term: Term, names: Sequence[str]) -> Block:
+        """Return the block of some coefficients of a term; of one that has none, of 1."""
+        if not term.names:
+            return self.block(term.rows, CERTAIN * np.eye(1), np.ones(1))
+        chosen = [term.names.index(name) for name in names]
+        return self.block({d: rows[chosen] for d, rows in term.rows.items()})
 
     def g_prior(self, grams: Mapping[int, Array]) -> Array:
         """Return the precision of coefficients whose rows have these sums of products, (k, k)."""
@@ -251,7 +261,7 @@ class Regression:
 
     def local(self, fit: JointFit, d: int) -> tuple[Array, list[Block]]:
         """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""
-        felt = [block for block in fit.blocks if d in block.rows and not block.is_fixed]
+        felt = [block for block in fit.blocks if d in block.rows]
         index = [self.base_index[d]]
         index += [np.arange(fit.places[block].start, fit.places[block].stop) for block in felt]
         return np.concatenate(index), felt
@@ -268,7 +278,8 @@ class Regression:
     def gain(self, fit: JointFit, block: Block) -> float:
         """Return by how much the deviance falls with one more block, at the noise of a fit."""
         S, b, _ = self._beside(fit, block)
-        return float(term_gains(S[None], b[None], block.precision[None], block.is_fixed)[0])
+        mean = np.zeros(block.size) if block.mean is None else block.mean
+        return float(term_gains(S[None], b[None], block.precision[None], mean[None])[0])
 
     def own_information(self, fit: JointFit, block: Block) -> Array:
         """Return the information on a block's coefficients that a fit leaves, (k, k)."""
@@ -281,25 +292,61 @@ class Regression:
 
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with what is left, and full squares of a block."""
-        size = len(next(iter(block.rows.values())))
-        S, b = np.zeros((size, size)), np.zeros(size)
-        taken = np.zeros((size, len(fit.coefficients)))
-        for d in block.rows:
-            weights = self.weights(fit, d)
-            index, felt = self.local(fit, d)
+        taken, b = Columns(self, block.rows).projected(fit)
+        S = sum(np.tensordot(self.weights(fit, d), self.products(block, block, d), 1)
+                for d in block.rows)
+        return S - taken @ fit.covariance @ taken.T, b, np.diag(S)
 
-            def weighted(other: Block | None, d: int = d, weights: Array = weights) -> Array:
-                pair = self.products(block, other, d)
-                found: Array = (weights @ pair.reshape(len(weights), -1)).reshape(pair.shape[1:])
+
+class Columns:
+    """Rows on some drives, against what is in a fit; band sums of products are kept.
+
+    Parameters
+    ----------
+    regression : Regression
+    rows : mapping of drive to (R, n) array
+        Transformed; products have their precision.
+    """
+
+    def __init__(self, regression: Regression, rows: Mapping[int, Array]) -> None:
+        self.regression, self.rows = regression, rows
+        self._crosses: dict[tuple[int, Block | None], Array] = {}
+
+    def __len__(self) -> int:
+        return max((len(values) for values in self.rows.values()), default=0)
+
+    def _cross(self, d: int, block: Block | None) -> Array:
+        """Return band sums of all rows with a block's, or with base and error, (B, R, k)."""
+        key = (d, block)
+        if key not in self._crosses:
+            if len(self._crosses) > MOST_CROSSES * len(self.rows):
+                self._crosses = {one: cross for one, cross in self._crosses.items()
+                                 if one[1] is None}
+            rows = self.rows[d]
+            other = self.regression.base[d] if block is None else block.rows[d]
+            self._crosses[key] = self.regression.series[d].products(
+                rows, other.astype(rows.dtype)).astype(rows.dtype)
+        return self._crosses[key]
+
+    def projected(self, fit: JointFit) -> tuple[Array, Array]:
+        """Return whitened products with all columns of a fit, (R, P), and with what it leaves.
+
+        What the fit can take of products of the rows with each other is T C T^T, with its
+        covariance C (Schur's complement).
+        """
+        taken, side = np.zeros((len(self), len(fit.coefficients))), np.zeros(len(self))
+        for d, rows in self.rows.items():
+            index, felt = self.regression.local(fit, d)
+            weights = self.regression.weights(fit, d).astype(rows.dtype)
+
+            def weighted(block: Block | None, d: int = d, weights: Array = weights) -> Array:
+                cross = self._cross(d, block)
+                found: Array = (weights @ cross.reshape(len(weights), -1)).reshape(
+                    cross.shape[1:]).astype(float)
                 return found
 
             with_base = weighted(None)
             known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in felt)], axis=1)
-            S += weighted(block)
-            b += with_base[:, -1] - known @ fit.coefficients[index]
-            for one in fit.blocks:
-                if one.is_fixed and d in one.rows:
-                    b -= weighted(one)[:, 0]
+            side += with_base[:, -1] - known @ fit.coefficients[index]
             taken[:, index] += known
-        plain = np.diag(S).copy()
-        return S - taken @ fit.covariance @ taken.T, b, plain
+        return taken, side

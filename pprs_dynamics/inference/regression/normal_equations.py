@@ -23,29 +23,29 @@ MOST_LIMITED = 12  # rounds until the numbers at their limits are known
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Columns of one term, transformed, with the prior of their coefficients.
+    """Columns of one term, transformed, with the Gaussian prior of their coefficients.
 
     Parameters
     ----------
     rows : mapping of drive to (k, n) array
         DCT coefficients [N]; drives that are not in it feel nothing.
     precision : (k, k) array
-        Of the Gaussian prior about 0.
-    is_fixed : bool
-        True where the only row has the coefficient 1.
+        Of the prior.
+    mean : (k,) array, optional
+        Of the prior; by default 0.
     """
 
     rows: Mapping[int, Array]
     precision: Array
-    is_fixed: bool = False
+    mean: Array | None = None
 
     @property
     def size(self) -> int:
-        """Number of coefficients that are fitted."""
-        return 0 if self.is_fixed else len(self.precision)
+        """Number of coefficients."""
+        return len(self.precision)
 
 
-def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
+def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
     """Return by how much the deviance falls with each of n terms, (n,).
 
     Parameters
@@ -56,12 +56,13 @@ def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
         Whitened sums of products with what is left.
     precision : (n, k, k) array
         Of the prior.
-    is_fixed : bool
-        True where the coefficient is 1.
+    mean : (n, k) array
+        Of the prior.
     """
-    if is_fixed:
-        fixed: Array = 2 * b[:, 0] - S[:, 0, 0]
-        return fixed
+    # At the mean of the prior, and from there on.
+    at_mean = np.einsum('nkj,nj->nk', S, mean)
+    gained = np.sum((2 * b - at_mean) * mean, axis=1)
+    b = b - at_mean
     posterior = (S + S.transpose(0, 2, 1)) / 2 + precision
     # What is fitted already can take all of a row, to rounding; then only the prior is left.
     floor = 1e-6 * np.einsum('nkk->nk', precision)
@@ -75,8 +76,81 @@ def term_gains(S: Array, b: Array, precision: Array, is_fixed: bool) -> Array:
     quadratic = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)
     log_det = (np.sum(np.log(np.maximum(values, 1e-7)), axis=1) - 2 * np.sum(np.log(scale), axis=1)
                - np.linalg.slogdet(precision)[1])
-    gains: Array = quadratic - log_det
+    gains: Array = gained + quadratic - log_det
     return gains
+
+
+@dataclass(frozen=True)
+class Prior:
+    """The Gaussian prior of all coefficients of a fit, steeper beyond a tolerance.
+
+    Parameters
+    ----------
+    precision : (P, P) array
+    mean : (P,) array
+    log_det : float
+        Of the precision.
+    limited : (P,) bool array
+        Numbers with a tolerance.
+    """
+
+    precision: Array
+    mean: Array
+    log_det: float
+    limited: np.typing.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, columns: Sequence[BaseColumn], blocks: Sequence[Block]) -> Prior:
+        """Return the prior of base columns, then of blocks in order."""
+        parts = [np.diag([column.precision for column in columns]),
+                 *(block.precision for block in blocks)]
+        count = sum(map(len, parts))
+        precision, mean, at, log_det = np.zeros((count, count)), np.zeros(count), 0, 0.0
+        for part, block in zip(parts, (None, *blocks), strict=True):
+            place = slice(at, at + len(part))
+            precision[place, place] = part
+            if block is not None and block.mean is not None:
+                mean[place] = block.mean
+            if len(part):
+                log_det += float(np.linalg.slogdet(part)[1])
+            at += len(part)
+        limited = np.zeros(count, dtype=bool)
+        limited[:len(columns)] = [isinstance(column, KnownNumber) for column in columns]
+        return cls(precision, mean, log_det, limited)
+
+    def posterior(self, gram: Array, side: Array) -> Posterior:
+        """Return the posterior of coefficients, given X^T S^-1 X and X^T S^-1 y.
+
+        A number beyond its tolerance is held back by a prior that is much steeper there.
+        """
+        b = side - gram @ self.mean
+        beyond = np.zeros(len(b))
+        for _ in range(MOST_LIMITED):
+            H = gram + self.precision + np.diag(BEYOND_TOLERANCE * np.abs(beyond))
+            scale = 1 / np.sqrt(np.einsum('ii->i', H))
+            factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)),
+                                check_finite=False)
+            away = scale * cho_solve(factor, scale * (
+                b + BEYOND_TOLERANCE * DEVIATIONS * beyond), check_finite=False)
+            now = np.sign(away) * (self.limited & (np.abs(away) > DEVIATIONS))
+            if np.array_equal(now, beyond):
+                break
+            beyond = now
+        covariance = cho_solve(factor, np.eye(len(H)), check_finite=False) * np.outer(scale, scale)
+        penalty = float(away @ self.precision @ away + BEYOND_TOLERANCE * np.sum(
+            np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
+        log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
+        return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Coefficients given a noise: mean, covariance, c'Lc of the prior, and ln det (H + L) / L."""
+
+    coefficients: Array
+    covariance: Array
+    penalty: float
+    log_det: float
 
 
 class Fitted(Protocol):
@@ -84,7 +158,6 @@ class Fitted(Protocol):
 
     columns: tuple[BaseColumn, ...]
     drives: tuple[int, ...]
-    precision: Array
     base_index: dict[int, np.typing.NDArray[np.int_]]
     base_products: dict[int, Array]
 
@@ -98,7 +171,7 @@ class Fitted(Protocol):
 class DriveEquations:
     """Band sums of one drive's columns with each other and with the error.
 
-    Columns are those of the base, then of the free blocks in order.
+    Columns are those of the base, then of the blocks in order.
 
     Parameters
     ----------
@@ -109,19 +182,16 @@ class DriveEquations:
     """
 
     def __init__(self, regression: Fitted, d: int, felt: Sequence[Block]) -> None:
-        fixed = [block for block in felt if block.is_fixed]
-        free = [block for block in felt if not block.is_fixed]
         base = regression.base_products[d]
         count, first = base.shape[0], base.shape[1] - 1
-        size = first + sum(block.size for block in free)
+        size = first + sum(block.size for block in felt)
         gram = np.empty((count, size, size))
         side = np.empty((count, size))
         gram[:, :first, :first] = base[:, :-1, :-1]
         side[:, :first] = base[:, :-1, -1]
-        squares = base[:, -1, -1].copy()
         at = first
         spots: list[tuple[Block, slice]] = []
-        for block in free:
+        for block in felt:
             spot = slice(at, at + block.size)
             with_base = regression.products(block, None, d)
             gram[:, spot, :first] = with_base[:, :, :-1]
@@ -133,15 +203,7 @@ class DriveEquations:
                 gram[:, place, spot] = pair.transpose(0, 2, 1)
             spots.append((block, spot))
             at += block.size
-        for number, block in enumerate(fixed):
-            with_base = regression.products(block, None, d)[:, 0]
-            side[:, :first] -= with_base[:, :-1]
-            squares += regression.products(block, block, d)[:, 0, 0] - 2 * with_base[:, -1]
-            for other in fixed[:number]:
-                squares += 2 * regression.products(block, other, d)[:, 0, 0]
-            for other, place in spots:
-                side[:, place] -= regression.products(other, block, d)[:, :, 0]
-        self.gram, self.side, self.squares = gram, side, squares
+        self.gram, self.side, self.squares = gram, side, base[:, -1, -1]
         self._flat = gram.reshape(count, -1)
 
     def weighted(self, weights: Array) -> tuple[Array, Array]:
@@ -174,24 +236,12 @@ class NormalEquations:
     """The normal equations of all drives."""
 
     def __init__(self, regression: Fitted, blocks: Sequence[Block]) -> None:
-        place = len(regression.precision)
+        self.prior = Prior.of(regression.columns, blocks)
+        place = len(regression.columns)
         self.places: dict[Block, slice] = {}
-        precision = [np.diag(regression.precision)]
         for block in blocks:
             self.places[block] = slice(place, place + block.size)
             place += block.size
-            if not block.is_fixed:
-                precision.append(block.precision)
-        self.precision = np.zeros((place, place))
-        self.log_precision, at = 0.0, 0
-        for part in precision:
-            self.precision[at:at + len(part), at:at + len(part)] = part
-            at += len(part)
-            if len(part):
-                self.log_precision += float(np.linalg.slogdet(part)[1])
-        self.limited = np.zeros(place, dtype=bool)
-        self.limited[:len(regression.columns)] = [
-            isinstance(column, KnownNumber) for column in regression.columns]
         self.drives: list[DriveEquations] = []
         self.indices: list[np.typing.NDArray[np.int_]] = []
         for d in regression.drives:
@@ -201,38 +251,19 @@ class NormalEquations:
                 np.arange(self.places[one].start, self.places[one].stop) for one in felt)]))
 
     def solve(self, spectra: Array, counts: Array) -> Solution:
-        """Return the solution under noise spectra (D, B).
-
-        A number beyond its tolerance is held back by a prior that is much steeper there.
-        """
-        data, b = np.zeros_like(self.precision), np.zeros(len(self.precision))
+        """Return the solution under noise spectra (D, B)."""
+        gram, side = np.zeros_like(self.prior.precision), np.zeros(len(self.prior.mean))
         weights = 1 / spectra
         for k, (drive, index) in enumerate(zip(self.drives, self.indices, strict=True)):
-            gram, side = drive.weighted(weights[k])
-            data[np.ix_(index, index)] += gram
-            b[index] += side
-        beyond = np.zeros(len(b))
-        for _ in range(MOST_LIMITED):
-            H = data + self.precision + np.diag(BEYOND_TOLERANCE * np.abs(beyond))
-            scale = 1 / np.sqrt(np.einsum('ii->i', H))
-            factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)),
-                                check_finite=False)
-            side = b + BEYOND_TOLERANCE * DEVIATIONS * beyond
-            coefficients = scale * cho_solve(factor, scale * side, check_finite=False)
-            now = np.sign(coefficients) * (self.limited & (np.abs(coefficients) > DEVIATIONS))
-            if np.array_equal(now, beyond):
-                break
-            beyond = now
-        covariance = cho_solve(factor, np.eye(len(H)), check_finite=False) * np.outer(scale, scale)
-        squares = np.stack([drive.left(coefficients[index])
+            products, with_error = drive.weighted(weights[k])
+            gram[np.ix_(index, index)] += products
+            side[index] += with_error
+        found = self.prior.posterior(gram, side)
+        squares = np.stack([drive.left(found.coefficients[index])
                             for drive, index in zip(self.drives, self.indices, strict=True)])
         leverage = np.stack([
-            drive.leverage(covariance[np.ix_(index, index)], weights[k])
+            drive.leverage(found.covariance[np.ix_(index, index)], weights[k])
             for k, (drive, index) in enumerate(zip(self.drives, self.indices, strict=True))])
-        log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
         deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
-                         + coefficients @ self.precision @ coefficients
-                         + BEYOND_TOLERANCE * np.sum(
-                             np.abs(beyond) * (np.abs(coefficients) - DEVIATIONS) ** 2)
-                         + log_det - self.log_precision)
-        return Solution(coefficients, covariance, deviance, squares, leverage)
+                         + found.penalty + found.log_det)
+        return Solution(found.coefficients, found.covariance, deviance, squares, leverage)

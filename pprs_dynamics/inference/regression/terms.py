@@ -41,11 +41,6 @@ class Term:
     bare: Rows | None = None
 
     @property
-    def is_fixed(self) -> bool:
-        """True where the only row has the coefficient 1: its shape says it all."""
-        return not self.effect.coefficients
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Coefficients of the rows; none where the only row has the coefficient 1."""
         return tuple(c.name for c in self.effect.coefficients)

@@ -51,12 +51,11 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
 
 def beyond_others(regression: Regression, found: CandidateSet, candidate: Candidate) -> float:
     """Return the whitened square of what no refit of the others makes good."""
-    free = [block for block in candidate.blocks if not block.is_fixed]
-    if not free:
+    if any(block.mean is not None for block in candidate.blocks):
         return sum(whitened_square(regression, found, block, set(block.rows))
                    for block in candidate.blocks)
     index = np.concatenate([np.arange(place.start, place.stop) for place in (
-        found.fit.places[block] for block in free)])
+        found.fit.places[block] for block in candidate.blocks)])
     c = found.fit.coefficients[index]
     return float(c @ np.linalg.solve(found.fit.covariance[np.ix_(index, index)], c))
 

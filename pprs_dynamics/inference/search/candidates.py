@@ -58,7 +58,7 @@ class Placement:
     @property
     def rows(self) -> dict[int, Array]:
         """Rows in time of the coefficients that are fitted, (k, M) by drive [N]."""
-        if self.term.is_fixed:
+        if not self.names:
             return dict(self.term.rows)
         every = list(self.term.names)
         chosen = [every.index(name) for name in self.names]
@@ -217,7 +217,7 @@ class CandidateSet:
         return tuple(c for c in self.candidates if isinstance(c, UnknownCandidate))
 
     def coefficients(self, placement: Placement) -> Array:
-        """Return the coefficients of a placement; 1 where it is fixed."""
+        """Return the coefficients of a placement."""
         return self.fit.of(placement.block)
 
     def force(self, candidate: Candidate, shape: tuple[int, ...]) -> Array:

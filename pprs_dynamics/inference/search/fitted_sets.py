@@ -145,7 +145,7 @@ class FittedSets:
 
         By the Savage-Dickey ratio of prior and posterior density at 0.
         """
-        if placement.block.is_fixed:
+        if not placement.names:
             return np.inf
         place = found.fit.places[placement.block]
         c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]

@@ -15,6 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ReversalShape
+from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.search import Search
 
@@ -49,9 +50,7 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
         series = regression.series[d]
         index, felt = regression.local(fit, d)
         rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in felt)])
-        y = regression.base[d][-1] - sum(
-            (block.rows[d][0] for block in fit.blocks if block.is_fixed and d in block.rows),
-            np.zeros(len(series)))
+        y = regression.base[d][-1]
         root = np.sqrt(series.spread(regression.weights(fit, d)))
         stacked = series.inverse(np.concatenate((rows, y[None])) * root)
         stacked[:, ~series.known] = 0.0
@@ -61,9 +60,9 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
             part = stacked[:, at[k]:at[k + 1]]
             H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
             b[k, index] += part[:-1] @ part[-1]
-    prior = _precision(search, found)
-    fits = np.stack([_solved(H.sum(axis=0) - H[k] + prior, b.sum(axis=0) - b[k])
-                     for k in range(BLOCKS)])
+    prior = Prior.of(regression.columns, fit.blocks)
+    others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
+    fits = np.stack([one.coefficients for one in others])
     reversals = [k for k, column in enumerate(search.design.base)
                  if isinstance(column, ReversalShape)]
     reversals += [k for blocks in found.doubtful.values() for block in blocks
@@ -81,24 +80,6 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
             rest = (rows[-1, block] - plain[k, index] @ rows[:-1, block])[series.known[block]]
             squares, count = squares + float(rest @ rest), count + len(rest)
     # Numbers that are stretched beyond what is known of them cost their share in every block.
-    losses += np.einsum('kp,pq,kq->k', fits, prior, fits) / BLOCKS
+    losses += np.array([one.penalty for one in others]) / BLOCKS
     return HeldOut(float(np.sqrt(squares / max(count, 1))), losses)
 
-
-def _precision(search: Search, found: CandidateSet) -> Array:
-    size = len(found.fit.coefficients)
-    precision = np.zeros((size, size))
-    count = len(search.regression.precision)
-    precision[:count, :count] = np.diag(search.regression.precision)
-    for block in found.fit.blocks:
-        place = found.fit.places[block]
-        if not block.is_fixed:
-            precision[place, place] = block.precision
-    return precision
-
-
-def _solved(H: Array, b: Array) -> Array:
-    scale = 1 / np.sqrt(np.diag(H))
-    matrix = H * np.outer(scale, scale) + 1e-10 * np.eye(len(H))
-    solution: Array = scale * np.linalg.solve(matrix, scale * b)
-    return solution

@@ -13,7 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.open_form import open_rows
 from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate, Placement, Prices
@@ -72,8 +72,8 @@ class DriveLibrary:
         entries: list[Entry[tuple[Term, tuple[str, ...]]]] = []
         first = 0
         for term in self.terms:
-            if term.is_fixed:
-                entries.append(Entry((term, ()), (first,), True))
+            if not term.names:
+                entries.append(Entry((term, ()), (first,), CERTAIN * np.eye(1), np.ones(1)))
             else:
                 entries += [Entry((term, names),
                                   tuple(first + term.names.index(name) for name in names))
@@ -129,8 +129,8 @@ class Library:
         for one in placements:
             rows = one.block.rows
             size = max((len(values) for values in rows.values()), default=0)
-            entries.append(Entry(one, tuple(range(first, first + size)), one.block.is_fixed,
-                                 one.block.precision))
+            entries.append(Entry(one, tuple(range(first, first + size)), one.block.precision,
+                                 one.block.mean))
             parts.append({d: rows[d] if d in rows else np.zeros((size, len(series[d])))
                           for d in series})
             first += size
@@ -171,7 +171,7 @@ class Library:
 
     def _open_rows(self, placement: Placement) -> Array | None:
         design, term, d = self.design, placement.term, placement.drive
-        if d is None or term.is_fixed:
+        if d is None or not term.names:
             return None
         units = np.eye(len(term.names))[[term.names.index(name) for name in placement.names]]
         rows = np.stack([open_rows(design, term, unit) for unit in units])
@@ -179,17 +179,14 @@ class Library:
 
     def _placed(self, term: Term, names: tuple[str, ...]) -> Placement:
         regression = self.regression
-        chosen = [0] if term.is_fixed else [term.names.index(name) for name in names]
-        rows = {d: values[chosen] for d, values in term.rows.items()}
-        block = regression.block(rows, term.is_fixed,
-                                 np.zeros((0, 0)) if term.is_fixed else None)
         bare = None
         if term.bare is not None:
-            bare = {d: regression.series[d].transform(values[chosen] - rows[d])
+            chosen = [term.names.index(name) for name in names]
+            bare = {d: regression.series[d].transform((values - term.rows[d])[chosen])
                     for d, values in term.bare.items() if d in regression.series}
         tried = (self.local[term.drive].trials.get(term.effect.name, 1)
                  if term.drive is not None else 1)
-        return Placement(term, () if term.is_fixed else names, block,
+        return Placement(term, names if term.names else (), regression.term_block(term, names),
                          self.prices.of_placement(term.effect, tried), bare)
 
     def full(self, offer: ScannedTerm) -> Placement:

@@ -216,7 +216,7 @@ class Search(ScannedSets):
         """Yield the candidate with other coefficients of one placement."""
         for placement in candidate.placements:
             for names in candidate.effect.variants:
-                if names != placement.names and not placement.term.is_fixed:
+                if names != placement.names:
                     rest = [one for one in candidate.placements if one is not placement]
                     yield self.library.candidate(candidate.effect, [
                         *rest, self.library.placement(placement.term, names)])

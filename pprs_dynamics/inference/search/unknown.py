@@ -16,7 +16,7 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.patterns import (
@@ -44,17 +44,36 @@ class _Scanned:
     Parameters
     ----------
     family : Family
-    columns : (C, n) array
+    columns : Columns
+        C rows.
     gram : (B, C, C) array
         Band sums.
-    precision : (P,) or (P, 2, 2) array
+    precision : (P, k, k) array
         Of the patterns' g-priors.
     """
 
     family: Family
-    columns: Array
+    columns: Columns
     gram: Array
     precision: Array
+
+    @staticmethod
+    def of_patterns(family: Family, S: Array) -> Array:
+        """Return products (C, C) of a family's columns for its patterns, (P, k, k)."""
+        if family.paired:
+            pairs = np.arange(len(S)).reshape(-1, 2)
+            found: Array = S[pairs[:, :, None], pairs[:, None, :]]
+            return found
+        own = np.einsum('pc,cd,pd->p', family.weights, S, family.weights)
+        positive: Array = np.maximum(own, 0.0)[:, None, None]
+        return positive
+
+    def gains(self, fit: JointFit, weights: Array) -> Array:
+        """Return by how much the deviance falls with each pattern beside a fit, (P,)."""
+        taken, side = self.columns.projected(fit)
+        S = np.tensordot(weights, self.gram, 1) - taken @ fit.covariance @ taken.T
+        b = side.reshape(-1, 2) if self.family.paired else (self.family.weights @ side)[:, None]
+        return term_gains(self.of_patterns(self.family, S), b, self.precision, np.zeros_like(b))
 
 
 class PatternLibrary:
@@ -91,13 +110,9 @@ class PatternLibrary:
                 continue
             columns = self.series.transform(family.columns.astype(np.float32))
             gram = self.series.products(columns, columns)
-            total = gram.sum(axis=0)
-            if family.paired:
-                pairs = np.arange(len(columns)).reshape(-1, 2)
-                precision = total[pairs[:, :, None], pairs[:, None, :]] / scale
-            else:
-                precision = np.einsum('pc,cd,pd->p', family.weights, total, family.weights) / scale
-            found.append(_Scanned(family, columns, gram, precision))
+            found.append(_Scanned(
+                family, Columns(self.regression, {self.d: columns}), gram,
+                _Scanned.of_patterns(family, gram.sum(axis=0)) / scale))
         return found
 
     @property
@@ -158,30 +173,11 @@ class PatternLibrary:
             Beyond `count`, those for which there is a plain word: a constant, friction.
         """
         weights = self.regression.weights(fit, self.d)
-        index, felt = self.regression.local(fit, self.d)
-        series = self.series
-        factor = series.spread(weights)
-        active = np.concatenate([self.regression.base[self.d][:-1],
-                                 *(block.rows[self.d] for block in felt)]).astype(np.float32)
-        rest = self.regression.remaining(fit, self.d) * factor
-        covariance = fit.covariance[np.ix_(index, index)]
-        active_weighted = active * factor.astype(np.float32)
         scored: list[tuple[float, _Scanned, int]] = []
         for scanned in self._scanned:
-            family = scanned.family
-            side = scanned.columns @ rest.astype(np.float32)
-            known = (scanned.columns @ active_weighted.T).astype(float)
-            S = np.tensordot(weights, scanned.gram, 1) - known @ covariance @ known.T
-            if family.paired:
-                pairs = np.arange(len(side)).reshape(-1, 2)
-                gains = term_gains(S[pairs[:, :, None], pairs[:, None, :]],
-                                   side[pairs].astype(float), scanned.precision, False)
-            else:
-                own = np.einsum('pc,cd,pd->p', family.weights, S, family.weights)
-                own = np.maximum(own, 0.0) + scanned.precision
-                gains = (family.weights @ side) ** 2 / own - np.log(own / scanned.precision)
+            gains = scanned.gains(fit, weights)
             best = int(np.argmax(gains))
-            scored.append((float(gains[best]) - self.price(family), scanned, best))
+            scored.append((float(gains[best]) - self.price(scanned.family), scanned, best))
         scored.sort(key=lambda one: -one[0])
         found = []
         for rank, (score, scanned, best) in enumerate(scored):
@@ -241,12 +237,7 @@ class PatternLibrary:
         values = self.values(family.variable)
         values = np.abs(values) if speed else values
         sign = self.values('direction') if pattern.kind == 'directed_range' else 1.0
-        index, felt = self.regression.local(fit, self.d)
-        root = np.sqrt(self.series.spread(self.regression.weights(fit, self.d)))
-        active = np.concatenate([self.regression.base[self.d][:-1],
-                                 *(block.rows[self.d] for block in felt)]) * root
-        rest = self.regression.remaining(fit, self.d) * root
-        covariance = fit.covariance[np.ix_(index, index)]
+        weights = self.series.spread(self.regression.weights(fit, self.d))
         limits = list(pattern.limits)
         outer = (float(values.min()), float(values.max()))
         best = -np.inf
@@ -260,10 +251,10 @@ class PatternLibrary:
                               dtype=float)
             # A handful of samples is an incident, not a range.
             held = np.abs(rows).sum(axis=1) >= LEAST_SHARE * len(values)
-            x = self.series.transform(rows) * root
-            known = x @ active.T
-            own = np.einsum('ij,ij->i', x, x) - np.einsum('ip,pq,iq->i', known, covariance, known)
-            gains = np.where(held, (x @ rest) ** 2 / np.maximum(own, 1e-9), -np.inf)
+            x = self.series.transform(rows)
+            taken, side = Columns(self.regression, {self.d: x}).projected(fit)
+            own = x ** 2 @ weights - np.einsum('ip,pq,iq->i', taken, fit.covariance, taken)
+            gains = np.where(held, side ** 2 / np.maximum(own, 1e-9), -np.inf)
             top = int(np.argmax(gains))
             if gains[top] > best:
                 best, limits[end] = float(gains[top]), float(trials[top])
