@@ -228,9 +228,8 @@ def test_the_page_is_told_the_runner_up_and_evidence_is_the_difference_of_costs(
     assert found.sets[0].cost == 0
     assert [one.cost for one in found.sets] == sorted(one.cost for one in found.sets)
     assert found.selection is not None
-    last = found.selection.last
-    without = last.evaluated[frozenset()]
-    assert found.effects[0].evidence == pytest.approx(without.cost - found.selection.best.cost)
+    assert found.effects[0].evidence == pytest.approx(
+        found.selection.nothing.cost - found.selection.best.cost)
 
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:

@@ -42,8 +42,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.expansion import Selection
-from pprs_dynamics.inference.search.rivals import Rival
+from pprs_dynamics.inference.search.ranking import Ranking, Rival
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.pose_files import read_poses
 from pprs_dynamics.measurement.files.recording import Recording
@@ -356,11 +355,13 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
         return search.evaluate((search.library.candidate(CATALOGUE[name], [placement]),))
 
     adopted = fitted('coulomb_friction', 'force')
-    selection = Selection(search, search, adopted)
-    assert question_after(selection, adopted, []).kind == 'estimate'
+    ranking = Ranking.of(search, search, adopted)
+    assert ranking.kept is adopted
+    assert question_after(ranking, []).kind == 'estimate'
     free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')
-    question = question_after(selection, adopted, [
+    ranking = Ranking.of(search, search, adopted)
+    question = question_after(ranking, [
         Rival(free, ('coulomb_friction',), ('asymmetric_friction',)),
         Rival(other, ('coulomb_friction',), ('load_friction',))])
     assert question.kind == 'separate'

@@ -19,10 +19,9 @@ from pprs_dynamics.inference.search.expansion import (
     exact_forces,
     fitted_model,
     linear_prediction,
-    select,
     squared,
 )
-from pprs_dynamics.inference.search.form import without_remainders
+from pprs_dynamics.inference.search.ranking import select
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -143,11 +142,10 @@ def names(found: CandidateSet) -> list[str]:
     ids=lambda effects: '+'.join(effects))
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
-    selection = select(MODEL, [recording], DECISIONS)
-    _, found, _ = without_remainders(selection.last, selection.best)
+    ranking = select(MODEL, [recording], DECISIONS)
+    found, last = ranking.kept, ranking.last
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
-    last = selection.last
     exact = exact_forces(last.design, fitted_model(last, found))
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
@@ -158,11 +156,11 @@ def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
     # Both are less than a tenth of what the drag is.
     recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
                               'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
-    selection = select(MODEL, [recording], DECISIONS)
-    assert names(selection.best) == ['platform_drag', 'revolute_friction']
-    _, found, remainders = without_remainders(selection.last, selection.best)
-    assert ('revolute_friction' in names(found)) is stands_out
-    assert [one.candidate.name for one in remainders] == ['revolute_friction'] * (not stands_out)
+    ranking = select(MODEL, [recording], DECISIONS)
+    assert names(ranking.best) == ['platform_drag', 'revolute_friction']
+    assert ('revolute_friction' in names(ranking.kept)) is stands_out
+    assert [one.candidate.name for one in ranking.remainders] == [
+        'revolute_friction'] * (not stands_out)
 
 
 def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
@@ -178,9 +176,8 @@ def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
         total = forces.total if follows else plain.total + forces.parts['external_wrench']
         recording = Recording.from_arrays('made', TIME, forces.mechanism.position,
                                           effort=total + 0.05 * rng.normal(size=total.shape))
-        selection = select(MODEL, [recording], DECISIONS)
-        _, found, _ = without_remainders(selection.last, selection.best)
-        assert names(found) == ['external_wrench'], follows
+        found = select(MODEL, [recording], DECISIONS)
+        assert names(found.kept) == ['external_wrench'], follows
 
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
@@ -189,8 +186,8 @@ def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -
     found = select(MODEL, [recording_of(hidden)], DECISIONS)
     assert names(found.best) == ['coulomb_friction', 'viscous_friction']
     # One that is both is told with its cost.
-    assert found.ranked[0] is found.best
-    both = next(one for one in found.ranked if names(one) == ['asymmetric_friction'])
+    assert found.sets[0] is found.best
+    both = next(one for one in found.sets if names(one) == ['asymmetric_friction'])
     assert both.cost > found.best.cost
 
 

@@ -84,11 +84,7 @@ def see(browser: Any, file: Path) -> Iterator[Any]:
 def alone(diagnosis: Diagnosis) -> dict[str, Tried]:
     """Return every effect that was fitted as the only one, where it explains most."""
     assert diagnosis.selection is not None
-    every: dict[str, Tried] = {}
-    for one in sorted(diagnosis.selection.first.evaluated.values(), key=lambda one: one.total):
-        if len(one.candidates) == 1 and one.effects:
-            every.setdefault(one.effects[0].name, (one.effects[0], one))
-    return every
+    return {name: (one.effects[0], one) for name, one in diagnosis.selection.alone.items()}
 
 
 def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:

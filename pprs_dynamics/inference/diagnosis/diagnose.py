@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -25,17 +25,14 @@ from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, E
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, calibrations, estimate
 from pprs_dynamics.inference.search.expansion import (
-    Selection,
     exact_forces,
     fitted_model,
     linear_error,
-    linear_residual,
-    select,
 )
-from pprs_dynamics.inference.search.form import Remainder, without_remainders
+from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.ranking import Ranking, select
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
-from pprs_dynamics.inference.search.rivals import find_rivals
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
@@ -83,8 +80,8 @@ class Diagnosis:
     noise_floor : float
         The same over drives [N].
     held_out_on : {'blocks', 'validation'}
-    selection : Selection, optional
-        The searches, for looking closer.
+    selection : Ranking, optional
+        All that was tried, for looking closer.
     chosen : CandidateSet, optional
         What was adopted of them.
     """
@@ -108,7 +105,7 @@ class Diagnosis:
     noise_floors: dict[str, float]
     noise_floor: float
     held_out_on: str = 'blocks'
-    selection: Selection | None = field(default=None, repr=False, compare=False)
+    selection: Ranking | None = field(default=None, repr=False, compare=False)
     chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -153,27 +150,26 @@ def diagnose(
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    selection = select(model, recordings, decisions, lambda share: report(0.9 * share))
-    diagnosis = _Answer(selection, validate, decisions).diagnosis()
+    ranking = select(model, recordings, decisions, lambda share: report(0.9 * share))
+    diagnosis = _Answer(ranking, validate, decisions).diagnosis()
     report(1.0)
     return diagnosis
 
 
 class _Answer:
-    """Turns a selection into an answer."""
+    """Turns a ranking into an answer."""
 
-    def __init__(self, selection: Selection, validate: Sequence[Recording],
+    def __init__(self, ranking: Ranking, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
-        self.decisions, self.validate = decisions, validate
-        self.search: Search = selection.last
+        self.ranking, self.validate, self.decisions = ranking, validate, decisions
+        self.search: Search = ranking.last
+        self.best, self.kept = ranking.best, ranking.kept
         self.design = self.search.design
-        self.best, self.kept, self.remainders = without_remainders(self.search, selection.best)
-        self.selection = replace(selection, best=self.best)
         self.drives = self.design.drives
 
     def diagnosis(self) -> Diagnosis:
         search, regression = self.search, self.search.regression
-        first = self.selection.first.design
+        first = self.ranking.first.design
         widths = estimate_widths(search, self.kept)
         adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
         remaining = first.residuals.measured - exact_forces(self.design, adopted)
@@ -190,62 +186,42 @@ class _Answer:
                  if abs(one.after - one.before) > SURE * one.std]
         return Diagnosis(
             verdict, tuple(effects), sets, self._candidates(), self._suspects(), depends,
-            tuple(self._within_model_error(one) for one in self.remainders), self._sets(),
+            tuple(map(self._within_model_error, self.ranking.remainders)), self._sets(),
             tuple(moved), find_cautions(search, self.best, effects), first.notes,
             first.given, adopted, first.residuals, remaining, noise, floors,
             float(np.sqrt(np.mean(np.square(list(floors.values()))))),
-            'validation' if self.validate else 'blocks', self.selection, self.kept)
+            'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
     def _effects(self, remaining: Array) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
-        search = self.search
-        without = {c: self._without(c) for c in self.kept.effects}
-        evidence = {c: one.total - self.kept.total for c, one in without.items()}
-        # First what lowers the error most, as a multiple of each drive's noise: drives may be of
-        # different sizes and units.
-        ordered = sorted(self.kept.effects, key=lambda c: -self._over_noise(without[c]))
+        search, ordered, steps = self.search, self.ranking.order, self.ranking.path
         if not ordered:
             return []
-        unknown = self.kept.unknowns
-        steps = [search.evaluate((*ordered[:k], *unknown), self.kept)
-                 for k in range(len(ordered))] + [self.kept]
-        errors = [_rms(self.selection.first.design.residuals.error),
+        errors = [_rms(self.ranking.first.design.residuals.error),
                   *(linear_error(search, step) for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
-            given = self.selection.first.design.given
+            given = self.ranking.first.design.given
             models = [given, *(fitted_model(search, step) for step in steps[1:])]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
             held_out = [hold_out(search, step).error for step in steps]
-        near = [one for one in search.evaluated.values()
-                if one.cost < self.best.cost + self.decisions.rival_margin]
+        near = self.ranking.near(self.decisions.rival_margin)
         found = []
         for k, candidate in enumerate(ordered):
             said = estimate(search, self.kept, candidate, near)
             found.append(FoundEffect(
-                candidate.effect, self._names(candidate), said.parameters, evidence[candidate],
-                errors[k], errors[k + 1], held_out[k], held_out[k + 1],
+                candidate.effect, self._names(candidate), said.parameters,
+                self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 self.kept.force(candidate, remaining.shape), said.at_bound))
         return found
 
-    def _over_noise(self, found: CandidateSet) -> float:
-        """Return the root of the mean square of what a set leaves, over the noise of each drive."""
-        search = self.search
-        left = linear_residual(search, found)
-        shares = [np.nanmean(np.square(left[:, d])) / max(
-            search.regression.noise_floor(self.best.fit, d), 1e-12) ** 2
-            for d in search.regression.drives]
-        return float(np.sqrt(np.mean(shares)))
-
-    def _without(self, candidate: Candidate) -> CandidateSet:
-        return self.search.evaluate(tuple(c for c in self.kept.candidates if c is not candidate),
-                                    self.kept)
+    def _evidence(self, candidate: Candidate) -> float:
+        return self.ranking.without[candidate].total - self.kept.total
 
     def _rivals(self) -> dict[str, list[str]]:
         """Return, for each adopted effect, what stands for it in sets that are nearly as good."""
         rivals: dict[str, list[str]] = {c.name: [] for c in self.kept.effects}
-        for rival in find_rivals(self.selection, self.kept, self.decisions.rival_margin,
-                                 {one.candidate.name for one in self.remainders}):
+        for rival in self.ranking.rivals(self.decisions.rival_margin):
             for name in rival.missing:
                 rivals[name] += [one for one in rival.instead if one not in rivals[name]]
         return rivals
@@ -254,42 +230,24 @@ class _Answer:
         statements = []
         libraries = {library.d: library for library in self.search.patterns}
         for candidate in self.kept.unknowns:
-            evidence = self._without(candidate).total - self.kept.total
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    self.drives[d], libraries[d], candidate, self.kept.fit.of(block), evidence,
-                    ()))
+                    self.drives[d], libraries[d], candidate, self.kept.fit.of(block),
+                    self._evidence(candidate), ()))
         statements += levels(self.search.regression.residuals, dict(noise),
                              self.decisions).values()
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""
-        search = self.selection.first
-        none = search.evaluated[frozenset()]
-        best: dict[str, CandidateSet] = {}
-        for one in search.evaluated.values():
-            if len(one.candidates) == 1 and one.effects:
-                name = one.effects[0].name
-                if name not in best or one.cost < best[name].cost:
-                    best[name] = one
-        return tuple(sorted((self._ranked(search, one, one.effects[0], none.cost - one.cost)
-                             for one in best.values()), key=lambda one: -one.evidence))
+        none = self.ranking.nothing.cost
+        return tuple(self._ranked(self.ranking.first, one, one.effects[0], none - one.cost)
+                     for one in self.ranking.alone.values())
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
         """Return effects that nearly pay beside those adopted: slow noise would do as well."""
-        mine = {c.key for c in self.best.candidates}
-        found: dict[str, RankedEffect] = {}
-        for one in self.search.evaluated.values():
-            more = [c for c in one.effects if c.key not in mine]
-            behind = one.cost - self.best.cost
-            if (len(more) == 1 and len(one.candidates) == len(mine) + 1
-                    and 0 < behind < self.decisions.rival_margin / 2
-                    and more[0].name not in {c.name for c in self.best.effects}):
-                ranked = self._ranked(self.search, one, more[0], -behind)
-                if more[0].name not in found or found[more[0].name].evidence < ranked.evidence:
-                    found[more[0].name] = ranked
-        return tuple(sorted(found.values(), key=lambda one: -one.evidence))
+        return tuple(self._ranked(self.search, one, candidate, self.best.cost - one.cost)
+                     for candidate, one in self.ranking.suspects(self.decisions.rival_margin / 2))
 
     def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:
@@ -298,7 +256,7 @@ class _Answer:
 
     def _sets(self) -> tuple[RankedSet, ...]:
         found: dict[frozenset[str], RankedSet] = {}
-        for one in self.selection.ranked:
+        for one in self.ranking.sets:
             names = tuple((c.name, self._names(c)) for c in one.candidates)
             key = frozenset(name for name, _ in names)
             if key not in found:

@@ -75,12 +75,11 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     found = []
     for of, name in ((names[0], name) for names in diagnosis.indistinguishable
                      for name in names[1:]):
-        best = next((one for one in selection.ranked if name in {c.name for c in one.effects}
+        best = next((one for one in selection.sets if name in {c.name for c in one.effects}
                      and of not in {c.name for c in one.effects}), None)
         if best is None:
             continue
-        search = (selection.last if any(one is best for one in selection.last.evaluated.values())
-                  else selection.first)
+        search = selection.search_of(best)
         candidate = next(c for c in best.effects if c.name == name)
         remaining = linear_residual(search, best)
         drives = candidate.drives

@@ -25,7 +25,7 @@ from pprs_dynamics.inference.regression.normal_equations import (
     NormalEquations,
 )
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
-from pprs_dynamics.inference.search.expansion import Selection
+from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
@@ -158,7 +158,7 @@ def what_if(diagnosis: Diagnosis) -> WhatIf | None:
 class _System:
     """Columns of all placements that were tried, in the last search."""
 
-    def __init__(self, diagnosis: Diagnosis, selection: Selection, kept: CandidateSet) -> None:
+    def __init__(self, diagnosis: Diagnosis, selection: Ranking, kept: CandidateSet) -> None:
         self.diagnosis, self.kept = diagnosis, kept
         self.search: Search = selection.last
         self.first_choice: dict[str, set[int | None]] = {}
@@ -195,21 +195,21 @@ class _System:
             self.gram[np.ix_(index, index)] += products
             self.side[index] += with_error
 
-    def _tried(self, selection: Selection,
+    def _tried(self, selection: Ranking,
                ) -> Iterable[tuple[tuple[EffectCandidate, ...], CandidateSet]]:
         """Yield the effects of sets, and the sets, those that matter most first."""
-        def by_cost(search: Search) -> list[CandidateSet]:
-            return sorted(search.evaluated.values(), key=lambda one: one.total)
+        def by_cost(sets: Iterable[CandidateSet]) -> list[CandidateSet]:
+            return sorted(sets, key=lambda one: one.total)
 
         def effects(candidates: Iterable[object]) -> tuple[EffectCandidate, ...]:
             return tuple(one for one in candidates if isinstance(one, EffectCandidate))
 
         order = [one.name for one in self.diagnosis.effects]
         yield tuple(sorted(self.kept.effects, key=lambda one: order.index(one.name))), self.kept
-        for one in by_cost(selection.first):
+        for one in by_cost(selection.of_first):
             if len(one.candidates) == 1:
                 yield effects(self.search.library.rebuilt(one.effects)), one
-        for one in by_cost(self.search):
+        for one in by_cost(selection.of_last):
             yield one.effects, one
         # Where no set has an effect, a scan beside what was found says in which shape and where.
         for proposal in self.search.proposals(self.kept, least=-inf):

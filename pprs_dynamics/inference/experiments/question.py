@@ -27,9 +27,7 @@ from pprs_dynamics.inference.experiments.information import Information
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.expansion import Selection, select
-from pprs_dynamics.inference.search.form import without_remainders
-from pprs_dynamics.inference.search.rivals import Rival, find_rivals
+from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
@@ -88,44 +86,40 @@ class Question:
 def question_of(model: ForceModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None]) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    selection = select(model, recordings, DECISIONS, progress)
-    best, adopted, remainders = without_remainders(selection.last, selection.best)
-    selection = replace(selection, best=best)
-    rivals = find_rivals(selection, adopted, DECISIONS.rival_margin,
-                         {one.candidate.name for one in remainders})
-    return question_after(selection, adopted, rivals)
+    ranking = select(model, recordings, DECISIONS, progress)
+    return question_after(ranking, ranking.rivals(DECISIONS.rival_margin))
 
 
-def question_after(selection: Selection, adopted: CandidateSet,
-                   rivals: Sequence[Rival]) -> Question:
-    """Return what a selection leaves open.
+def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
+    """Return what a ranking leaves open.
 
     Parameters
     ----------
-    selection : Selection
-    adopted : CandidateSet
-        Of its last search.
+    ranking : Ranking
     rivals : sequence of Rival
         The best first.
     """
+    adopted = ranking.kept
     if rivals:
-        return _separation(selection, adopted, rivals)
-    search = selection.last
+        return _separation(ranking, rivals)
+    search = ranking.last
     if adopted.effects:
         return _estimation(search, adopted)
     return _excitation(search, adopted)
 
 
-def _separation(selection: Selection, adopted: CandidateSet, rivals: Sequence[Rival]) -> Question:
+def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     """Return how to tell sets apart, each pair of effects in the sets of lowest cost."""
     pairs: set[tuple[str, str]] = set()
-    sets = [adopted]
+    sets = [ranking.kept]
     for rival in rivals:
         new = set(product(rival.missing, rival.instead))
         if not new <= pairs:
             pairs |= new
             sets.append(rival.found)
-    search = _common_search(selection, sets)
+    # The last search, or the first where one of the sets is linear around its point.
+    search = (ranking.last if all(ranking.search_of(one) is ranking.last for one in sets)
+              else ranking.first)
     placed = [search.evaluate(search.library.rebuilt(one.candidates)) for one in sets]
     terms = _Terms()
     parts = [terms.of_set(one) for one in placed]
@@ -149,12 +143,6 @@ def _separation(selection: Selection, adopted: CandidateSet, rivals: Sequence[Ri
                 for c in placed[0].effects]
     return _asked('separate', search, placed[0], plan, Separation(tuple(contests)), contests,
                   subjects)
-
-
-def _common_search(selection: Selection, sets: Sequence[CandidateSet]) -> Search:
-    """Return the last search, or the first where one of the sets is linear around its point."""
-    last = selection.last
-    return last if all(last.evaluated.get(one.key) is one for one in sets) else selection.first
 
 
 def _estimation(search: Search, adopted: CandidateSet) -> Question:

@@ -233,6 +233,11 @@ class CandidateSet:
         return force
 
 
+def bends(candidate: Candidate) -> bool:
+    """Return whether a candidate changes how others show."""
+    return isinstance(candidate, EffectCandidate) and candidate.effect.bends_columns
+
+
 def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
     """Return the same for sets of the same candidates."""
     return frozenset(candidate.key for candidate in candidates)

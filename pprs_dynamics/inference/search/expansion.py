@@ -12,7 +12,7 @@ search goes on from the set that was found. Costs of both searches mean the same
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,11 +27,10 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import PlacedEffect, Point
-from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet, bends
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form import beyond_lack_of_fit
 from pprs_dynamics.inference.search.search import Search
-from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.reconstruction import treated_forces
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
@@ -42,65 +41,15 @@ LEAST_DIFFERENCE, LEAST_CHANGE = 4.0, 2.0
 MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 5, 6, 4  # how often all of this is repeated
 
 
-@dataclass(frozen=True)
-class Selection:
-    """The outcome of all searches.
-
-    Parameters
-    ----------
-    first, last : Search
-        Around the model as given, and around the last point.
-    best : CandidateSet
-        Of the last.
-    """
-
-    first: Search
-    last: Search
-    best: CandidateSet
-
-    @property
-    def ranked(self) -> list[CandidateSet]:
-        """Sets of both searches, the best first, the others by cost.
-
-        A set belongs to the search around whose point it is linear: those with an effect that
-        bends the columns to the last, the others to the first.
-        """
-        found = list(self.last.evaluated.values())
-        if self.first is not self.last:
-            def is_bent(one: CandidateSet) -> bool:
-                return any(map(_bends, one.candidates))
-            found = [one for one in found if is_bent(one)] + [
-                one for one in self.first.evaluated.values() if not is_bent(one)]
-        others = [one for one in found if one is not self.best]
-        return [self.best, *sorted(others, key=lambda one: one.cost)]
-
-
-def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
-           progress: Callable[[float], None] | None = None) -> Selection:
-    """Return the best set of effects, searched around the fitted model where that matters.
-
-    Raises
-    ------
-    PprsError
-        As `measure_residuals`.
-    """
-    report = progress or (lambda share: None)
-    design = Design.of(model, recordings, lambda share: report(0.25 * share))
-    first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
-    best = first.run()
+def around_fitted(first: Search, best: CandidateSet, decisions: Decisions,
+                  report: Callable[[float], None]) -> tuple[Search, CandidateSet]:
+    """Return the search around the fitted model where that matters, and its best set."""
     found = _around_fitted(first, best, decisions, report, _bending_alone)
-    if _stands_out(*found) and not all(map(_bends, best.candidates)):
+    if _stands_out(*found) and not all(map(bends, best.candidates)):
         found = min(found, _around_fitted(first, best, decisions, report, _as_it_is,
                                           found[1].total),
                     key=lambda one: beyond_lack_of_fit(*one)[0].total)
-    search, best = found
-    # Rivals that bend no columns are judged where none are bent.
-    for one in list(search.evaluated.values()) if search is not first else ():
-        if (one.cost < best.cost + decisions.rival_margin and one.effects and not one.unknowns
-                and not any(map(_bends, one.candidates))):
-            first.refined(first.evaluate(first.library.rebuilt(one.candidates)))
-    report(1.0)
-    return Selection(first, search, best)
+    return found
 
 
 def _around_fitted(
@@ -138,7 +87,7 @@ def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:
 
     What was found beside them may only make good that columns were not bent.
     """
-    alone = search.rescanned(search.evaluate(tuple(filter(_bends, best.candidates))))
+    alone = search.rescanned(search.evaluate(tuple(filter(bends, best.candidates))))
     return search.at_noise_of(best, alone.candidates)
 
 
@@ -159,10 +108,6 @@ def _stands_out(search: Search, best: CandidateSet) -> bool:
     left = np.sqrt(np.nanmean(np.square(linear_residual(search, kept)), axis=0))
     promised = search.decisions.left_ratio * regression.left(kept.fit)
     return bool(np.any(left[list(regression.drives)] > promised))
-
-
-def _bends(candidate: Candidate) -> bool:
-    return isinstance(candidate, EffectCandidate) and candidate.effect.bends_columns
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,

@@ -53,22 +53,27 @@ class FittedSets:
         self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
         self.prices = Prices.of(self.regression, decisions)
         self.library = Library(design, self.regression, self.prices)
-        self.evaluated: dict[Hashable, CandidateSet] = {}
+        self._evaluated: dict[Hashable, CandidateSet] = {}
         self._doubtful: dict[Hashable, tuple[Block, ...]] = {}
+
+    @property
+    def sets(self) -> tuple[CandidateSet, ...]:
+        """All that were fitted so far."""
+        return tuple(self._evaluated.values())
 
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
-        return min(self.evaluated.values(), key=lambda found: found.cost)
+        return min(self._evaluated.values(), key=lambda found: found.cost)
 
     def evaluate(self, candidates: Candidates, near: CandidateSet | None = None) -> CandidateSet:
         """Return a set, fitted; one that was fitted before is not fitted again."""
         key = set_key(candidates)
-        if key not in self.evaluated:
+        if key not in self._evaluated:
             start = near.fit.amplitudes if near is not None else (
-                self.evaluated[frozenset()].fit.amplitudes if self.evaluated else None)
-            self.evaluated[key] = self._fitted(candidates, start)
-        return self.evaluated[key]
+                self._evaluated[frozenset()].fit.amplitudes if self._evaluated else None)
+            self._evaluated[key] = self._fitted(candidates, start)
+        return self._evaluated[key]
 
     def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
         blocks = [block for candidate in candidates for block in candidate.blocks]
@@ -78,7 +83,7 @@ class FittedSets:
             doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
         else:
             doubtful = {}
-        rival = min((one.fit.deviance for one in self.evaluated.values()), default=np.inf)
+        rival = min((one.fit.deviance for one in self._evaluated.values()), default=np.inf)
         fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start, rival)
         found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
         return replace(found, is_admissible=self._is_admissible(found))

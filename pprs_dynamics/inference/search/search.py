@@ -112,7 +112,7 @@ class Search(ScannedSets):
         """Fit sets, each from the noise of a near one, and refine the shapes of the best few."""
         new = []
         for candidates, near in sets:
-            if set_key(candidates) not in self.evaluated and self._is_bounded(candidates):
+            if set_key(candidates) not in self._evaluated and self._is_bounded(candidates):
                 new.append(self.evaluate(candidates, near))
         # No noise takes a constant: what lacks nothing else is judged once it has it.
         for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
@@ -138,7 +138,7 @@ class Search(ScannedSets):
     def _additions(self, with_patterns: bool) -> list[tuple[Candidates, CandidateSet]]:
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[tuple[Candidates, CandidateSet]] = []
-        ranked = sorted(self.evaluated.values(), key=lambda one: one.cost)
+        ranked = sorted(self._evaluated.values(), key=lambda one: one.cost)
         for rank, base in enumerate(ranked[:BEAM]):
             count = PROPOSALS if rank == 0 else 2
             found += [(candidates, base) for candidates in self.proposals(base, count)]
@@ -169,7 +169,7 @@ class Search(ScannedSets):
 
         None where the model has it everywhere already.
         """
-        base = self.evaluated[frozenset()]
+        base = self._evaluated[frozenset()]
         fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
         for near in (base, fast):
             found = self._scan(near).get(effect, [])
@@ -181,14 +181,14 @@ class Search(ScannedSets):
                 candidate = self.library.candidate(effect, [make() for make in chosen])
                 self.refined(self.evaluate((candidate,), near))
         while True:
-            alone = [one for one in self.evaluated.values() if one.candidates]
+            alone = [one for one in self._evaluated.values() if one.candidates]
             if not alone:
                 return None
             best = min(alone, key=lambda one: one.cost)
             for candidate in (*self._alternatives(best.effects[0]),
                               *(self._variants(best.effects[0]))):
                 self.evaluate((candidate,), best)
-            after = min((one for one in self.evaluated.values() if one.candidates),
+            after = min((one for one in self._evaluated.values() if one.candidates),
                         key=lambda one: one.cost)
             if after.cost > best.cost - LEAST_IMPROVEMENT:
                 return best
@@ -224,9 +224,9 @@ class Search(ScannedSets):
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
         """Return the best of a set and those in which something else stands for one or two."""
-        before = set(self.evaluated)
+        before = set(self._evaluated)
         self._try(self._replacements(found))
-        better = [one for key, one in self.evaluated.items()
+        better = [one for key, one in self._evaluated.items()
                   if key not in before and one.cost < found.total - LEAST_IMPROVEMENT]
         return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
                     found)

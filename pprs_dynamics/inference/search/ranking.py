@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The answer of the search: all sets by cost, the one that is kept, and what stands beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+    bends,
+)
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.expansion import around_fitted, linear_residual
+from pprs_dynamics.inference.search.form import Remainder, without_remainders
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A set that stands beside the one that was adopted.
+
+    Parameters
+    ----------
+    found : CandidateSet
+    missing, instead : tuple of str
+        Adopted effects that it lacks, and what it has instead; neither is empty.
+    """
+
+    found: CandidateSet
+    missing: tuple[str, ...]
+    instead: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """All sets that were fitted, and what is to be said of them.
+
+    Parameters
+    ----------
+    first, last : Search
+        Around the model as given, and around the last operating point: for looking closer.
+    of_first, of_last : tuple of CandidateSet
+        Their sets, by cost.
+    best, kept : CandidateSet
+        Of the last: that of lowest cost, and without what is within the model error of others.
+    remainders : tuple of Remainder
+        What is.
+    without : mapping of Candidate to CandidateSet
+        The kept set without each of its candidates.
+    order : tuple of EffectCandidate
+        Those of the kept set, first the one without which the error would be largest.
+    path : tuple of CandidateSet
+        From the patterns of the kept set to all of it, an effect more in each in that order.
+    """
+
+    first: Search = field(repr=False)
+    last: Search = field(repr=False)
+    of_first: tuple[CandidateSet, ...] = field(repr=False)
+    of_last: tuple[CandidateSet, ...] = field(repr=False)
+    best: CandidateSet
+    kept: CandidateSet
+    remainders: tuple[Remainder, ...]
+    without: Mapping[Candidate, CandidateSet] = field(repr=False)
+    order: tuple[EffectCandidate, ...] = field(repr=False)
+    path: tuple[CandidateSet, ...] = field(repr=False)
+
+    @classmethod
+    def of(cls, first: Search, last: Search, best: CandidateSet) -> Ranking:
+        """Return the ranking of the sets of two searches, and of what the answer needs beside."""
+        best, kept, remainders = without_remainders(last, best)
+
+        def less(gone: Candidate) -> CandidateSet:
+            return last.evaluate(tuple(c for c in kept.candidates if c is not gone), kept)
+        without = {candidate: less(candidate) for candidate in kept.candidates}
+        # First what lowers the error most, as a multiple of each drive's noise: drives may be of
+        # different sizes and units.
+        ordered = sorted(kept.effects, key=lambda c: -_over_noise(last, best, without[c]))
+        path = [last.evaluate((*ordered[:k], *kept.unknowns), kept) for k in range(len(ordered))]
+        return cls(first, last, _by_cost(first.sets), _by_cost(last.sets), best, kept, remainders,
+                   MappingProxyType(without), tuple(ordered), (*path, kept))
+
+    @cached_property
+    def sets(self) -> tuple[CandidateSet, ...]:
+        """Sets of both searches, the best first, the others by cost.
+
+        A set belongs to the search around whose point it is linear: those with an effect that
+        bends the columns to the last, the others to the first.
+        """
+        found = list(self.of_last)
+        if self.first is not self.last:
+            found = [one for one in self.of_last if _is_bent(one)] + [
+                one for one in self.of_first if not _is_bent(one)]
+        return (self.best, *_by_cost([one for one in found if one is not self.best]))
+
+    @property
+    def nothing(self) -> CandidateSet:
+        """The empty set around the model as given."""
+        return next(one for one in self.of_first if not one.candidates)
+
+    @property
+    def alone(self) -> dict[str, CandidateSet]:
+        """The best set of each effect that was fitted as the only one, by its name."""
+        found: dict[str, CandidateSet] = {}
+        for one in self.of_first:
+            if len(one.candidates) == 1 and one.effects:
+                found.setdefault(one.effects[0].name, one)
+        return found
+
+    def search_of(self, found: CandidateSet) -> Search:
+        """Return the search that holds a set."""
+        return self.last if any(one is found for one in self.of_last) else self.first
+
+    def near(self, margin: float) -> tuple[CandidateSet, ...]:
+        """Return the sets of the last search within a margin of the best."""
+        return tuple(one for one in self.of_last if one.cost < self.best.cost + margin)
+
+    def rivals(self, margin: float) -> list[Rival]:
+        """Return sets with other effects than the kept ones so near the best, the best first.
+
+        To have what is within the model error of others makes no rival.
+        """
+        mine = {candidate.name for candidate in self.kept.effects}
+        ignored = {one.candidate.name for one in self.remainders}
+        rivals = []
+        for other in self.sets:
+            if other.cost > self.best.cost + margin:
+                break
+            theirs = {candidate.name for candidate in other.effects} - ignored
+            missing, instead = sorted(mine - theirs), sorted(theirs - mine)
+            if missing and instead:
+                rivals.append(Rival(other, tuple(missing), tuple(instead)))
+        return rivals
+
+    def suspects(self, margin: float) -> list[tuple[EffectCandidate, CandidateSet]]:
+        """Return effects that nearly pay beside the best, with their sets: noise would do it."""
+        mine = {c.key for c in self.best.candidates}
+        names = {c.name for c in self.best.effects}
+        found: dict[str, tuple[EffectCandidate, CandidateSet]] = {}
+        for one in self.near(margin):
+            more = [c for c in one.effects if c.key not in mine]
+            if (len(more) == 1 and len(one.candidates) == len(mine) + 1
+                    and one.cost > self.best.cost and more[0].name not in names):
+                found.setdefault(more[0].name, (more[0], one))
+        return list(found.values())
+
+
+def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+           progress: Callable[[float], None] | None = None) -> Ranking:
+    """Return all sets of effects that were tried, around the fitted model where that matters.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    design = Design.of(model, recordings, lambda share: report(0.25 * share))
+    first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
+    last, best = around_fitted(first, first.run(), decisions, report)
+    # Rivals that bend no columns are judged where none are bent.
+    for one in last.sets if last is not first else ():
+        if (one.cost < best.cost + decisions.rival_margin and one.effects and not one.unknowns
+                and not _is_bent(one)):
+            first.refined(first.evaluate(first.library.rebuilt(one.candidates)))
+    found = Ranking.of(first, last, best)
+    report(1.0)
+    return found
+
+
+def _is_bent(found: CandidateSet) -> bool:
+    return any(map(bends, found.candidates))
+
+
+def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:
+    return tuple(sorted(sets, key=lambda one: one.cost))
+
+
+def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:
+    """Return the root of the mean square of what a set leaves, over the noise of each drive."""
+    left = linear_residual(search, found)
+    shares = [np.nanmean(np.square(left[:, d])) / max(
+        search.regression.noise_floor(best.fit, d), 1e-12) ** 2
+        for d in search.regression.drives]
+    return float(np.sqrt(np.mean(shares)))
