@@ -39,7 +39,7 @@ def consult(selection: Ranking, truth: Mapping[str, Any]) -> dict[str, Any]:
     if own is None:
         return {}
     base = replace(nothing, fit=search.regression.at((), own.fit.amplitudes))
-    rivals = [search.refined(search.evaluate(one, own)).cost
+    rivals = [search.refined(search.evaluate(one)).cost
               for one in search.proposals(base, RIVALS) if one[0].name != effect.name]
     return {'best_error': linear_error(search, own),
             'separable': min(rivals, default=nothing.cost) > own.cost + DECISIONS.rival_margin}

@@ -224,9 +224,9 @@ class TickFits:
         listed = tuple(candidates)
         return CandidateSet(listed, fit, fit.deviance + self.search.price(listed, fit), doubtful)
 
-    def fitted(self, candidates: Sequence[EffectCandidate], near: CandidateSet) -> CandidateSet:
+    def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
         """Return a set with the noise fitted beside it."""
-        return self.search.evaluate(tuple(candidates), near)
+        return self.search.evaluate(tuple(candidates))
 
     def refined(self, found: CandidateSet) -> CandidateSet:
         """Return the set with all shapes where the cost is lowest."""

@@ -46,7 +46,7 @@ def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision:
 
 def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
     """Yield what follows: the noise fitted, what others would gain, shapes, the model itself."""
-    free = fits.fitted([tick.best for tick in view.ticks.values()], view.free)
+    free = fits.fitted([tick.best for tick in view.ticks.values()])
     view = _fitted(fits, view, free, FITTED)
     yield view
     view = replace(view, offers=fits.offers(view.free), has_offers=True)
@@ -74,7 +74,7 @@ def _fitted(fits: TickFits, view: ViewState, free: CandidateSet, stage: str) -> 
     evidence = {}
     for candidate in free.effects:
         rest = [one for one in free.effects if one is not candidate]
-        evidence[candidate.name] = fits.fitted(rest, free).total - free.total
+        evidence[candidate.name] = fits.fitted(rest).total - free.total
     free = fits.at(free.effects, free)
     found = _with_chosen(fits, free, view.ticks)
     residual = fits.residual(found) if view.ticks else fits.before

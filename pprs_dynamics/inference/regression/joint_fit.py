@@ -38,9 +38,8 @@ from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsEr
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
-# The fit has converged when a round changes the deviance by less, or by less than this share of
-# what it lies above the one it is compared with; rounds are bounded.
-CONVERGED, HOPELESS, MOST_ROUNDS, NOISE_STEPS = 0.01, 0.005, 40, 60
+# The fit has converged when a round changes the deviance by less; rounds are bounded.
+CONVERGED, MOST_ROUNDS = 0.01, 40
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_EQUATIONS = 300  # of drives that are kept: some 0.1 to 0.5 MB each
 
@@ -188,8 +187,7 @@ class Regression:
             self._equations[key] = DriveEquations(self, d, felt)
         return self._equations[key]
 
-    def fit(self, blocks: Sequence[Block], start: Array | None = None,
-            rival: float = np.inf) -> JointFit:
+    def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
 
         Parameters
@@ -197,8 +195,6 @@ class Regression:
         blocks : sequence of Block
         start : (D, J + 1) array, optional
             Amplitudes of the noise to start from.
-        rival : float
-            The deviance to be compared with: far above it the fit is only a rough one.
         """
         system = NormalEquations(self, blocks)
         shapes = self.noise_shapes
@@ -208,12 +204,11 @@ class Regression:
         solution = system.solve(spectra, self.counts)
         for _ in range(MOST_ROUNDS - 1):
             before = solution.deviance
-            amplitudes = shapes.improved(amplitudes, solution.squares, self.counts,
-                                         solution.leverage, NOISE_STEPS)
+            amplitudes = shapes.fitted(amplitudes, solution.squares, self.counts,
+                                       solution.leverage)
             spectra = shapes.spectra(amplitudes)
             solution = system.solve(spectra, self.counts)
-            above = solution.deviance - rival
-            if abs(before - solution.deviance) < max(CONVERGED, HOPELESS * above):
+            if abs(before - solution.deviance) < CONVERGED:
                 break
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)

@@ -102,6 +102,11 @@ class EffectCandidate:
         return self.effect.name
 
     @property
+    def rank(self) -> tuple[Any, ...]:
+        """Place in a set: that of the catalogue, before patterns of no catalogue."""
+        return (0, list(catalogue()).index(self.name), self.drives or ())
+
+    @property
     def drives(self) -> tuple[int, ...] | None:
         """Drives on which it sits; None for the structure."""
         drives = [placement.drive for placement in self.placements]
@@ -149,6 +154,11 @@ class UnknownCandidate:
     def name(self) -> str:
         """What stands for it among the names of effects."""
         return f'unknown, {self.family.variable}'
+
+    @property
+    def rank(self) -> tuple[Any, ...]:
+        """Place in a set."""
+        return (1, self.family.variable, self.drives, repr(self.pattern))
 
     @property
     def blocks(self) -> tuple[Block, ...]:

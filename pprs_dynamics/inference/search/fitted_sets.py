@@ -66,25 +66,26 @@ class FittedSets:
         """The set of lowest cost so far."""
         return min(self._evaluated.values(), key=lambda found: found.cost)
 
-    def evaluate(self, candidates: Candidates, near: CandidateSet | None = None) -> CandidateSet:
-        """Return a set, fitted; one that was fitted before is not fitted again."""
+    def evaluate(self, candidates: Candidates) -> CandidateSet:
+        """Return a set, fitted; one that was fitted before is not fitted again.
+
+        The fit is a function of the set alone: it does not matter when it is made, nor after what.
+        """
         key = set_key(candidates)
         if key not in self._evaluated:
-            start = near.fit.amplitudes if near is not None else (
-                self._evaluated[frozenset()].fit.amplitudes if self._evaluated else None)
-            self._evaluated[key] = self._fitted(candidates, start)
+            self._evaluated[key] = self._fitted(tuple(sorted(candidates, key=lambda c: c.rank)))
         return self._evaluated[key]
 
-    def _fitted(self, candidates: Candidates, start: Array | None) -> CandidateSet:
+    def _fitted(self, candidates: Candidates) -> CandidateSet:
+        if not candidates:
+            fit = self.regression.fit(())
+            return CandidateSet((), fit, fit.deviance)
+        start = self.evaluate(()).fit.amplitudes
         blocks = [block for candidate in candidates for block in candidate.blocks]
-        if start is not None:
-            # The size of its forces, in proportion to which friction is in doubt, need not be
-            # exact: the noise of a near set does, and steps of it, whose columns are kept.
-            doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
-        else:
-            doubtful = {}
-        rival = min((one.fit.deviance for one in self._evaluated.values()), default=np.inf)
-        fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start, rival)
+        # The size of its forces, in proportion to which friction is in doubt, need not be
+        # exact: the noise of the empty set does, and steps of it, whose columns are kept.
+        doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
+        fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start)
         found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
         return replace(found, is_admissible=self._is_admissible(found))
 
@@ -166,7 +167,7 @@ class FittedSets:
             moved = self._moved(found, 2.0 ** number)
             if moved is None:
                 return found
-            after = self.evaluate(moved, found)
+            after = self.evaluate(moved)
             if after.cost > found.cost - LEAST_IMPROVEMENT:
                 return found
             found = after

@@ -70,7 +70,7 @@ def beyond_lack_of_fit(search: Search, best: CandidateSet,
     while small := _small(search, kept):
         # Of two that look like each other, either is small beyond the other.
         without = {candidate: search.evaluate(
-            tuple(c for c in kept.candidates if c is not candidate), kept) for candidate in small}
+            tuple(c for c in kept.candidates if c is not candidate)) for candidate in small}
         without = {candidate: found for candidate, found in without.items()
                    if _is_of_loads(kept, candidate)
                    or _over_noise(search, best, found) <= search.decisions.left_ratio}

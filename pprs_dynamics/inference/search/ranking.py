@@ -82,12 +82,12 @@ class Ranking:
         best, kept, remainders = without_remainders(last, best)
 
         def less(gone: Candidate) -> CandidateSet:
-            return last.evaluate(tuple(c for c in kept.candidates if c is not gone), kept)
+            return last.evaluate(tuple(c for c in kept.candidates if c is not gone))
         without = {candidate: less(candidate) for candidate in kept.candidates}
         # First what lowers the error most, as a multiple of each drive's noise: drives may be of
         # different sizes and units.
         ordered = sorted(kept.effects, key=lambda c: -_over_noise(last, best, without[c]))
-        path = [last.evaluate((*ordered[:k], *kept.unknowns), kept) for k in range(len(ordered))]
+        path = [last.evaluate((*ordered[:k], *kept.unknowns)) for k in range(len(ordered))]
         return cls(first, last, _by_cost(first.sets), _by_cost(last.sets), best, kept, remainders,
                    MappingProxyType(without), tuple(ordered), (*path, kept))
 

@@ -108,15 +108,15 @@ class Search(ScannedSets):
 
     # Moves
 
-    def _try(self, sets: Iterable[tuple[Candidates, CandidateSet]]) -> None:
-        """Fit sets, each from the noise of a near one, and refine the shapes of the best few."""
+    def _try(self, sets: Iterable[Candidates]) -> None:
+        """Fit sets, and refine the shapes of the best few."""
         new = []
-        for candidates, near in sets:
+        for candidates in sets:
             if set_key(candidates) not in self._evaluated and self._is_bounded(candidates):
-                new.append(self.evaluate(candidates, near))
+                new.append(self.evaluate(candidates))
         # No noise takes a constant: what lacks nothing else is judged once it has it.
         for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
-            new += [self.evaluate(more, found) for more in self.proposals(found, 1)
+            new += [self.evaluate(more) for more in self.proposals(found, 1)
                     if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
@@ -135,22 +135,22 @@ class Search(ScannedSets):
         unknown = sum(isinstance(candidate, UnknownCandidate) for candidate in candidates)
         return unknown <= MOST_UNKNOWN and len(candidates) - unknown <= MOST_EFFECTS
 
-    def _additions(self, with_patterns: bool) -> list[tuple[Candidates, CandidateSet]]:
+    def _additions(self, with_patterns: bool) -> list[Candidates]:
         """Return sets with one candidate more, or on more drives, from the best few sets."""
-        found: list[tuple[Candidates, CandidateSet]] = []
+        found: list[Candidates] = []
         ranked = sorted(self._evaluated.values(), key=lambda one: one.cost)
         for rank, base in enumerate(ranked[:BEAM]):
             count = PROPOSALS if rank == 0 else 2
-            found += [(candidates, base) for candidates in self.proposals(base, count)]
+            found += self.proposals(base, count)
             if rank == 0:
                 fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
-                found += [(candidates, fast) for candidates in self.proposals(fast, REPLACEMENTS)]
+                found += self.proposals(fast, REPLACEMENTS)
                 for near in (base, fast) if with_patterns else ():
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
-                    found += [((*base.candidates, pattern), near) for pattern in patterns]
+                    found += [(*base.candidates, pattern) for pattern in patterns]
         return found
 
-    def _other_bending(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
+    def _other_bending(self, best: CandidateSet) -> Iterable[Candidates]:
         """Yield sets in which another effect that bends the columns stands for one that does.
 
         Several add nearly constant forces: around the wrong one, all would be computed in vain.
@@ -161,7 +161,7 @@ class Search(ScannedSets):
                 for candidates in self.proposals(self.at_noise_of(best, rest)):
                     if any(one.effect.bends_columns for one in candidates
                            if isinstance(one, EffectCandidate) and one not in rest):
-                        yield candidates, best
+                        yield candidates
 
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 ) -> CandidateSet | None:
@@ -179,7 +179,7 @@ class Search(ScannedSets):
                 chosen = [make for _, make in found if make().drive in drives]
             if chosen:
                 candidate = self.library.candidate(effect, [make() for make in chosen])
-                self.refined(self.evaluate((candidate,), near))
+                self.refined(self.evaluate((candidate,)))
         while True:
             alone = [one for one in self._evaluated.values() if one.candidates]
             if not alone:
@@ -187,7 +187,7 @@ class Search(ScannedSets):
             best = min(alone, key=lambda one: one.cost)
             for candidate in (*self._alternatives(best.effects[0]),
                               *(self._variants(best.effects[0]))):
-                self.evaluate((candidate,), best)
+                self.evaluate((candidate,))
             after = min((one for one in self._evaluated.values() if one.candidates),
                         key=lambda one: one.cost)
             if after.cost > best.cost - LEAST_IMPROVEMENT:
@@ -197,7 +197,7 @@ class Search(ScannedSets):
     def rescanned(self, found: CandidateSet) -> CandidateSet:
         """Return the set on all drives where its effects pay, in shapes that scans find."""
         for candidates in self.proposals(found, effects={c.effect for c in found.effects}):
-            found = min(found, self.evaluate(candidates, found), key=lambda one: one.cost)
+            found = min(found, self.evaluate(candidates), key=lambda one: one.cost)
         for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.placements
                           if c.effect.shape and one.drive is not None]:
             candidate = next(c for c in found.effects if c.effect is effect)
@@ -208,7 +208,7 @@ class Search(ScannedSets):
             if effect.name in offers:
                 placements = [*others, self.library.full(offers[effect.name])]
                 found = min(found, self.evaluate(
-                    (*rest, self.library.candidate(effect, placements)), found),
+                    (*rest, self.library.candidate(effect, placements))),
                     key=lambda one: one.cost)
         return self.refined(found)
 
@@ -234,14 +234,14 @@ class Search(ScannedSets):
     def pruned(self, found: CandidateSet) -> CandidateSet:
         """Return a set without the candidates that do not pay in it."""
         while found.candidates:
-            less = min((self.evaluate(tuple(c for c in found.candidates if c is not gone), found)
+            less = min((self.evaluate(tuple(c for c in found.candidates if c is not gone))
                         for gone in found.candidates), key=lambda one: one.total)
             if less.total > found.total:
                 break
             found = less
         return found
 
-    def _replacements(self, best: CandidateSet) -> Iterable[tuple[Candidates, CandidateSet]]:
+    def _replacements(self, best: CandidateSet) -> Iterable[Candidates]:
         """Yield sets in which something else stands for one or two candidates, or for a drive's.
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
@@ -264,16 +264,16 @@ class Search(ScannedSets):
         for rest, drive in rests:
             base = self.at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
-            for candidates in self.proposals(base, REPLACEMENTS, drive, least):
-                yield candidates, best
+            # Whatever stands for one effect as well is a rival: all of them are fitted.
+            one_gone = drive is None and len(rest) == len(best.candidates) - 1
+            yield from self.proposals(base, None if one_gone else REPLACEMENTS, drive, least)
         for candidate in best.effects:
             for other in self._alternatives(candidate):
-                yield self._exchanged(best, candidate, other), best
+                yield self._exchanged(best, candidate, other)
             if len(candidate.hypotheses) > 1:
                 yield from self._two_for(best, candidate)
 
-    def _two_for(self, best: CandidateSet, gone: EffectCandidate,
-                 ) -> Iterable[tuple[Candidates, CandidateSet]]:
+    def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
         """Yield sets in which two other effects stand for one that claims more than one thing."""
         rest = tuple(one for one in best.candidates if one is not gone)
 
@@ -282,8 +282,7 @@ class Search(ScannedSets):
             return [more for more in found if all(
                 one.effect is not gone.effect for one in more if isinstance(one, EffectCandidate))]
         for first in with_another(rest):
-            for second in with_another(first)[:REPLACEMENTS]:
-                yield second, best
+            yield from with_another(first)[:REPLACEMENTS]
 
     def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate in the shapes that its own is easily taken for."""
@@ -302,7 +301,7 @@ class Search(ScannedSets):
         while True:
             best = self.best
             for candidates in self._simpler(best):
-                self.evaluate(candidates, best)
+                self.evaluate(candidates)
             if self.best.cost > best.cost - LEAST_IMPROVEMENT:
                 return
             self.refined(self.best)

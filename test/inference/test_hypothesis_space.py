@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The search on spaces of random columns whose truth is known, against an exhaustive one.
+
+No recording, no robot: seven effects, some in the structure and some on three drives, each a
+random curve. What is found must be the best of all sets; costs must not depend on what was fitted before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import BaseColumn
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.inference.search import candidates as candidates_module
+from pprs_dynamics.inference.search import library as library_module
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+
+SAMPLES, PERIOD = 700, 0.01
+DRIVES = ('a', 'b', 'c')
+MODEL = DriveModel.load()
+SIZE = (Parameter('size', 's', 'N', 'size', -1e3, 1e3),)
+IN_STRUCTURE = [type(f'Structure{k}', (StructureEffect,), {
+    'name': f'structure_{k}', 'linear': SIZE, 'idealised': False}) for k in range(5)]
+ON_DRIVES = [type(f'Drive{k}', (DriveEffect,), {
+    'name': f'drive_{k}', 'linear': SIZE, 'idealised': False}) for k in range(2)]
+EVERY = [*IN_STRUCTURE, *ON_DRIVES]
+
+
+@dataclass
+class RandomDesign(Design):
+    """A design whose columns are given."""
+
+    columns: Mapping[tuple[str, int | None], Mapping[int, Array]] = field(default_factory=dict)
+
+    @property
+    def covered(self) -> tuple[DriveRange, ...]:  # type: ignore[override]
+        return tuple(DriveRange(SAMPLES * PERIOD, PERIOD, 1.0, 1.0) for _ in DRIVES)
+
+    def moves(self, drive: int) -> bool:
+        return True
+
+    def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
+        return effect in ON_DRIVES
+
+    def term(self, effect: type[DriveEffect], drive: int, shape: Mapping[str, float]) -> Term:
+        return Term(effect, drive, {}, self.columns[effect.name, drive])
+
+    def trial_terms(self, effect: type[DriveEffect], drive: int,
+                    shapes: Sequence[Mapping[str, float]]) -> list[Term]:
+        return [self.term(effect, drive, {})]
+
+
+@pytest.fixture(autouse=True)
+def catalogue_of_random_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    every = {effect.name: effect for effect in EVERY}
+    monkeypatch.setattr(candidates_module, 'catalogue', lambda: every)
+    monkeypatch.setattr(library_module, 'searched_in_drives', lambda design: list(ON_DRIVES))
+    # Nothing of it knows loads or turns over.
+    monkeypatch.setattr(library_module, 'open_rows', lambda *_: np.zeros((0, SAMPLES)))
+
+
+def random_design(truth: Mapping[tuple[str, int | None], float], seed: int) -> RandomDesign:
+    """Return a design with noise that has a slow part, and some effects of given sizes [noise]."""
+    rng = np.random.default_rng(seed)
+    slow = np.cumsum(rng.normal(size=(SAMPLES, len(DRIVES))), axis=0) * 0.05
+    error = rng.normal(size=(SAMPLES, len(DRIVES))) + slow - slow.mean(axis=0)
+    # Smooth curves: neighbours of one another, and like slow noise.
+    smooth = np.exp(-0.5 * (np.arange(-60, 61) / 15) ** 2)
+
+    def curve(count: int) -> Array:
+        rows = np.array([np.convolve(rng.normal(size=SAMPLES + 120), smooth, 'valid')
+                         for _ in range(count)])
+        return rows / rows.std(axis=1, keepdims=True)
+    columns: dict[tuple[str, int | None], dict[int, Array]] = {}
+    for effect in IN_STRUCTURE:
+        columns[effect.name, None] = {d: curve(1) for d in range(len(DRIVES))}
+    # One that is nearly the sum of two others: what a greedy search takes first.
+    first, second, both = (columns[f'structure_{k}', None] for k in range(3))
+    for d in both:
+        both[d] = (first[d] + second[d] + 0.7 * both[d]) / 1.6
+    for effect in ON_DRIVES:
+        for d in range(len(DRIVES)):
+            columns[effect.name, d] = {d: curve(1)}
+    for key, size in truth.items():
+        for d, rows in columns[key].items():
+            error[:, d] += size * rows[0]
+    residuals = Residuals(DRIVES, PERIOD * np.arange(SAMPLES), np.zeros(SAMPLES, dtype=int),
+                          error, np.zeros_like(error), {}, {}, PERIOD)
+    base = (BaseColumn({d: curve(1)[0] for d in range(len(DRIVES))}, 1.0),)
+    structure = tuple(Term(effect, None, {}, columns[effect.name, None])
+                      for effect in IN_STRUCTURE)
+    return RandomDesign(MODEL, MODEL, residuals, (), base, structure, (), (), (), error,
+                        columns=columns)
+
+
+def everything(search: Search) -> list[EffectCandidate]:
+    """Return every effect on every choice of drives."""
+    library = search.library
+    found = [library.candidate(effect, [library.placed(effect, None, {}, ('size',))])
+             for effect in IN_STRUCTURE]
+    for effect in ON_DRIVES:
+        for count in (1, 2, 3):
+            found += [library.candidate(effect, [library.placed(effect, d, {}, ('size',))
+                                                 for d in chosen])
+                      for chosen in combinations(range(len(DRIVES)), count)]
+    return found
+
+
+def sets_of(found: CandidateSet) -> set[tuple[str, tuple[int, ...] | None]]:
+    return {(one.name, one.drives) for one in found.effects}
+
+
+SPACES = [
+    {}, {('structure_4', None): 1.5}, {('structure_0', None): 1.0, ('structure_1', None): 1.0},
+    {('drive_1', 0): 1.2, ('drive_1', 2): 0.8},
+    {('structure_2', None): 1.2, ('drive_0', 1): 1.5},
+    {('structure_3', None): 1.0, ('structure_4', None): -0.8, ('drive_1', 0): 1.2},
+]
+
+
+@pytest.mark.parametrize(('number', 'truth'), list(enumerate(SPACES)))
+def test_the_search_ends_at_the_best_of_all_sets(
+        number: int, truth: dict[tuple[str, int | None], float]) -> None:
+    design = random_design(truth, number)
+    search = Search(design, DECISIONS, with_unknown=False)
+    found = search.run()
+    exhaustive = Search(design, DECISIONS, with_unknown=False)
+    every = everything(exhaustive)
+    best = exhaustive.evaluate(())
+    for size in range(1, max(len(truth), 2) + 1):
+        for chosen in combinations(every, size):
+            if len({one.name for one in chosen}) == size:
+                best = min(best, exhaustive.evaluate(chosen), key=lambda one: one.cost)
+    assert found.cost <= best.cost + 1e-6
+    assert sets_of(found) == sets_of(best)
+    assert {name for name, _ in sets_of(found)} == {name for name, _ in truth}
+    assert found.cost == pytest.approx(exhaustive.evaluate(found.candidates).cost, abs=1e-6)
+
+
+def test_costs_do_not_depend_on_what_was_fitted_before() -> None:
+    design = random_design(SPACES[-1], 11)
+    search = Search(design, DECISIONS, with_unknown=False)
+    search.run()
+    visited = list(search.sets)
+    assert len(visited) > 15
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        other = Search(design, DECISIONS, with_unknown=False)
+        for k in rng.permutation(len(visited)):
+            one = visited[k]
+            again = other.evaluate(other.library.rebuilt(tuple(rng.permutation(
+                np.array(one.candidates, dtype=object)))))
+            assert again.cost == pytest.approx(one.cost, abs=1e-9, rel=1e-12)
