@@ -4,7 +4,8 @@
 """The search on spaces of random columns whose truth is known, against an exhaustive one.
 
 No recording, no robot: seven effects, some in the structure and some on three drives, each a
-random curve. What is found must be the best of all sets; costs must not depend on what was fitted before.
+random curve. What is found must be the best of all sets; costs must not depend on what was fitted
+before.
 """
 
 from __future__ import annotations

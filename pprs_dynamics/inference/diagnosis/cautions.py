@@ -10,25 +10,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.search import Search
 
 if TYPE_CHECKING:
     from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 
-SHORT = 8.0  # [s]
-FEW_SAMPLES = 60.0  # independent ones, per drive
-UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least
-ONE_WAY = 0.95  # of the moving time in one direction
-FILTERED = 0.05  # high frequencies of the effort over those of white noise
-
 
 def find_cautions(
     search: Search, best: CandidateSet, effects: Sequence[FoundEffect],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
-    return (*_length(search, best), *_motion(search.design), *_filtered(search.design),
+    return (*_length(search, best), *_motion(search), *_filtered(search),
             *_unexcited(search, best), *_bounds(effects))
 
 
@@ -36,12 +29,12 @@ def _length(search: Search, best: CandidateSet) -> list[str]:
     design, regression = search.design, search.regression
     residuals = design.residuals
     duration = len(residuals) * residuals.period
-    if duration < SHORT:
+    if duration < search.decisions.short:
         return [f'the recordings last {duration:.3g} s together: too short to tell effects from '
                 'slow noise; record at least 20 s']
     worth = {d: noise.effective_samples(int(regression.series[d].known.sum()))
              for d, noise in regression.noise(best.fit).items()}
-    poor = [design.drives[d] for d, count in worth.items() if count < FEW_SAMPLES]
+    poor = [design.drives[d] for d, count in worth.items() if count < search.decisions.few_samples]
     if poor:
         least = min(worth.values())
         return [f'noise on {", ".join(poor)} is so slow that the recording is worth only '
@@ -50,7 +43,8 @@ def _length(search: Search, best: CandidateSet) -> list[str]:
     return []
 
 
-def _motion(design: Design) -> list[str]:
+def _motion(search: Search) -> list[str]:
+    design = search.design
     velocity = design.residuals.variables['velocity']
     still, one_way = [], []
     for d, name in enumerate(design.drives):
@@ -58,7 +52,7 @@ def _motion(design: Design) -> list[str]:
         moving = design.moving(d)
         if not design.moves(d):
             still.append(name)
-        elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > ONE_WAY:
+        elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > search.decisions.one_way:
             one_way.append(name)
     found = []
     if still:
@@ -70,8 +64,9 @@ def _motion(design: Design) -> list[str]:
     return found
 
 
-def _filtered(design: Design) -> list[str]:
+def _filtered(search: Search) -> list[str]:
     """Look for efforts that hold no fast noise at all, at full rate."""
+    design = search.design
     found = []
     for d, name in enumerate(design.drives):
         error = [one.effort_measured[part, d] - one.effort[part, d]
@@ -82,7 +77,7 @@ def _filtered(design: Design) -> list[str]:
             continue
         first, third = np.diff(longest), np.diff(longest, 3)
         # Third differences of white noise have ten times the variance of first ones.
-        if np.mean(third ** 2) < FILTERED * np.mean(first ** 2):
+        if np.mean(third ** 2) < search.decisions.filtered * np.mean(first ** 2):
             found.append(name)
     if not found:
         return []
@@ -104,7 +99,7 @@ def _unexcited(search: Search, best: CandidateSet) -> list[str]:
         sizes = np.diag(own) * scales ** 2
         present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)
                    if c.name not in search.design.absent(term.effect)}
-        names = [name for name, size in present.items() if size < UNEXCITED]
+        names = [name for name, size in present.items() if size < search.decisions.unexcited]
         if names:
             weak.append(term.effect.name if len(names) == len(present)
                         else f'{term.effect.name} ({", ".join(names)})')

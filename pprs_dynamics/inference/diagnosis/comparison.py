@@ -15,13 +15,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent
 from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 
-# What is left beyond noise is nothing to speak of below this share of the noise itself: the
-# noise is known to about a tenth, and sqrt(1.1^2 - 1) = 0.46.
-NOISE_SHARE = 0.46
-LEAST_SHARE = 0.01  # of a drive's squared error, that a statement must explain to be made
-GOOD, POOR = 0.05, 0.2  # relative unexplained error below which a model is good, above poor
 # Of the effort's size, below which a changing effort is rounding.
 CONSTANT = 1e-9
 
@@ -207,18 +203,19 @@ def _compare_drive(
         float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
         unexplained, parts, grade, unit, f'{name}: ' + _verdict(
             rms, swing, relative, floor, unexplained, parts, grade, unit,
-            most >= LEAST_SHARE * rms ** 2))
+            most >= DECISIONS.statement_share * rms ** 2))
 
 
 def _grade(
     unexplained: float, floor: float, swing: float, constant: bool, parts: Mapping[str, float],
 ) -> str:
-    if unexplained <= NOISE_SHARE * floor:
+    # The noise is known to a share: what is left beyond it is nothing below this.
+    if unexplained <= np.sqrt((1 + DECISIONS.noise_accuracy) ** 2 - 1) * floor:
         return 'noise'
     smallest = min((size for size in parts.values() if size > 0), default=np.inf)
-    if not constant and unexplained <= GOOD * swing and unexplained <= smallest:
+    if not constant and unexplained <= DECISIONS.good * swing and unexplained <= smallest:
         return 'good'
-    if constant or unexplained > POOR * swing:
+    if constant or unexplained > DECISIONS.poor * swing:
         return 'poor'
     return 'fair'
 
@@ -250,7 +247,7 @@ def _verdict(
 
 def _told(drives: Mapping[str, DriveComparison], where: Localisation) -> tuple[Statement, ...]:
     told = [one for one in where.statements if one.drive in drives
-            and one.mean_square >= LEAST_SHARE * drives[one.drive].rms ** 2]
+            and one.mean_square >= DECISIONS.statement_share * drives[one.drive].rms ** 2]
     return tuple(sorted(told, key=lambda one: -one.mean_square))
 
 

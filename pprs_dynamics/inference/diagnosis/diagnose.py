@@ -42,7 +42,6 @@ from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_SETS = 8  # that are told with their costs
-SURE = 2.0  # standard deviations by which a number must have moved to be told
 
 
 @dataclass(frozen=True)
@@ -183,7 +182,7 @@ class _Answer:
         verdict = ('unknown' if depends else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(search, self.kept, widths)
-                 if abs(one.after - one.before) > SURE * one.std]
+                 if abs(one.after - one.before) > self.decisions.sure * one.std]
         return Diagnosis(
             verdict, tuple(effects), sets, self._candidates(), self._suspects(), depends,
             tuple(map(self._within_model_error, self.ranking.remainders)), self._sets(),
@@ -247,7 +246,7 @@ class _Answer:
     def _suspects(self) -> tuple[RankedEffect, ...]:
         """Return effects that nearly pay beside those adopted: slow noise would do as well."""
         return tuple(self._ranked(self.search, one, candidate, self.best.cost - one.cost)
-                     for candidate, one in self.ranking.suspects(self.decisions.rival_margin / 2))
+                     for candidate, one in self.ranking.suspects(self.decisions.suspect_margin))
 
     def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:

@@ -18,7 +18,7 @@ from scipy.special import ndtri
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -30,12 +30,10 @@ from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.system.parallel import each
 
 MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
-LEAST_SAMPLES = 100
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
 PROPOSALS = 4  # fitted in full, of each scan
-REVERSAL_SHARE = 0.12  # of the samples, the slowest, that friction may leave out at reversals
-LEAST_SCATTER = 1.5  # ratio of variances worth a statement
+PROPOSED = -30.0  # lowest score of a pattern that is fitted in full
 
 
 @dataclass(frozen=True)
@@ -165,7 +163,7 @@ def _best(library: PatternLibrary, fit: JointFit, blocks: list[Block], stated: s
     for near in (fit, with_fast_noise(regression, fit)):
         for candidate, score in library.proposals(near, PROPOSALS, always=True):
             variable = candidate.family.variable
-            if (variable in stated and candidate.pattern.kind != 'line') or score < -30:
+            if (variable in stated and candidate.pattern.kind != 'line') or score < PROPOSED:
                 continue
             chosen.setdefault(candidate.key, (candidate, near))
     scored = []
@@ -194,7 +192,8 @@ def _is_friction(winner: UnknownCandidate, library: PatternLibrary) -> bool:
     speed = np.abs(library.values('velocity'))
     assert winner.pattern.limits is not None
     low, high = winner.pattern.limits
-    return high >= speed.max() and bool(np.mean(speed < low) <= REVERSAL_SHARE)
+    return high >= speed.max() and bool(
+        np.mean(speed < low) <= library.prices.decisions.reversal_share)
 
 
 def _carried(library: PatternLibrary, winner: UnknownCandidate) -> list[Block]:
@@ -242,7 +241,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
             held = column[known] > 0.5
             ratio = (np.mean(white[known][held] ** 2)
                      / max(float(np.mean(white[known][~held] ** 2)), 1e-300))
-            if ratio >= LEAST_SCATTER:
+            if ratio >= library.prices.decisions.scatter_ratio:
                 best = (gain, family.variable, Pattern('scatter', pattern.limits, float(ratio)),
                         column)
     if best is None:

@@ -33,7 +33,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-UNEXCITED = 4.0  # gain that an effect of a size that matters would have, at least
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 Part = tuple[FittedTerm, Array]
 """A term, and the coefficients that it has in one explanation."""
@@ -166,7 +165,7 @@ def _excitation(search: Search, nothing: CandidateSet) -> Question:
         gain = np.diag(regression.own_information(nothing.fit, block))
         found = FittedTerm.at_scale(term.effect, None, {}, search.design.absent(term.effect))
         here = [term.names.index(name) for name in found.names]
-        if np.any(gain[here] * found.scales ** 2 < UNEXCITED):
+        if np.any(gain[here] * found.scales ** 2 < DECISIONS.unexcited):
             weak.append(found)
     plan = ColumnPlan.of_design(search.design, weak)
     subjects = subjects_of(plan, search.library.prices)

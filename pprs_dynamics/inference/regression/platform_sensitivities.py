@@ -41,7 +41,7 @@ from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solv
 from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
-HOMING_STEP = 1e-5  # [m]
+HOMING_STEP = 3e-5  # of a rod's length
 HOMING_STRIDE = 5  # samples; these columns change slowly
 PASSIVE_WIDTHS = (0.25, 4.0)
 # Numbers that act on the drives of one chain, or on one drive, only: all at once, then split.
@@ -250,12 +250,12 @@ class ChunkSensitivities:
             rates = rates if time is None else rates.with_time(time)
             return bare.forces_at(bare.mechanism(rates)).total
 
-        before = forces(motion)
+        before, step = forces(motion), HOMING_STEP * robot.geometry.rod_length
         columns = np.empty((len(DRIVES), len(samples), len(DRIVES)))
         for drive in range(len(DRIVES)):
-            move = -HOMING_STEP * s.jacobians.J[samples][:, :, drive]
+            move = -step * s.jacobians.J[samples][:, :, drive]
             pose = PlatformMotion.at_rest(
                 motion.position + move[:, :3],
                 (Rotation.from_rotvec(move[:, 3:]) * turned).as_quat())
-            columns[drive] = (forces(pose) - before) / HOMING_STEP
+            columns[drive] = (forces(pose) - before) / step
         return columns

@@ -295,6 +295,11 @@ class Prices:
             price += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
         return price
 
+    def of_width(self, tried: int) -> float:
+        """Return the price of a width of reversal that is another than the model's, on a drive."""
+        return (2 * log(self.drives) - 2 * log(self.decisions.effect_odds)
+                + max(log(self.samples), 2 * log(tried)))
+
     def of_pattern(self, families: int, patterns: int, drives: int) -> float:
         """Return the price of an unknown pattern among those tried on each drive."""
         return (self.of_name() + self.of_drives(drives) + 2 * log(families) + 2 * log(patterns)

@@ -7,6 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
+from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
+from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES
+from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
+from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
+from pprs_dynamics.measurement.residuals.noise import CONTINUED_OCTAVES, SLOPE_OCTAVES
+
 
 def _number(value: float, unit: str, decides: str, reason: str) -> float:
     found: float = field(default=value, metadata={
@@ -19,7 +25,7 @@ class Decisions:
     """What is chosen rather than computed; `docs/diagnosis.md` prints this table."""
 
     effect_odds: float = _number(
-        0.1, '1', 'prior odds that one more effect is missing',
+        0.1, '1', 'prior odds that one more effect is missing, or a width of reversal another',
         'models are seldom wrong in many ways at once; the smaller, the fewer false claims')
     wrong_sign_odds: float = _number(
         0.01, '1', 'prior odds of friction, mass or stiffness with the wrong sign',
@@ -42,14 +48,77 @@ class Decisions:
     rival_margin: float = _number(
         10.0, 'deviance', 'how near a set must come to the best to be told as its rival',
         'odds of 150 to 1')
+    suspect_margin: float = _number(
+        5.0, 'deviance', 'how nearly an effect must pay to be told as a suspect',
+        'odds of 12 to 1 against it: more noise of the same sort would turn them')
     level_ratio: float = _number(
         3.0, '1', "a drive's slow noise over its fast noise, against its peers', told as unknown",
         'robots have like drives; a factor of 3 in rms is an order of magnitude in power')
+    line_periods: float = _number(
+        3.0, '1', 'periods of a line within the longest stretch, below which it is a drift',
+        'slow noise has bumps of one or two periods')
+    scatter_ratio: float = _number(
+        1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
+        'less does not show in a plot')
+    reversal_share: float = _number(
+        0.12, '1', 'share of the samples, the slowest, that a pattern of friction may leave out',
+        'friction turns over there, in a width that nobody knows')
+    statement_share: float = _number(
+        0.01, '1', "share of a drive's squared error that a statement of compare must explain",
+        'a tenth of the rms; less is no news')
+    noise_accuracy: float = _number(
+        0.1, '1', 'relative error of the noise, within which compare calls all of an error noise',
+        'a spectrum of a dozen coefficients per octave is known to about that')
+    good: float = _number(
+        0.05, '1', 'unexplained error over the effort, up to which a model is good',
+        'feedforward then leaves a twentieth to the controller')
+    poor: float = _number(
+        0.2, '1', 'unexplained error over the effort, above which a model is poor',
+        'a fifth is more than friction in most robots')
+    sure: float = _number(
+        2.0, 'deviations', 'by how much a number must have moved to be told as calibrated',
+        '95 %')
+    edge_share: float = _number(
+        0.02, '1', 'how near the edge of what was tried a shape is not to be trusted',
+        'half a step of the finest grids')
+    short: float = _number(
+        8.0, 's', 'length of all recordings, below which a warning is given',
+        'friction, springs and slow noise look alike within one or two strokes')
+    few_samples: float = _number(
+        60.0, '1', 'independent samples of a drive, below which a warning is given',
+        'a mean is then known to an eighth of the noise')
+    unexcited: float = _number(
+        4.0, 'deviance', 'gain of an effect of a size that matters, below which it is unseen',
+        'two standard deviations')
+    one_way: float = _number(
+        0.95, '1', 'share of the motion in one direction, above which a warning is given',
+        'friction is then a constant but for a twentieth')
+    filtered: float = _number(
+        0.05, '1', 'fast part of an effort over that of white noise, below which it looks filtered',
+        'any amplifier and converter leaves more')
 
     def table(self) -> list[tuple[str, float, str, str, str]]:
         """Return name, value, unit, what it decides and why, for the documentation."""
-        return [(one.name, getattr(self, one.name), one.metadata['unit'],
-                 one.metadata['decides'], one.metadata['reason']) for one in fields(self)]
+        return [*((one.name, getattr(self, one.name), one.metadata['unit'],
+                   one.metadata['decides'], one.metadata['reason']) for one in fields(self)),
+                *FIXED]
 
 
+# What decides as well, but belongs to the criterion itself: fits of all kinds share it.
+FIXED = (
+    ('DEVIATIONS', DEVIATIONS, 'deviations', 'standard deviations within a tolerance',
+     'a tolerance is a limit: one number in a hundred lies beyond'),
+    ('BEYOND_TOLERANCE', BEYOND_TOLERANCE, '1', "steepness of a number's prior beyond tolerance",
+     'it may be passed by a fifth where much speaks for it, and not more'),
+    ('TURNED', TURNED, '1', "speed over the model's width of reversal, at which a drive moves",
+     'friction has turned over to 96 %'),
+    ('LEAST_MOVING', LEAST_MOVING, '1', 'share of the time in motion that friction needs',
+     'where a drive stands any constant force looks like friction'),
+    ('LEAST_SAMPLES', float(LEAST_SAMPLES), '1', 'samples of a drive that takes part',
+     'a spectrum has a dozen shapes'),
+    ('SLOPE_OCTAVES', float(SLOPE_OCTAVES), 'octaves', 'that tell the noise of a constant',
+     'of 360 drives of pure 1/f noise 4 % had a constant beyond three deviations'),
+    ('CONTINUED_OCTAVES', float(CONTINUED_OCTAVES), 'octaves', 'by which they are continued',
+     'the same'),
+)
 DECISIONS = Decisions()

@@ -21,7 +21,6 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_AVERAGED = 4  # further sets that estimates are averaged over
-AT_EDGE = 0.02  # of a value: how near the smallest or largest shape tried it is not to be trusted
 
 
 @dataclass(frozen=True)
@@ -161,8 +160,9 @@ def _of_placement(search: Search, placement: Placement, c: Array, covariance: Ar
             within(parameter, value), parameter.spread(amount, value),
             unit_of(parameter.unit))
         trials = sorted({trial[parameter.name] for trial in _trials(search, placement)})
-        if len(trials) > 2 and not (trials[0] + AT_EDGE * abs(trials[0]) < value
-                                    < trials[-1] - AT_EDGE * abs(trials[-1])):
+        edge = search.decisions.edge_share
+        if len(trials) > 2 and not (trials[0] + edge * abs(trials[0]) < value
+                                    < trials[-1] - edge * abs(trials[-1])):
             bound.append(prefix + parameter.name)
     return found, bound
 

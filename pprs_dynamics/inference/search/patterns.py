@@ -24,8 +24,8 @@ from pprs_dynamics.measurement.residuals.residuals import Residuals
 TIME_BINS = 16
 # Shares of the samples that lie below the speeds where bins of the velocity end.
 SLOW_SHARES = (0.03, 0.06, 0.12, 0.2, 0.35, 0.55, 0.8)
-# Friction turns over at a reversal within a speed that is seldom known [m/s].
-REVERSAL_WIDTHS = (0.0003, 0.001, 0.003)
+# Friction turns over at a reversal within a speed that is seldom known: shares of the highest.
+REVERSAL_WIDTHS = (0.0015, 0.005, 0.015)
 RIPPLE_PERIODS = (2, 32)  # periods of a force ripple within the drive's travel
 # Widths of smooth bumps, as parts of the stroke, and their standard deviation in widths.
 BUMP_PARTS = (4, 8, 16, 32)
@@ -144,13 +144,18 @@ def _offset(samples: int) -> Family:
 def _direction(sign: Array, velocity: Array | None) -> Family:
     signs = [sign]
     if velocity is not None:
-        signs += [np.tanh(velocity / width) for width in REVERSAL_WIDTHS]
+        signs += [_turned(velocity, width) for width in REVERSAL_WIDTHS]
     columns, patterns = [], []
     for turned in signs:
         columns += [(turned + 1) / 2, (1 - turned) / 2, turned]
         patterns += [Pattern('one_way', (0.0, 1.0)), Pattern('one_way', (-1.0, 0.0)),
                      Pattern('friction')]
     return Family('direction', np.stack(columns), np.eye(len(columns)), tuple(patterns))
+
+
+def _turned(velocity: Array, width: float) -> Array:
+    turned: Array = np.tanh(velocity / (width * max(float(np.abs(velocity).max()), 1e-300)))
+    return turned
 
 
 def _scalar(name: str, values: Array, sign: Array | None, rivals: int) -> Family:
@@ -225,7 +230,7 @@ def _velocity(name: str, values: Array, sign: Array | None, rivals: int) -> Fami
             weights.append(_runs(len(even)))
             patterns += _run_patterns('directed_range', speeds)
             # Friction that falls off with speed has no edge.
-            turned = (sign, np.tanh(values / REVERSAL_WIDTHS[1]))
+            turned = (sign, _turned(values, REVERSAL_WIDTHS[1]))
             for edge in speeds[1:-1]:
                 columns.append(np.stack([one * np.exp(-(values / edge) ** 2) for one in turned]))
                 weights.append(np.eye(len(turned)))

@@ -29,7 +29,6 @@ from pprs_dynamics.physics.model.model_file import build_model
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
 TRIALS = 13
-LEAST_GAIN = 15.0  # in deviance, for which a width is told: the price of an unlikely effect
 KEY, COMMON_KEY = 'friction.reversal_velocities', 'friction.reversal_velocity'
 # An effect on a drive, its shape and its coefficients.
 Turning = tuple[type[DriveEffect], Mapping[str, float], Array]
@@ -94,7 +93,7 @@ def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
         low, high = grid[max(best - 1, 0)], grid[min(best + 1, TRIALS - 1)]
         refined = minimize_scalar(loss, bounds=(low, high), method='bounded',
                                   options={'maxiter': 15})
-        if -float(refined.fun) > LEAST_GAIN:
+        if -float(refined.fun) > search.prices.of_width(TRIALS):
             widths[d] = rounded(width * float(np.exp(refined.x)))
     return widths
 

@@ -29,7 +29,6 @@ from pprs_dynamics.measurement.residuals.bins import LEAST_SHARE
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.system.parallel import each
 
-LOWEST_LINE = 3.0  # periods within the longest stretch, below which a line is a drift
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for
 FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
 # Limits of a range are moved by up to a bin, then by shares of it: a step in time is to be met to
@@ -196,10 +195,11 @@ class PatternLibrary:
         longest = max(self.series.stretches, key=lambda part: part.stop - part.start)
         white = self.regression.whitened(fit, self.d, self._remaining(fit))[longest]
         n, period = len(white), self.residuals.period
-        if n < 16 * LOWEST_LINE:
+        lowest = self.prices.decisions.line_periods
+        if n < 16 * lowest:
             return None
         power = np.abs(np.asarray(fft.rfft(white, OVERSAMPLING * n))) ** 2
-        first = int(np.ceil(LOWEST_LINE * OVERSAMPLING))
+        first = int(np.ceil(lowest * OVERSAMPLING))
         frequency = (first + int(np.argmax(power[first:-1]))) / (OVERSAMPLING * n * period)
         time = self.residuals.time[longest]
         step = 1 / (OVERSAMPLING * n * period)
