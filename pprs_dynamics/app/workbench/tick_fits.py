@@ -175,7 +175,7 @@ class TickFits:
         if d in library.local:
             scanned = library.local[d].offers(found.fit).get(effect.name)
             if scanned is not None:
-                return library.full(scanned)
+                return library.full(scanned, d)
         there = [one for one in library.spanning if one.term.effect is effect and one.drive == d]
         return max(there, key=lambda one: self.search.regression.gain(found.fit, one.block)
                    - one.price, default=None)

@@ -74,6 +74,7 @@ def _around_fitted(
                               and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
         starts = [kept] if kept is best else [kept, best]
+        search.release()
         search = Search(last.design, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
         best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,25 +23,31 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementE
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 
+class Trial(NamedTuple):
+    """An effect on a drive in one of the shapes tried, with some of its coefficients."""
+
+    effect: type[DriveEffect]
+    shape: Mapping[str, float]
+    names: tuple[str, ...]
+
+
 @dataclass(frozen=True)
-class ScannedTerm:
-    """A term and variant that a scan proposes.
+class ScannedTrial:
+    """A trial that a scan proposes.
 
     Parameters
     ----------
-    term : Term
-    names : tuple of str
+    trial : Trial
     gain : float
         By which the deviance falls at the noise of the fit.
     """
 
-    term: Term
-    names: tuple[str, ...]
+    trial: Trial
     gain: float
 
 
 class DriveLibrary:
-    """Terms on one drive alone, in every shape tried.
+    """Effects on one drive alone, in every shape tried.
 
     Parameters
     ----------
@@ -59,39 +66,37 @@ class DriveLibrary:
                        for effect in self.effects}
 
     @cached_property
-    def terms(self) -> list[Term]:
-        """Every effect in every shape tried; computed when a scan asks for them."""
-        covered = self.design.covered[self.d]
-        return [term for effect in self.effects for term in self.design.trial_terms(
-            effect, self.d, effect.trials(covered))]
-
-    @cached_property
-    def _scan(self) -> Scan[tuple[Term, tuple[str, ...]]]:
-        """Terms in all variants that the rows of a scan suffice for."""
-        stacked = np.concatenate([term.rows[self.d][:, self.series.index] for term in self.terms])
-        entries: list[Entry[tuple[Term, tuple[str, ...]]]] = []
+    def scan(self) -> Scan[Trial]:
+        """All shapes in all variants that the rows of a scan suffice for; computed when asked for.
+        """
+        entries: list[Entry[Trial]] = []
+        parts: list[Array] = [np.zeros((0, len(self.series)), dtype=np.float32)]
         first = 0
-        for term in self.terms:
-            if not term.names:
-                entries.append(Entry((term, ()), (first,), CERTAIN * np.eye(1), np.ones(1)))
-            else:
-                entries += [Entry((term, names),
+        for effect in self.effects:
+            terms = self.design.trial_terms(effect, self.d,
+                                            effect.trials(self.design.covered[self.d]))
+            for term in terms:
+                if not term.names:
+                    entries.append(Entry(Trial(effect, term.shape, ()), (first,),
+                                         CERTAIN * np.eye(1), np.ones(1)))
+                entries += [Entry(Trial(effect, term.shape, names),
                                   tuple(first + term.names.index(name) for name in names))
-                            for names in term.effect.variants
-                            if set(names) <= set(term.effect.scanned)]
-            first += len(term.rows[self.d])
-        return Scan(self.regression, {self.d: self.series.transform(stacked.astype(np.float32))},
-                    entries)
+                            for names in effect.variants
+                            if names and set(names) <= set(effect.scanned)]
+                first += len(term.rows[self.d])
+            # In single precision and in frequency alone: there are hundreds of them.
+            rows = np.concatenate([term.rows[self.d][:, self.series.index] for term in terms])
+            parts.append(self.series.transform(rows.astype(np.float32)))
+        return Scan(self.regression, {self.d: np.concatenate(parts)}, entries)
 
-    def offers(self, fit: JointFit) -> dict[str, ScannedTerm]:
+    def offers(self, fit: JointFit) -> dict[str, ScannedTrial]:
         """Return the best shape and variant of every effect, by name, at the noise of a fit."""
-        best: dict[str, ScannedTerm] = {}
-        for labels, gains in self._scan.gains(fit) if self.terms else ():
+        best: dict[str, ScannedTrial] = {}
+        for labels, gains in self.scan.gains(fit):
             for at in np.argsort(-gains):
-                term, names = labels[at]
-                name = term.effect.name
+                name = labels[at].effect.name
                 if name not in best or best[name].gain < gains[at]:
-                    best[name] = ScannedTerm(term, names, float(gains[at]))
+                    best[name] = ScannedTrial(labels[at], float(gains[at]))
         return best
 
 
@@ -189,10 +194,15 @@ class Library:
         return Placement(term, names if term.names else (), regression.term_block(term, names),
                          self.prices.of_placement(term.effect, tried), bare)
 
-    def full(self, offer: ScannedTerm) -> Placement:
-        """Return the placement of an offer, with the rows of the exact term."""
-        term = offer.term
-        return self.placed(term.effect, term.drive, term.shape, offer.names)
+    def full(self, offer: ScannedTrial, d: int) -> Placement:
+        """Return the placement of an offer on a drive, with the rows of the exact term."""
+        return self.placed(offer.trial.effect, d, offer.trial.shape, offer.trial.names)
+
+    def release(self) -> None:
+        """Let go of what scans need; it is computed again if it is asked for."""
+        vars(self).pop('_scan', None)
+        for local in self.local.values():
+            vars(local).pop('scan', None)
 
     def candidate(self, effect: type[CatalogueEffect],
                   placements: Sequence[Placement]) -> EffectCandidate:

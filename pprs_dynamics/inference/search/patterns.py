@@ -65,6 +65,7 @@ class Family:
     variable : str
         Name in the interface.
     columns : (C, N) array
+        In single precision: there are hundreds of them.
     weights : (P, C) array
         Each pattern's combination of the columns; for pairs (`paired`) unused.
     patterns : tuple of Pattern
@@ -90,7 +91,7 @@ class Family:
     def pattern_columns(self, index: int) -> Array:
         """Return the (1 or 2, N) columns of one pattern."""
         if self.paired:
-            return self.columns[2 * index:2 * index + 2]
+            return self.columns[2 * index:2 * index + 2].astype(float)
         return self.weights[index:index + 1] @ self.columns
 
 
@@ -181,8 +182,8 @@ def _scalar(name: str, values: Array, sign: Array | None, rivals: int) -> Family
         columns.append(bumps)
         weights.append(np.eye(len(bumps)))
         patterns += where
-    return Family(name, np.concatenate(columns), _diagonal(weights), tuple(patterns), rivals,
-                  edges=edges)
+    return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),
+                  tuple(patterns), rivals, edges=edges)
 
 
 def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
@@ -235,8 +236,8 @@ def _velocity(name: str, values: Array, sign: Array | None, rivals: int) -> Fami
                 columns.append(np.stack([one * np.exp(-(values / edge) ** 2) for one in turned]))
                 weights.append(np.eye(len(turned)))
                 patterns += [Pattern('fading', (0.0, float(edge)))] * len(turned)
-    return Family(name, np.concatenate(columns), _diagonal(weights), tuple(patterns), rivals,
-                  edges=edges)
+    return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),
+                  tuple(patterns), rivals, edges=edges)
 
 
 def _ripple(position: Array) -> Family:

@@ -66,12 +66,12 @@ class ScannedSets(FittedSets):
         offered = each(lambda d: library.local[d].offers(fit), drives)
         for d, offers in zip(drives, offered, strict=True):
             for offer in offers.values():
-                effect = offer.term.effect
+                effect: type[CatalogueEffect] = offer.trial.effect
                 if (effect, d) not in taken:
                     price = library.prices.of_placement(
                         effect, library.local[d].trials[effect.name])
                     found.setdefault(effect, []).append(
-                        (offer.gain - price, partial(library.full, offer)))
+                        (offer.gain - price, partial(library.full, offer, d)))
         best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
         for placement, gain in library.shared_offers(fit) if drive is None else ():
             key = (placement.term.effect, placement.drive)

@@ -81,6 +81,12 @@ class Search(ScannedSets):
         self._report(1.0)
         return self.best
 
+    def release(self) -> None:
+        """Let go of what only further scans would need."""
+        self.library.release()
+        for patterns in self.patterns:
+            patterns.release()
+
     @property
     def is_beyond_point(self) -> bool:
         """Whether the best set has an effect that bends columns, and these are not bent by it."""
@@ -206,7 +212,7 @@ class Search(ScannedSets):
             less = (*rest, self.library.candidate(effect, others)) if others else rest
             offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
             if effect.name in offers:
-                placements = [*others, self.library.full(offers[effect.name])]
+                placements = [*others, self.library.full(offers[effect.name], d)]
                 found = min(found, self.evaluate(
                     (*rest, self.library.candidate(effect, placements))),
                     key=lambda one: one.cost)

@@ -114,6 +114,10 @@ class PatternLibrary:
                 _Scanned.of_patterns(family, gram.sum(axis=0)) / scale))
         return found
 
+    def release(self) -> None:
+        """Let go of all columns; they are computed again if they are asked for."""
+        vars(self).pop('_scanned', None)
+
     @property
     def families(self) -> list[Family]:
         """All families that are searched."""
