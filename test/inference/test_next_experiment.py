@@ -40,7 +40,11 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
-from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.candidates import (
+    CandidateSet,
+    Component,
+    EffectCandidate,
+)
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.ranking import Ranking, Rival
 from pprs_dynamics.inference.search.search import Search
@@ -351,8 +355,8 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     search.evaluate(())
 
     def fitted(name: str, *coefficients: str) -> CandidateSet:
-        placement = search.library.placed(CATALOGUE[name], 3, {}, coefficients)
-        return search.evaluate((search.library.candidate(CATALOGUE[name], [placement]),))
+        component = Component(CATALOGUE[name], 3, coefficients)
+        return search.evaluate((EffectCandidate.of([component]),))
 
     adopted = fitted('coulomb_friction', 'force')
     ranking = Ranking.of(search, search, adopted)

@@ -16,7 +16,7 @@ from pprs_dynamics import AxisModel, DriveModel
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search import search as search_module
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.expansion import (
     exact_forces,
@@ -85,13 +85,12 @@ def test_the_search_ends_at_the_best_of_all_sets(
     found = search.run()
     exhaustive = Search(design, DECISIONS, with_unknown=False)
     best = exhaustive.evaluate(())
-    library = exhaustive.library
     every: list[EffectCandidate] = []
     for name in SMALL:
         effect = CATALOGUE[name]
         assert issubclass(effect, DriveEffect)
         if design.acts_on(effect, 0):
-            every += [library.candidate(effect, [library.placed(effect, 0, {}, names)])
+            every += [EffectCandidate.of([Component.of(effect, 0, {}, names)])
                       for names in effect.variants]
     for size in (1, 2, 3, 4):
         for chosen in combinations(every, size):
@@ -108,7 +107,7 @@ def test_what_does_not_pay_in_a_set_is_pruned() -> None:
     search = Search(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS,
                     with_unknown=False)
     search.evaluate(())
-    spring, drag, gain = (search.library.candidate(CATALOGUE[name], [search.library.placed(
+    spring, drag, gain = (EffectCandidate.of([Component.of(
         CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
         for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
     assert names(search.pruned(search.evaluate((spring, drag, gain)))) == ['drive_spring']

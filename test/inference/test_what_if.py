@@ -92,10 +92,14 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
     selection = diagnosis.selection
     assert selection is not None
     search = selection.last
-    blocks = [block for candidate, one in tried for placement in candidate.placements
-              for block in (placement.block, *one.doubtful.get(placement, ()))]
+    blocks = [block for candidate, one in tried for component in candidate.components
+              for block in (search.library.block(component), *one.doubtful.get(component, ()))]
     fit = search.regression.at(blocks, selection.best.fit.amplitudes)
-    return fit, fit.deviance + search.price(tuple(one for one, _ in tried), fit)
+    components = [component for one, _ in tried for component in one.components]
+    price = sum(search.library.price(one) for one, _ in tried) + sum(
+        search.prices.of_signs(one.effect, one.values(fit.of(search.library.block(one))))
+        for one in components)
+    return fit, fit.deviance + price
 
 
 def errors(diagnosis: Diagnosis, fit: JointFit) -> Array:

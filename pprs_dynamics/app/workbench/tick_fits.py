@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from threading import RLock
 
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adopt import original
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.expansion import (
@@ -167,18 +166,19 @@ class TickFits:
                           if (one := self._on_drive(effect, d, found)) is not None]
         if not placements or len(placements) < len(drives):
             return None
-        return self.search.library.candidate(effect, placements)
+        return EffectCandidate.of(placements)
 
     def _on_drive(self, effect: type[DriveEffect], d: int, found: CandidateSet,
-                  ) -> Placement | None:
+                  ) -> Component | None:
         library = self.search.library
         if d in library.local:
             scanned = library.local[d].offers(found.fit).get(effect.name)
             if scanned is not None:
-                return library.full(scanned, d)
-        there = [one for one in library.spanning if one.term.effect is effect and one.drive == d]
-        return max(there, key=lambda one: self.search.regression.gain(found.fit, one.block)
-                   - one.price, default=None)
+                return scanned[0]
+        there = [one for one in library.spanning if one.effect is effect and one.drive == d]
+        # All have the same price.
+        return max(there, key=lambda one: self.search.regression.gain(
+            found.fit, library.block(one)), default=None)
 
     def _proposals(self, found: CandidateSet) -> Iterable[tuple[object, ...]]:
         return self.search.proposals(found, least=-np.inf)
@@ -203,26 +203,18 @@ class TickFits:
 
     def with_chosen(self, tick: Tick) -> EffectCandidate:
         """Return a tick's candidate in the shapes that somebody chose."""
-        library = self.search.library
         placements = []
-        for one in tick.best.placements:
+        for one in tick.best.components:
             shape = {name: tick.chosen.get((one.drive, name), value)
-                     for name, value in one.term.shape.items()}
-            placements.append(one if shape == dict(one.term.shape) else library.placed(
-                tick.effect, one.drive, shape, one.names))
-        return library.candidate(tick.effect, placements)
+                     for name, value in one.shape}
+            placements.append(Component.of(tick.effect, one.drive, shape, one.names))
+        return EffectCandidate.of(placements)
 
     # Fits
 
     def at(self, candidates: Sequence[EffectCandidate], near: CandidateSet) -> CandidateSet:
         """Return a set under the noise of another: linear, in milliseconds."""
-        kept = {placement for candidate in candidates for placement in candidate.placements}
-        doubtful = {one: blocks for one, blocks in near.doubtful.items() if one in kept}
-        blocks = [block for candidate in candidates for block in candidate.blocks]
-        fit = self.search.regression.at([*blocks, *chain(*doubtful.values())],
-                                        near.fit.amplitudes)
-        listed = tuple(candidates)
-        return CandidateSet(listed, fit, fit.deviance + self.search.price(listed, fit), doubtful)
+        return self.search.at_noise_of(near, tuple(candidates))
 
     def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
         """Return a set with the noise fitted beside it."""
@@ -243,7 +235,7 @@ class TickFits:
         by_effect = {tick.effect: tick for tick in ticks}
         for candidate in found.effects:
             chosen = by_effect[candidate.effect].chosen
-            for placement in candidate.placements:
+            for placement in candidate.components:
                 linear = {parameter.name for parameter in candidate.effect.linear}
                 mine = {name: value for (d, name), value in chosen.items()
                         if d == placement.drive and name in linear}
@@ -251,7 +243,7 @@ class TickFits:
                     continue
                 c = found.coefficients(placement)
                 wanted = candidate.effect.to_coefficients({**placement.values(c), **mine})
-                place = found.fit.places[placement.block]
+                place = found.fit.places[found.blocks[placement]]
                 index += range(place.start, place.stop)
                 delta += [wanted[name] - old for name, old in zip(placement.names, c, strict=True)]
         if not index:
@@ -272,12 +264,12 @@ class TickFits:
     def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
         """Return the parameters of every effect of a set, by drive.parameter."""
         return {candidate.name: {
-            key: value for placement in candidate.placements
+            key: value for placement in candidate.components
             for key, value in self._of_placement(found, placement).items()}
             for candidate in found.effects}
 
-    def _of_placement(self, found: CandidateSet, placement: Placement) -> dict[str, float]:
-        every = {**placement.values(found.coefficients(placement)), **placement.term.shape}
+    def _of_placement(self, found: CandidateSet, placement: Component) -> dict[str, float]:
+        every = {**placement.values(found.coefficients(placement)), **placement.parameters}
         return {self.key(placement.drive, name): float(value) for name, value in every.items()}
 
     def estimates(self, found: CandidateSet) -> dict[str, dict[str, Estimate]]:

@@ -102,7 +102,7 @@ def fit_effect(
     if found is None:
         return None
     share = min((search.regression.own_share(without.fit, block)
-                 for block in found.candidates[0].blocks if block.mean is None), default=1.0)
+                 for block in found.blocks.values() if block.mean is None), default=1.0)
     before = hold_out(search, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.
     plain_set = replace(without, fit=search.regression.at((), found.fit.amplitudes))

@@ -211,7 +211,7 @@ class _Answer:
             found.append(FoundEffect(
                 candidate.effect, self._names(candidate), said.parameters,
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                self.kept.force(candidate, remaining.shape), said.at_bound))
+                search.library.force(self.kept, candidate, remaining.shape), said.at_bound))
         return found
 
     def _evidence(self, candidate: Candidate) -> float:
@@ -266,7 +266,8 @@ class _Answer:
         return tuple(found.values())
 
     def _within_model_error(self, remainder: Remainder) -> WithinModelError:
-        force = remainder.found.force(remainder.candidate, self.design.residuals.measured.shape)
+        force = self.search.library.force(remainder.found, remainder.candidate,
+                                          self.design.residuals.measured.shape)
         return WithinModelError(
             remainder.candidate.name, self._names(remainder.candidate),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)

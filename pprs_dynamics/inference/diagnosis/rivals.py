@@ -89,7 +89,7 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
             estimate(search, best, candidate).parameters,
             linear_error(search, best), _held_out(search, best, validate),
             best.cost - selection.best.cost,
-            best.force(candidate, remaining.shape), remaining))
+            search.library.force(best, candidate, remaining.shape), remaining))
     return tuple(found)
 
 

@@ -24,7 +24,7 @@ from pprs_dynamics.inference.regression.normal_equations import (
     DriveEquations,
     NormalEquations,
 )
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -162,13 +162,13 @@ class _System:
         self.diagnosis, self.kept = diagnosis, kept
         self.search: Search = selection.last
         self.first_choice: dict[str, set[int | None]] = {}
-        self.placements: dict[tuple[str, int | None], Placement] = {}
-        self.doubtful: dict[Placement, tuple[Block, ...]] = {}
+        self.placements: dict[tuple[str, int | None], Component] = {}
+        self.doubtful: dict[Component, tuple[Block, ...]] = {}
         for candidates, found in self._tried(selection):
             for candidate in candidates:
-                drives = {placement.drive for placement in candidate.placements}
+                drives = {one.drive for one in candidate.components}
                 self.first_choice.setdefault(candidate.name, drives)
-                for placement in candidate.placements:
+                for placement in candidate.components:
                     key = (candidate.name, placement.drive)
                     if key not in self.placements:
                         self.placements[key] = placement
@@ -208,15 +208,15 @@ class _System:
         yield tuple(sorted(self.kept.effects, key=lambda one: order.index(one.name))), self.kept
         for one in by_cost(selection.of_first):
             if len(one.candidates) == 1:
-                yield effects(self.search.library.rebuilt(one.effects)), one
+                yield one.effects, one
         for one in by_cost(selection.of_last):
             yield one.effects, one
         # Where no set has an effect, a scan beside what was found says in which shape and where.
         for proposal in self.search.proposals(self.kept, least=-inf):
             yield effects(proposal), self.kept
 
-    def _blocks(self, placement: Placement) -> list[Block]:
-        return [placement.block, *self.doubtful[placement]]
+    def _blocks(self, placement: Component) -> list[Block]:
+        return [self.search.library.block(placement), *self.doubtful[placement]]
 
     def what_if(self) -> WhatIf:
         """Return what a page needs of it."""
@@ -236,21 +236,22 @@ class _System:
                 search.regression.drives, self.equations.drives, self.equations.indices,
                 strict=True)))
 
-    def _optional(self, placement: Placement) -> OptionalPlacement:
-        effect, d = placement.term.effect, placement.drive
+    def _optional(self, placement: Component) -> OptionalPlacement:
+        effect, d = placement.effect, placement.drive
         own = self._blocks(placement)
         free = [block for block in own if block.mean is None]
         bounds = effect.unphysical_below
         return OptionalPlacement(
             None if d is None else self.search.design.drives[d],
-            any(placement in one.placements for one in self.kept.effects),
+            any(placement in one.components for one in self.kept.effects),
             d in self.first_choice[effect.name],
             tuple(column for block in free for column in self.columns[block]),
             tuple(column for block in own if block.mean is not None
                   for column in self.columns[block]),
             tuple((column, bounds[name]) for name, column in zip(
-                placement.names, self.columns[placement.block], strict=False) if name in bounds),
-            placement.price - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
+                placement.names, self.columns[own[0]], strict=False) if name in bounds),
+            self.search.prices.of_component(effect, self.search.library.tried(placement))
+            - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
             tuple(sorted(map(str, effect.hypotheses(placement.names)))))
 
     def _forces(self, d: int, drive: DriveEquations, index: np.typing.NDArray[np.int_],

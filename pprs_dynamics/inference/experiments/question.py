@@ -119,7 +119,7 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     # The last search, or the first where one of the sets is linear around its point.
     search = (ranking.last if all(ranking.search_of(one) is ranking.last for one in sets)
               else ranking.first)
-    placed = [search.evaluate(search.library.rebuilt(one.candidates)) for one in sets]
+    placed = [search.evaluate(one.candidates) for one in sets]
     terms = _Terms()
     parts = [terms.of_set(one) for one in placed]
     further = {(k, j): terms.on_drives_of(placed[k], placed[j])
@@ -150,7 +150,7 @@ def _estimation(search: Search, adopted: CandidateSet) -> Question:
     parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
     plan = ColumnPlan.of_design(search.design, terms.all)
     samples = search.library.prices.samples
-    subjects = [_explanation([c.name], own, plan, c.total_price + sum(
+    subjects = [_explanation([c.name], own, plan, search.library.price(c) + sum(
         len(term.names) for term, _ in own) * log(samples))
         for c, own in zip(adopted.effects, parts, strict=True)]
     return _asked('estimate', search, adopted, plan, precision_of(plan, subjects), (), subjects)
@@ -176,7 +176,7 @@ def subjects_of(plan: ColumnPlan, prices: Prices) -> list[Explanation]:
     """Return each term of a plan as an effect that may be there."""
     subjects = []
     for term in plan.terms:
-        price = (prices.of_name() + prices.of_placement(term.effect, 1)
+        price = (prices.of_name() + prices.of_component(term.effect, 1)
                  + len(term.names) * log(prices.samples))
         if term.drive is not None:
             price += prices.of_drives(1)
@@ -220,9 +220,9 @@ class _Terms:
     def of_candidate(self, found: CandidateSet, candidate: EffectCandidate) -> list[Part]:
         """Return the terms of an effect of a set."""
         parts = []
-        for one in candidate.placements:
+        for one in candidate.components:
             values = found.coefficients(one)
-            term = FittedTerm(candidate.effect, one.drive, one.term.shape, one.names, values)
+            term = FittedTerm(candidate.effect, one.drive, one.parameters, one.names, values)
             parts.append((self._once(term), values))
         return parts
 
@@ -231,11 +231,11 @@ class _Terms:
         theirs = {d for c in truth.effects for d in c.drives or ()}
         more = []
         for c in found.effects:
-            first = c.placements[0]
+            first = c.components[0]
             if c.drives is not None and c.name not in {one.name for one in truth.effects} and (
-                    len(first.term.rows) == 1):
+                    len(found.blocks[first].rows) == 1):
                 values = np.zeros(len(first.names)) if first.names else np.ones(1)
-                more += [self._once(FittedTerm(c.effect, d, first.term.shape, first.names, values))
+                more += [self._once(FittedTerm(c.effect, d, first.parameters, first.names, values))
                          for d in sorted(theirs - set(c.drives))]
         return more
 

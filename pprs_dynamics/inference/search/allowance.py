@@ -28,12 +28,13 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
     exact = isinstance(candidate, EffectCandidate) and not (
         candidate.effect.idealised or candidate.effect.shows_at_reversals)
     share = decisions.exact_share if exact else decisions.form_share
-    drives = {d for block in candidate.blocks for d in block.rows}
+    drives = {d for block in found.blocks_of(candidate) for d in block.rows}
     allowed, names = 0.0, []
     for other in found.effects:
         if other is candidate or not other.effect.idealised:
             continue
-        size = sum(whitened_square(regression, found, block, drives) for block in other.blocks)
+        size = sum(whitened_square(regression, found, block, drives)
+                   for block in found.blocks_of(other))
         if size > 0:
             allowed += share ** 2 * size
             names.append(other.name)
@@ -51,11 +52,12 @@ def share_of_allowance(design: Design, regression: Regression, decisions: Decisi
 
 def beyond_others(regression: Regression, found: CandidateSet, candidate: Candidate) -> float:
     """Return the whitened square of what no refit of the others makes good."""
-    if any(block.mean is not None for block in candidate.blocks):
+    blocks = found.blocks_of(candidate)
+    if any(block.mean is not None for block in blocks):
         return sum(whitened_square(regression, found, block, set(block.rows))
-                   for block in candidate.blocks)
+                   for block in blocks)
     index = np.concatenate([np.arange(place.start, place.stop) for place in (
-        found.fit.places[block] for block in candidate.blocks)])
+        found.fit.places[block] for block in blocks)])
     c = found.fit.coefficients[index]
     return float(c @ np.linalg.solve(found.fit.covariance[np.ix_(index, index)], c))
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import comb, inf, log
@@ -16,64 +16,59 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """A term of an effect with the coefficients of it that are fitted.
+@dataclass(frozen=True)
+class Component:
+    """An effect on one drive or in the structure: what it is, and no arrays.
+
+    The columns come from a linearisation (`Library.block`), so that a component means the same
+    around every operating point.
 
     Parameters
     ----------
-    term : Term
+    effect : type of CatalogueEffect
+    drive : int or None
     names : tuple of str
-        Coefficients; none where the shape says it all.
-    block : Block
-    price : float
-        Of the choice among its variants and shapes.
-    bare : mapping of drive to (k, n) array, optional
-        Change of the block's rows if friction did not follow the effect's loads.
+        Coefficients that are fitted; none where the shape says it all.
+    shape : tuple of (str, float)
+        Parameters of the shape, by name.
     """
 
-    term: Term
+    effect: type[CatalogueEffect]
+    drive: int | None
     names: tuple[str, ...]
-    block: Block
-    price: float
-    bare: Mapping[int, Array] | None = None
+    shape: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def of(cls, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],
+           names: tuple[str, ...]) -> Component:
+        """Return an effect on a drive or in the structure, of one shape."""
+        return cls(effect, drive, names, tuple(sorted(shape.items())))
 
     @property
-    def drive(self) -> int | None:
-        """On which it sits."""
-        return self.term.drive
+    def parameters(self) -> dict[str, float]:
+        """Of the shape."""
+        return dict(self.shape)
 
-    @cached_property
-    def key(self) -> Hashable:
-        """What makes it differ from others of the same effect."""
-        return (self.drive, self.names, tuple(sorted(self.term.shape.items())))
-
-    @property
-    def rows(self) -> dict[int, Array]:
-        """Rows in time of the coefficients that are fitted, (k, M) by drive [N]."""
+    def every(self, coefficients: Array) -> Array:
+        """Return the coefficients of all of the effect's, 0 for those that are not fitted."""
         if not self.names:
-            return dict(self.term.rows)
-        every = list(self.term.names)
-        chosen = [every.index(name) for name in self.names]
-        return {d: rows[chosen] for d, rows in self.term.rows.items()}
-
-    def force(self, coefficients: Array) -> dict[int, Array]:
-        """Return what it contributes to each drive, (M,) [N]."""
-        return {d: coefficients @ rows for d, rows in self.rows.items()}
+            return coefficients
+        known = [c.name for c in self.effect.coefficients]
+        found = np.zeros(len(known))
+        found[[known.index(name) for name in self.names]] = coefficients
+        return found
 
     def values(self, coefficients: Array) -> dict[str, float]:
         """Return all linear parameters of the effect."""
-        effect = self.term.effect
-        every = {c.name: 0.0 for c in effect.coefficients}
-        every.update(zip(self.names, (float(c) for c in coefficients), strict=False))
-        return {name: float(value) for name, value in effect.from_coefficients(every).items()}
+        every = {c.name: float(value) for c, value in zip(
+            self.effect.coefficients, self.every(coefficients), strict=False)}
+        return {name: float(value) for name, value in self.effect.from_coefficients(every).items()}
 
 
 @dataclass(frozen=True)
@@ -83,18 +78,18 @@ class EffectCandidate:
     Parameters
     ----------
     effect : type of CatalogueEffect
-    placements : tuple of Placement
+    components : tuple of Component
         One for each drive, ascending, or one.
-    price : float
-        Of its hypotheses and its drives.
-    hypotheses : frozenset
-        That it claims, each priced as a name.
     """
 
     effect: type[CatalogueEffect]
-    placements: tuple[Placement, ...]
-    price: float
-    hypotheses: frozenset[Hashable]
+    components: tuple[Component, ...]
+
+    @classmethod
+    def of(cls, components: Iterable[Component]) -> EffectCandidate:
+        """Return the effect that components of one effect are."""
+        ordered = tuple(sorted(components, key=lambda c: -1 if c.drive is None else c.drive))
+        return cls(ordered[0].effect, ordered)
 
     @property
     def name(self) -> str:
@@ -109,23 +104,23 @@ class EffectCandidate:
     @property
     def drives(self) -> tuple[int, ...] | None:
         """Drives on which it sits; None for the structure."""
-        drives = [placement.drive for placement in self.placements]
+        drives = [component.drive for component in self.components]
         return None if drives[0] is None else tuple(d for d in drives if d is not None)
 
     @property
-    def blocks(self) -> tuple[Block, ...]:
-        """Of its placements."""
-        return tuple(placement.block for placement in self.placements)
-
-    @property
-    def total_price(self) -> float:
-        """Of everything that was chosen."""
-        return self.price + sum(placement.price for placement in self.placements)
-
-    @cached_property
     def key(self) -> Hashable:
         """What makes it differ from other candidates."""
-        return (self.name, tuple(placement.key for placement in self.placements))
+        return self
+
+    @property
+    def hypotheses(self) -> frozenset[Hashable]:
+        """What it claims, each priced as a name.
+
+        With other coefficients, on other drives or on one, it may be more than one hypothesis:
+        asymmetric friction that is dry and viscous is two.
+        """
+        return frozenset[Hashable]().union(*(self.effect.hypotheses(one.names)
+                                             for one in self.components))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,11 +165,6 @@ class UnknownCandidate:
         """On which it is."""
         return tuple(self.parts)
 
-    @property
-    def total_price(self) -> float:
-        """Of everything that was chosen."""
-        return self.price
-
     @cached_property
     def key(self) -> Hashable:
         """What makes it differ from other candidates."""
@@ -194,8 +184,10 @@ class CandidateSet:
     fit : JointFit
     total : float
         Penalised deviance with all prices.
-    doubtful : mapping of Placement to tuple of Block
-        Columns for what the placements leave open, fitted with them.
+    blocks : mapping of Component to Block
+        Columns of the components.
+    doubtful : mapping of Component to tuple of Block
+        Columns for what the components leave open, fitted with them.
     is_admissible : bool
         False where a pattern may be the lack of fit of the effects beside it.
     """
@@ -203,7 +195,8 @@ class CandidateSet:
     candidates: tuple[Candidate, ...]
     fit: JointFit
     total: float
-    doubtful: Mapping[Placement, tuple[Block, ...]] = field(default_factory=dict, repr=False)
+    blocks: Mapping[Component, Block] = field(default_factory=dict, repr=False)
+    doubtful: Mapping[Component, tuple[Block, ...]] = field(default_factory=dict, repr=False)
     is_admissible: bool = True
 
     @property
@@ -226,21 +219,15 @@ class CandidateSet:
         """Those of no catalogue."""
         return tuple(c for c in self.candidates if isinstance(c, UnknownCandidate))
 
-    def coefficients(self, placement: Placement) -> Array:
-        """Return the coefficients of a placement."""
-        return self.fit.of(placement.block)
+    def coefficients(self, component: Component) -> Array:
+        """Return the coefficients of a component."""
+        return self.fit.of(self.blocks[component])
 
-    def force(self, candidate: Candidate, shape: tuple[int, ...]) -> Array:
-        """Return what a candidate contributes, in the shape (M, D) [N]."""
-        force = np.zeros(shape)
+    def blocks_of(self, candidate: Candidate) -> tuple[Block, ...]:
+        """Return the columns of a candidate."""
         if isinstance(candidate, UnknownCandidate):
-            for d, block in candidate.parts.items():
-                force[:, d] = self.fit.of(block) @ candidate.rows[d]
-            return force
-        for placement in candidate.placements:
-            for d, values in placement.force(self.coefficients(placement)).items():
-                force[:, d] += values
-        return force
+            return candidate.blocks
+        return tuple(self.blocks[component] for component in candidate.components)
 
 
 def bends(candidate: Candidate) -> bool:
@@ -285,7 +272,20 @@ class Prices:
         """Return the price of a choice of drives: how many, and which."""
         return 2 * log(self.drives) + 2 * log(comb(self.drives, count))
 
-    def of_placement(self, effect: type[CatalogueEffect], tried: int) -> float:
+    def of_candidate(self, candidate: Candidate, tried: Callable[[Component], int]) -> float:
+        """Return the price of what was chosen: hypotheses, drives, variants and shapes.
+
+        `tried` says how many shapes of a component there were.
+        """
+        if isinstance(candidate, UnknownCandidate):
+            return candidate.price
+        price = len(candidate.hypotheses) * self.of_name()
+        if candidate.drives is not None:
+            price += self.of_drives(len(candidate.components))
+        return price + sum(self.of_component(one.effect, tried(one))
+                           for one in candidate.components)
+
+    def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
         """Return the price of a variant and of a shape among those tried.
 
         A shape is worth at least what a coefficient of weak prior is.

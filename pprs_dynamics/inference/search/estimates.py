@@ -14,7 +14,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import KnownNumber, PresentCoefficient, within
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.reversal_widths import place_of
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -119,25 +119,26 @@ def _of_set(search: Search, found: CandidateSet, candidate: EffectCandidate,
     fit = search.regression.at((*found.fit.blocks, *slopes.values()), found.fit.amplitudes)
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
-    for placement in candidate.placements:
-        blocks = [placement.block, *([slopes[placement]] if placement in slopes else [])]
+    for component in candidate.components:
+        blocks = [found.blocks[component],
+                  *([slopes[component]] if component in slopes else [])]
         index = np.concatenate([np.arange(place.start, place.stop) for place in (
             fit.places[block] for block in blocks)])
         covariance = fit.covariance[np.ix_(index, index)]
-        c = found.coefficients(placement)
-        some, held = _of_placement(search, placement, c, covariance)
+        c = found.coefficients(component)
+        some, held = _of_component(search, component, c, covariance)
         parameters.update(some)
         bound += held
     return parameters, tuple(bound)
 
 
-def _of_placement(search: Search, placement: Placement, c: Array, covariance: Array,
+def _of_component(search: Search, component: Component, c: Array, covariance: Array,
                   ) -> tuple[dict[str, Estimate], list[str]]:
-    effect, term = placement.term.effect, placement.term
-    prefix = '' if placement.drive is None else f'{search.design.drives[placement.drive]}.'
-    unit_of = _units(search.design, placement.drive)
-    values = placement.values(c)
-    size = placement.block.size
+    effect, shape = component.effect, component.parameters
+    prefix = '' if component.drive is None else f'{search.design.drives[component.drive]}.'
+    unit_of = _units(search.design, component.drive)
+    values = component.values(c)
+    size = len(c)
     found, bound = {}, []
     # From coefficients to parameters: the map is smooth but for angles, which it may wrap.
     for parameter in effect.linear:
@@ -146,7 +147,7 @@ def _of_placement(search: Search, placement: Placement, c: Array, covariance: Ar
             step = 1e-4 * max(float(np.sqrt(covariance[k, k])), 1e-12)
             moved = c.copy()
             moved[k] += step
-            slope[k] = (placement.values(moved)[parameter.name] - values[parameter.name]) / step
+            slope[k] = (component.values(moved)[parameter.name] - values[parameter.name]) / step
         variance = float(slope @ covariance[:size, :size] @ slope)
         found[prefix + parameter.name] = Estimate(
             within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
@@ -154,12 +155,12 @@ def _of_placement(search: Search, placement: Placement, c: Array, covariance: Ar
         if not parameter.lower <= values[parameter.name] <= parameter.upper:
             bound.append(prefix + parameter.name)
     for k, parameter in enumerate(effect.shape):
-        value = float(term.shape[parameter.name])
+        value = float(shape[parameter.name])
         amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
         found[prefix + parameter.name] = Estimate(
             within(parameter, value), parameter.spread(amount, value),
             unit_of(parameter.unit))
-        trials = sorted({trial[parameter.name] for trial in _trials(search, placement)})
+        trials = sorted({trial[parameter.name] for trial in _trials(search, component)})
         edge = search.decisions.edge_share
         if len(trials) > 2 and not (trials[0] + edge * abs(trials[0]) < value
                                     < trials[-1] - edge * abs(trials[-1])):
@@ -175,8 +176,8 @@ def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
     return design.residuals.units_of(name).of
 
 
-def _trials(search: Search, placement: Placement) -> Sequence[Mapping[str, float]]:
-    effect, d = placement.term.effect, placement.drive
+def _trials(search: Search, component: Component) -> Sequence[Mapping[str, float]]:
+    effect, d = component.effect, component.drive
     if d is None or not issubclass(effect, DriveEffect):
         return ()
     return effect.trials(search.design.covered[d])

@@ -77,7 +77,7 @@ def _around_fitted(
         search.release()
         search = Search(last.design, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
-        best = search.run(*(search.library.rebuilt(one.candidates) for one in starts))
+        best = search.run(*(one.candidates for one in starts))
         if best.total > rival:
             break
     return search, best
@@ -135,7 +135,7 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions,
         search = Search(search.design.around(point), decisions, search.regression.error_scale,
                         with_unknown=False)
         search.evaluate(())
-        found = search.refined(search.evaluate(search.library.rebuilt(found.candidates)))
+        found = search.refined(search.evaluate(found.candidates))
     return search, found
 
 
@@ -205,12 +205,12 @@ def parts_of(search: Search, found: CandidateSet) -> tuple[Array, tuple[PlacedEf
     base[[isinstance(column, ReversalShape) for column in search.design.base]] = 0.0
     effects = []
     for candidate in found.effects:
-        for placement in candidate.placements:
-            every = {c.name: 0.0 for c in candidate.effect.coefficients}
-            every.update(zip(placement.names, found.coefficients(placement).tolist(),
-                             strict=False))
-            effects.append(PlacedEffect(candidate.effect, placement.drive, placement.term.shape,
-                                        every))
+        for one in candidate.components:
+            every = one.every(found.coefficients(one)).tolist()
+            effects.append(PlacedEffect(
+                candidate.effect, one.drive, one.parameters,
+                {c.name: value for c, value in zip(candidate.effect.coefficients, every,
+                                                   strict=False)}))
     return base, tuple(effects)
 
 
@@ -269,7 +269,7 @@ def linear_prediction(search: Search, found: CandidateSet) -> Array:
             for d, row in column.rows.items():
                 prediction[:, d] += c * row
     for candidate in found.effects:
-        prediction += found.force(candidate, prediction.shape)
+        prediction += search.library.force(found, candidate, prediction.shape)
     return prediction
 
 

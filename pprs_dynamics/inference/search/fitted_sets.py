@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from itertools import chain
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,9 +20,10 @@ from pprs_dynamics.inference.search.allowance import share_of_allowance
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
+    Component,
     EffectCandidate,
-    Placement,
     Prices,
+    UnknownCandidate,
     set_key,
 )
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -34,6 +36,7 @@ LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
 
 Candidates = tuple[Candidate, ...]
+Doubtful = Mapping[Component, tuple[Block, ...]]
 
 
 class FittedSets:
@@ -81,21 +84,33 @@ class FittedSets:
             fit = self.regression.fit(())
             return CandidateSet((), fit, fit.deviance)
         start = self.evaluate(()).fit.amplitudes
-        blocks = [block for candidate in candidates for block in candidate.blocks]
         # The size of its forces, in proportion to which friction is in doubt, need not be
         # exact: the noise of the empty set does, and steps of it, whose columns are kept.
-        doubtful = self._doubtful_blocks(candidates, self.regression.at(blocks, start))
-        fit = self.regression.fit([*blocks, *chain(*doubtful.values())], start)
-        found = CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+        doubtful = self._doubtful_blocks(candidates, self.regression.at(
+            self.blocks(candidates), start))
+        fit = self.regression.fit(self.blocks(candidates, doubtful), start)
+        found = self._set(candidates, fit, doubtful)
         return replace(found, is_admissible=self._is_admissible(found))
+
+    def blocks(self, candidates: Candidates, doubtful: Doubtful = MappingProxyType({}),
+               ) -> list[Block]:
+        """Return the columns of candidates, then those of what they leave open."""
+        return [*(block for c in candidates for block in (
+            c.blocks if isinstance(c, UnknownCandidate) else map(self.library.block, c.components)
+        )), *chain(*doubtful.values())]
+
+    def _set(self, candidates: Candidates, fit: JointFit, doubtful: Doubtful) -> CandidateSet:
+        blocks = {one: self.library.block(one) for candidate in candidates
+                  if isinstance(candidate, EffectCandidate) for one in candidate.components}
+        found = CandidateSet(candidates, fit, fit.deviance, blocks, doubtful)
+        return replace(found, total=fit.deviance + self.price(found))
 
     def _is_admissible(self, found: CandidateSet) -> bool:
         """Return whether every pattern is more than the lack of fit of the effects beside it."""
         return all(share_of_allowance(self.design, self.regression, self.decisions, found,
                                       candidate)[0] >= 1 for candidate in found.unknowns)
 
-    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit,
-                         ) -> dict[Placement, tuple[Block, ...]]:
+    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit) -> Doubtful:
         """Return columns for what effects leave open, in proportion to their fitted force.
 
         Whether friction follows the loads that an effect adds; how friction turns over; and how
@@ -103,60 +118,54 @@ class FittedSets:
         """
         found = {}
         for candidate in candidates:
-            for placement in candidate.placements if isinstance(candidate, EffectCandidate) else ():
-                size = _stepped(fit.of(placement.block))
-                key = (placement, tuple(size.tolist()))
+            for one in candidate.components if isinstance(candidate, EffectCandidate) else ():
+                size = _stepped(fit.of(self.library.block(one)))
+                key = (one, tuple(size.tolist()))
                 if key not in self._doubtful:
-                    self._doubtful[key] = self._doubtful_of(placement, size)
+                    self._doubtful[key] = self._doubtful_of(one, size)
                 if self._doubtful[key]:
-                    found[placement] = self._doubtful[key]
+                    found[one] = self._doubtful[key]
         return found
 
-    def _doubtful_of(self, placement: Placement, c: Array) -> tuple[Block, ...]:
-        """Return the columns of one placement, for its coefficients (k,)."""
+    def _doubtful_of(self, component: Component, c: Array) -> tuple[Block, ...]:
+        """Return the columns of one component, for its coefficients (k,)."""
         blocks = []
-        if placement.bare is not None:
-            rows = {d: (c @ bare)[None] for d, bare in placement.bare.items()}
-            blocks.append(Block(rows, np.eye(1)))
-        left_open = self.library.open_rows(placement)
+        unloaded = self.library.unloaded(component)
+        if unloaded is not None:
+            blocks.append(Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1)))
+        left_open = self.library.open_rows(component)
         if left_open is not None:
-            assert placement.drive is not None
-            blocks.append(Block({placement.drive: np.tensordot(c, left_open, 1)},
+            assert component.drive is not None
+            blocks.append(Block({component.drive: np.tensordot(c, left_open, 1)},
                                 np.eye(left_open.shape[1])))
         return tuple(blocks)
 
     def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
-        placements = {placement for candidate in candidates
-                      if isinstance(candidate, EffectCandidate)
-                      for placement in candidate.placements}
-        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in placements}
-        blocks = [block for candidate in candidates for block in candidate.blocks]
-        fit = self.regression.at([*blocks, *chain(*doubtful.values())], found.fit.amplitudes)
-        return CandidateSet(candidates, fit, fit.deviance + self.price(candidates, fit), doubtful)
+        kept = {one for candidate in candidates if isinstance(candidate, EffectCandidate)
+                for one in candidate.components}
+        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in kept}
+        fit = self.regression.at(self.blocks(candidates, doubtful), found.fit.amplitudes)
+        return self._set(candidates, fit, doubtful)
 
-    def price(self, candidates: Candidates, fit: JointFit) -> float:
+    def price(self, found: CandidateSet) -> float:
         """Return the price of all that was chosen, and of signs that are unphysical."""
-        total = 0.0
-        for candidate in candidates:
-            total += candidate.total_price
-            if isinstance(candidate, EffectCandidate):
-                total += sum(self.library.prices.of_signs(
-                    candidate.effect, placement.values(fit.of(placement.block)))
-                    for placement in candidate.placements)
-        return total
+        return sum(map(self.library.price, found.candidates)) + sum(
+            self.prices.of_signs(one.effect, one.values(found.coefficients(one)))
+            for one in found.blocks)
 
-    def drop_cost(self, found: CandidateSet, placement: Placement) -> float:
-        """Return by how much the deviance rises without a placement, at the noise of a fit.
+    def drop_cost(self, found: CandidateSet, component: Component) -> float:
+        """Return by how much the deviance rises without a component, at the noise of a fit.
 
         By the Savage-Dickey ratio of prior and posterior density at 0.
         """
-        if not placement.names:
+        if not component.names:
             return np.inf
-        place = found.fit.places[placement.block]
+        block = found.blocks[component]
+        place = found.fit.places[block]
         c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
-                     + np.linalg.slogdet(placement.block.precision)[1])
+                     + np.linalg.slogdet(block.precision)[1])
 
     def refined(self, found: CandidateSet) -> CandidateSet:
         """Return the set with all shapes moved by Gauss-Newton steps that lower the cost.
@@ -181,47 +190,39 @@ class FittedSets:
             return None
         fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
                                  found.fit.amplitudes)
-        moved: dict[Placement, Placement] = {}
-        for placement, block in slopes:
-            effect, d = placement.term.effect, placement.drive
-            assert d is not None
-            assert issubclass(effect, DriveEffect)
-            shape = dict(placement.term.shape)
-            reach = self._reach(placement)
+        moved: dict[Component, Component] = {}
+        for component, block in slopes:
+            effect, shape, reach = component.effect, component.parameters, self._reach(component)
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
-            moved[placement] = self.library.placed(effect, d, shape, placement.names)
+            moved[component] = Component.of(effect, component.drive, shape, component.names)
         return tuple(
-            self.library.candidate(c.effect, [moved.get(one, one) for one in c.placements])
+            EffectCandidate.of(moved.get(one, one) for one in c.components)
             if isinstance(c, EffectCandidate) else c for c in found.candidates)
 
-    def slopes(self, found: CandidateSet) -> list[tuple[Placement, Block]]:
-        """Return derivatives by the shapes of a set, of unit prior, for the placements with any."""
+    def slopes(self, found: CandidateSet) -> list[tuple[Component, Block]]:
+        """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
         slopes = []
         for candidate in found.effects:
-            for placement in candidate.placements if candidate.effect.shape else ():
-                c = found.coefficients(placement)
-                if placement.names:
-                    every = np.zeros(len(placement.term.names))
-                    every[[placement.term.names.index(name) for name in placement.names]] = c
-                    c = every
-                assert placement.drive is not None
-                rows = self.design.slope_rows(placement.term, c)
-                slopes.append((placement, self.regression.block(
-                    {placement.drive: rows}, precision=np.eye(len(rows)))))
+            for one in candidate.components if candidate.effect.shape else ():
+                assert one.drive is not None
+                rows = self.design.slope_rows(self.library.term(one),
+                                              one.every(found.coefficients(one)))
+                slopes.append((one, self.regression.block({one.drive: rows},
+                                                          precision=np.eye(len(rows)))))
         return slopes
 
-    def _reach(self, placement: Placement) -> dict[str, float]:
+    def _reach(self, component: Component) -> dict[str, float]:
         """Return how far each shape parameter may move at once: half the way between trials."""
-        effect, d = placement.term.effect, placement.drive
+        effect, d = component.effect, component.drive
         assert d is not None
         assert issubclass(effect, DriveEffect)
         trials = effect.trials(self.design.covered[d])
         reach = {}
         for parameter in effect.shape:
-            value = placement.term.shape[parameter.name]
+            value = component.parameters[parameter.name]
             known = np.array(sorted({trial[parameter.name] for trial in trials}))
             if len(known) < 2:
                 reach[parameter.name] = 0.5

@@ -72,7 +72,7 @@ def beyond_lack_of_fit(search: Search, best: CandidateSet,
         without = {candidate: search.evaluate(
             tuple(c for c in kept.candidates if c is not candidate)) for candidate in small}
         without = {candidate: found for candidate, found in without.items()
-                   if _is_of_loads(kept, candidate)
+                   if _is_of_loads(search, kept, candidate)
                    or _over_noise(search, best, found) <= search.decisions.left_ratio}
         if not without:
             break
@@ -82,15 +82,15 @@ def beyond_lack_of_fit(search: Search, best: CandidateSet,
     return kept, tuple(remainders)
 
 
-def _is_of_loads(found: CandidateSet, candidate: Candidate) -> bool:
+def _is_of_loads(search: Search, found: CandidateSet, candidate: Candidate) -> bool:
     """Return whether a candidate is friction of drives that an effect beside it loads.
 
     Friction may follow such loads or not, which is known to first order only.
     """
     return (isinstance(candidate, EffectCandidate) and candidate.effect.is_friction
             and issubclass(candidate.effect, DriveEffect)
-            and any(placement.bare for other in found.effects if other is not candidate
-                    for placement in other.placements))
+            and any(search.library.term(one).bare for other in found.effects
+                    if other is not candidate for one in other.components))
 
 
 def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:

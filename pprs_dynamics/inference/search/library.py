@@ -5,45 +5,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.open_form import open_rows
 from pprs_dynamics.inference.regression.terms import Term
-from pprs_dynamics.inference.search.candidates import Candidate, EffectCandidate, Placement, Prices
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    CandidateSet,
+    Component,
+    Prices,
+    UnknownCandidate,
+)
 from pprs_dynamics.inference.search.scan import Entry, Scan
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
-
-
-class Trial(NamedTuple):
-    """An effect on a drive in one of the shapes tried, with some of its coefficients."""
-
-    effect: type[DriveEffect]
-    shape: Mapping[str, float]
-    names: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ScannedTrial:
-    """A trial that a scan proposes.
-
-    Parameters
-    ----------
-    trial : Trial
-    gain : float
-        By which the deviance falls at the noise of the fit.
-    """
-
-    trial: Trial
-    gain: float
 
 
 class DriveLibrary:
@@ -66,10 +47,10 @@ class DriveLibrary:
                        for effect in self.effects}
 
     @cached_property
-    def scan(self) -> Scan[Trial]:
+    def scan(self) -> Scan[Component]:
         """All shapes in all variants that the rows of a scan suffice for; computed when asked for.
         """
-        entries: list[Entry[Trial]] = []
+        entries: list[Entry[Component]] = []
         parts: list[Array] = [np.zeros((0, len(self.series)), dtype=np.float32)]
         first = 0
         for effect in self.effects:
@@ -77,9 +58,9 @@ class DriveLibrary:
                                             effect.trials(self.design.covered[self.d]))
             for term in terms:
                 if not term.names:
-                    entries.append(Entry(Trial(effect, term.shape, ()), (first,),
+                    entries.append(Entry(Component.of(effect, self.d, term.shape, ()), (first,),
                                          CERTAIN * np.eye(1), np.ones(1)))
-                entries += [Entry(Trial(effect, term.shape, names),
+                entries += [Entry(Component.of(effect, self.d, term.shape, names),
                                   tuple(first + term.names.index(name) for name in names))
                             for names in effect.variants
                             if names and set(names) <= set(effect.scanned)]
@@ -89,19 +70,19 @@ class DriveLibrary:
             parts.append(self.series.transform(rows.astype(np.float32)))
         return Scan(self.regression, {self.d: np.concatenate(parts)}, entries)
 
-    def offers(self, fit: JointFit) -> dict[str, ScannedTrial]:
-        """Return the best shape and variant of every effect, by name, at the noise of a fit."""
-        best: dict[str, ScannedTrial] = {}
+    def offers(self, fit: JointFit) -> dict[str, tuple[Component, float]]:
+        """Return the best shape and variant of every effect, by name, with its gain at a noise."""
+        best: dict[str, tuple[Component, float]] = {}
         for labels, gains in self.scan.gains(fit):
             for at in np.argsort(-gains):
                 name = labels[at].effect.name
-                if name not in best or best[name].gain < gains[at]:
-                    best[name] = ScannedTrial(labels[at], float(gains[at]))
+                if name not in best or best[name][1] < gains[at]:
+                    best[name] = labels[at], float(gains[at])
         return best
 
 
 class Library:
-    """All candidates of a design.
+    """Columns and prices of the components of a design.
 
     Parameters
     ----------
@@ -113,119 +94,110 @@ class Library:
 
     def __init__(self, design: Design, regression: Regression, prices: Prices) -> None:
         self.design, self.regression, self.prices = design, regression, prices
-        self._placements: dict[Hashable, Placement] = {}
-        self._open: dict[Placement, Array | None] = {}
+        self._terms: dict[Hashable, Term] = {}
+        self._blocks: dict[Component, Block] = {}
+        self._open: dict[Component, Array | None] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
         felt = [effect for effect in searched_in_drives(design) if _is_felt_everywhere(effect)]
-        self.spanning = [self.placement(design.term(effect, d, {}), names)
+        self.spanning = [Component.of(effect, d, {}, names)
                          for effect in felt for d in regression.drives
                          if design.acts_on(effect, d) for names in effect.variants]
-        self.structure = [self.placement(term, names) for term in design.structure
+        self.structure = [Component.of(term.effect, None, {}, names) for term in design.structure
                           for names in term.effect.variants
                           if any(np.any(rows[[term.names.index(name) for name in names]])
                                  for rows in term.rows.values())]
 
     @cached_property
-    def _scan(self) -> Scan[Placement]:
+    def _scan(self) -> Scan[Component]:
         """Of all that more than one drive feels."""
-        placements = [*self.structure, *self.spanning]
         series = self.regression.series
         entries, parts, first = [], [], 0
-        for one in placements:
-            rows = one.block.rows
-            size = max((len(values) for values in rows.values()), default=0)
-            entries.append(Entry(one, tuple(range(first, first + size)), one.block.precision,
-                                 one.block.mean))
-            parts.append({d: rows[d] if d in rows else np.zeros((size, len(series[d])))
-                          for d in series})
-            first += size
+        for one in (*self.structure, *self.spanning):
+            block = self.block(one)
+            entries.append(Entry(one, tuple(range(first, first + block.size)), block.precision,
+                                 block.mean))
+            parts.append({d: block.rows[d] if d in block.rows
+                          else np.zeros((block.size, len(series[d]))) for d in series})
+            first += block.size
         return Scan(self.regression, {
             d: np.concatenate([part[d] for part in parts]).astype(np.float32) for d in series},
             entries)
 
-    def shared_offers(self, fit: JointFit) -> list[tuple[Placement, float]]:
+    def shared_offers(self, fit: JointFit) -> list[tuple[Component, float]]:
         """Return what more than one drive feels, with its gains at the noise of a fit."""
         if not self.structure and not self.spanning:
             return []
-        return [(one, float(gain)) for placements, gains in self._scan.gains(fit)
-                for one, gain in zip(placements, gains, strict=True)]
+        return [(one, float(gain)) for components, gains in self._scan.gains(fit)
+                for one, gain in zip(components, gains, strict=True)]
 
-    def placement(self, term: Term, names: tuple[str, ...]) -> Placement:
-        """Return a term with the coefficients that are to be fitted."""
-        key = (term.effect, term.drive, names, tuple(sorted(term.shape.items())))
-        if key not in self._placements:
-            self._placements[key] = self._placed(term, names)
-        return self._placements[key]
+    def term(self, component: Component) -> Term:
+        """Return the rows in time of a component, of all of its effect's coefficients."""
+        key = (component.effect, component.drive, component.shape)
+        if key not in self._terms:
+            self._terms[key] = self.design.find_term(
+                component.effect, component.drive, component.parameters)
+        return self._terms[key]
 
-    def placed(self, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],
-               names: tuple[str, ...]) -> Placement:
-        """Return an effect on a drive or in the structure, of one shape."""
-        key = (effect, drive, names, tuple(sorted(shape.items())))
-        found = self._placements.get(key)
-        return found or self.placement(
-            self.design.find_term(effect, drive, shape), names)
+    def block(self, component: Component) -> Block:
+        """Return the columns of a component, transformed, with their prior."""
+        if component not in self._blocks:
+            self._blocks[component] = self.regression.term_block(
+                self.term(component), component.names)
+        return self._blocks[component]
 
-    def open_rows(self, placement: Placement) -> Array | None:
+    def unloaded(self, component: Component) -> dict[int, Array] | None:
+        """Return what its columns change by if friction did not follow its loads, (k, n)."""
+        term = self.term(component)
+        if term.bare is None:
+            return None
+        chosen = [term.names.index(name) for name in component.names]
+        return {d: self.regression.series[d].transform((values - term.rows[d])[chosen])
+                for d, values in term.bare.items() if d in self.regression.series}
+
+    def open_rows(self, component: Component) -> Array | None:
         """Return what its form leaves open, by its coefficients, (k, w, n); None for nothing.
 
         How friction turns over where it knows no past, and the effect's own deviations.
         """
-        if placement not in self._open:
-            self._open[placement] = self._open_rows(placement)
-        return self._open[placement]
+        if component not in self._open:
+            self._open[component] = self._open_rows(component)
+        return self._open[component]
 
-    def _open_rows(self, placement: Placement) -> Array | None:
-        design, term, d = self.design, placement.term, placement.drive
-        if d is None or not term.names:
+    def _open_rows(self, component: Component) -> Array | None:
+        d = component.drive
+        if d is None or not component.names:
             return None
-        units = np.eye(len(term.names))[[term.names.index(name) for name in placement.names]]
-        rows = np.stack([open_rows(design, term, unit) for unit in units])
+        rows = np.stack([open_rows(self.design, self.term(component), component.every(unit))
+                         for unit in np.eye(len(component.names))])
         return self.regression.series[d].transform(rows) if np.any(rows) else None
 
-    def _placed(self, term: Term, names: tuple[str, ...]) -> Placement:
-        regression = self.regression
-        bare = None
-        if term.bare is not None:
-            chosen = [term.names.index(name) for name in names]
-            bare = {d: regression.series[d].transform((values - term.rows[d])[chosen])
-                    for d, values in term.bare.items() if d in regression.series}
-        tried = (self.local[term.drive].trials.get(term.effect.name, 1)
-                 if term.drive is not None else 1)
-        return Placement(term, names if term.names else (), regression.term_block(term, names),
-                         self.prices.of_placement(term.effect, tried), bare)
+    def tried(self, component: Component) -> int:
+        """Return how many shapes of a component are tried."""
+        return (1 if component.drive is None else
+                self.local[component.drive].trials.get(component.effect.name, 1))
 
-    def full(self, offer: ScannedTrial, d: int) -> Placement:
-        """Return the placement of an offer on a drive, with the rows of the exact term."""
-        return self.placed(offer.trial.effect, d, offer.trial.shape, offer.trial.names)
+    def price(self, candidate: Candidate) -> float:
+        """Return the price of everything that was chosen."""
+        return self.prices.of_candidate(candidate, self.tried)
+
+    def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
+        """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
+        force = np.zeros(shape)
+        if isinstance(candidate, UnknownCandidate):
+            for d, block in candidate.parts.items():
+                force[:, d] = found.fit.of(block) @ candidate.rows[d]
+            return force
+        for one in candidate.components:
+            c = one.every(found.coefficients(one))
+            for d, rows in self.term(one).rows.items():
+                force[:, d] += c @ rows
+        return force
 
     def release(self) -> None:
         """Let go of what scans need; it is computed again if it is asked for."""
         vars(self).pop('_scan', None)
         for local in self.local.values():
             vars(local).pop('scan', None)
-
-    def candidate(self, effect: type[CatalogueEffect],
-                  placements: Sequence[Placement]) -> EffectCandidate:
-        """Return an effect with the price of its name and drives.
-
-        With other coefficients, on other drives or on one, it may be more than one hypothesis:
-        asymmetric friction that is dry and viscous is two.
-        """
-        ordered = tuple(sorted(placements, key=lambda one: -1 if one.drive is None else one.drive))
-        hypotheses = frozenset[Hashable]().union(*(effect.hypotheses(one.names)
-                                                   for one in ordered))
-        price = len(hypotheses) * self.prices.of_name()
-        if ordered[0].drive is not None:
-            price += self.prices.of_drives(len(ordered))
-        return EffectCandidate(effect, ordered, price, hypotheses)
-
-    def rebuilt(self, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-        """Return the candidates of another library with the columns of this one."""
-        return tuple(self.candidate(one.effect, [
-            self.placed(one.effect, placement.drive, placement.term.shape, placement.names)
-            for placement in one.placements]) if isinstance(one, EffectCandidate) else one
-            for one in candidates)
-
 
 
 def _is_felt_everywhere(effect: type[DriveEffect]) -> bool:

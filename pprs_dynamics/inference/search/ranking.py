@@ -173,7 +173,7 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     for one in last.sets if last is not first else ():
         if (one.cost < best.cost + decisions.rival_margin and one.effects and not one.unknowns
                 and not _is_bent(one)):
-            first.refined(first.evaluate(first.library.rebuilt(one.candidates)))
+            first.refined(first.evaluate(one.candidates))
     found = Ranking.of(first, last, best)
     report(1.0)
     return found

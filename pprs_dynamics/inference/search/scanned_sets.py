@@ -9,13 +9,12 @@ of sums that are known. It proposes; a fit with its own noise decides (`selectio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
-from functools import partial
+from collections.abc import Container
 
 import numpy as np
 
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Placement
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -45,72 +44,54 @@ class ScannedSets(FittedSets):
         effects : container of type, optional
             Only these.
         """
-        scored: list[tuple[float, Callable[[], Candidates]]] = []
+        scored: list[tuple[float, Candidates]] = []
         for effect, found in self._scan(base, drive).items():
             if effects is not None and effect not in effects:
                 continue
             old = next((c for c in base.effects if c.effect is effect), None)
             score, chosen = self._best_drives(effect, found, old)
             if score > least and chosen:
-                scored.append((score, self._joined(base, effect, chosen, old)))
+                kept = tuple(c for c in base.candidates if c is not old)
+                scored.append((score, (*kept, EffectCandidate.of(
+                    [*(old.components if old else ()), *chosen]))))
         scored.sort(key=lambda one: -one[0])
-        return [make() for _, make in scored[:count]]
+        return [candidates for _, candidates in scored[:count]]
 
     def _scan(self, base: CandidateSet, drive: int | None = None,
-              ) -> dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]]:
-        """Return gains less prices of placements, by effect; one for each drive."""
+              ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
+        """Return gains less prices of components, by effect; one for each drive."""
         library, fit = self.library, base.fit
-        taken = {(c.effect, placement.drive) for c in base.effects for placement in c.placements}
-        found: dict[type[CatalogueEffect], list[tuple[float, Callable[[], Placement]]]] = {}
+        taken = {(c.effect, one.drive) for c in base.effects for one in c.components}
         drives = tuple(library.local) if drive is None else (drive,)
         offered = each(lambda d: library.local[d].offers(fit), drives)
-        for d, offers in zip(drives, offered, strict=True):
-            for offer in offers.values():
-                effect: type[CatalogueEffect] = offer.trial.effect
-                if (effect, d) not in taken:
-                    price = library.prices.of_placement(
-                        effect, library.local[d].trials[effect.name])
-                    found.setdefault(effect, []).append(
-                        (offer.gain - price, partial(library.full, offer, d)))
-        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Placement]] = {}
-        for placement, gain in library.shared_offers(fit) if drive is None else ():
-            key = (placement.term.effect, placement.drive)
-            if key not in taken:
-                net = gain - placement.price
-                if key not in best or net > best[key][0]:
-                    best[key] = (net, placement)
-        for (effect, _), (net, placement) in best.items():
-            found.setdefault(effect, []).append((net, partial(_same, placement)))
+        offers = [offer for of_drive in offered for offer in of_drive.values()]
+        offers += library.shared_offers(fit) if drive is None else []
+        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Component]] = {}
+        for one, gain in offers:
+            key = (one.effect, one.drive)
+            net = gain - self.prices.of_component(one.effect, library.tried(one))
+            if key not in taken and (key not in best or net > best[key][0]):
+                best[key] = (net, one)
+        found: dict[type[CatalogueEffect], list[tuple[float, Component]]] = {}
+        for (effect, _), scored in best.items():
+            found.setdefault(effect, []).append(scored)
         return found
 
     def _best_drives(
-        self, effect: type[CatalogueEffect],
-        found: list[tuple[float, Callable[[], Placement]]], old: EffectCandidate | None,
-    ) -> tuple[float, list[Callable[[], Placement]]]:
+        self, effect: type[CatalogueEffect], found: list[tuple[float, Component]],
+        old: EffectCandidate | None,
+    ) -> tuple[float, list[Component]]:
         """Return the drives on which an effect pays, and the score of all together."""
-        prices = self.library.prices
+        prices = self.prices
         found = sorted(found, key=lambda one: -one[0])
         if not issubclass(effect, DriveEffect):
             return found[0][0] - prices.of_name(), [found[0][1]]
-        there = len(old.placements) if old else 0
+        there = len(old.components) if old else 0
         before = prices.of_drives(there) if there else -prices.of_name()
         nets = np.cumsum([net for net, _ in found])
         scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
         best = int(np.argmax(scores))
-        return float(scores[best]), [make for _, make in found[:best + 1]]
-
-    def _joined(self, base: CandidateSet, effect: type[CatalogueEffect],
-                chosen: Sequence[Callable[[], Placement]], old: EffectCandidate | None,
-                ) -> Callable[[], Candidates]:
-        def make() -> Candidates:
-            placements = [*(old.placements if old else ()), *(one() for one in chosen)]
-            kept = tuple(c for c in base.candidates if c is not old)
-            return (*kept, self.library.candidate(effect, placements))
-        return make
-
-
-def _same(placement: Placement) -> Placement:
-    return placement
+        return float(scores[best]), [one for _, one in found[:best + 1]]
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:

@@ -21,6 +21,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
+    Component,
     EffectCandidate,
     UnknownCandidate,
     set_key,
@@ -92,8 +93,8 @@ class Search(ScannedSets):
         """Whether the best set has an effect that bends columns, and these are not bent by it."""
         point = self.design.point
         known = {(one.effect, one.drive) for one in point.effects} if point else set()
-        return any(c.effect.bends_columns and (c.effect, placement.drive) not in known
-                   for c in self.best.effects for placement in c.placements)
+        return any(c.effect.bends_columns and (c.effect, one.drive) not in known
+                   for c in self.best.effects for one in c.components)
 
     def _descend(self, with_patterns: bool, begin: float) -> None:
         """Move from the best set to better neighbours until there is none."""
@@ -105,9 +106,9 @@ class Search(ScannedSets):
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._try(self._replacements(self.best))
-                if self.best.cost > before - LEAST_IMPROVEMENT:
-                    return
             self._simplify()
+            if self.best.cost > before - LEAST_IMPROVEMENT:
+                return
             if self.is_beyond_point:
                 self._try(self._other_bending(self.best))
                 return
@@ -182,10 +183,9 @@ class Search(ScannedSets):
             if drives is None:
                 chosen = self._best_drives(effect, found, None)[1] if found else []
             else:
-                chosen = [make for _, make in found if make().drive in drives]
+                chosen = [one for _, one in found if one.drive in drives]
             if chosen:
-                candidate = self.library.candidate(effect, [make() for make in chosen])
-                self.refined(self.evaluate((candidate,)))
+                self.refined(self.evaluate((EffectCandidate.of(chosen),)))
         while True:
             alone = [one for one in self._evaluated.values() if one.candidates]
             if not alone:
@@ -204,28 +204,24 @@ class Search(ScannedSets):
         """Return the set on all drives where its effects pay, in shapes that scans find."""
         for candidates in self.proposals(found, effects={c.effect for c in found.effects}):
             found = min(found, self.evaluate(candidates), key=lambda one: one.cost)
-        for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.placements
+        for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.components
                           if c.effect.shape and one.drive is not None]:
             candidate = next(c for c in found.effects if c.effect is effect)
-            others = [one for one in candidate.placements if one.drive != d]
+            others = [one for one in candidate.components if one.drive != d]
             rest = tuple(c for c in found.candidates if c is not candidate)
-            less = (*rest, self.library.candidate(effect, others)) if others else rest
+            less = (*rest, EffectCandidate.of(others)) if others else rest
             offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
             if effect.name in offers:
-                placements = [*others, self.library.full(offers[effect.name], d)]
-                found = min(found, self.evaluate(
-                    (*rest, self.library.candidate(effect, placements))),
-                    key=lambda one: one.cost)
+                found = min(found, self.evaluate((*rest, EffectCandidate.of(
+                    [*others, offers[effect.name][0]]))), key=lambda one: one.cost)
         return self.refined(found)
 
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
-        """Yield the candidate with other coefficients of one placement."""
-        for placement in candidate.placements:
+        """Yield the candidate with other coefficients of one component."""
+        for component in candidate.components:
             for names in candidate.effect.variants:
-                if names != placement.names:
-                    rest = [one for one in candidate.placements if one is not placement]
-                    yield self.library.candidate(candidate.effect, [
-                        *rest, self.library.placement(placement.term, names)])
+                if names != component.names:
+                    yield self._with(candidate, component, replace(component, names=names))
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
@@ -258,15 +254,13 @@ class Search(ScannedSets):
                 if size == 1 or any(isinstance(c, EffectCandidate) for c in gone):
                     rests.append((tuple(c for c in best.candidates if c not in gone), None))
         for candidate in best.effects:
-            for placement in candidate.placements if len(candidate.placements) > 1 else ():
+            for component in candidate.components if len(candidate.components) > 1 else ():
                 # On one of its drives it, or some of its coefficients, may stand for another.
-                others = [one for one in candidate.placements if one is not placement]
-                fewer = [names for names in candidate.effect.variants
-                         if set(names) < set(placement.names)]
-                for kept in ([], *([self.library.placement(placement.term, names)]
-                                   for names in fewer)):
-                    less = self.library.candidate(candidate.effect, [*others, *kept])
-                    rests.append((self._exchanged(best, candidate, less), placement.drive))
+                fewer = [replace(component, names=names) for names in candidate.effect.variants
+                         if set(names) < set(component.names)]
+                for kept in ([], *([one] for one in fewer)):
+                    less = self._with(candidate, component, *kept)
+                    rests.append((self._exchanged(best, candidate, less), component.drive))
         for rest, drive in rests:
             base = self.at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
@@ -295,12 +289,11 @@ class Search(ScannedSets):
         effect = candidate.effect
         if not issubclass(effect, DriveEffect) or not effect.shape:
             return
-        shapes = [effect.alternatives(placement.term.shape) for placement in candidate.placements]
+        shapes = [effect.alternatives(one.parameters) for one in candidate.components]
         for number in range(min(map(len, shapes))):
-            placements = [self.library.placed(
-                effect, placement.drive, others[number], placement.names)
-                for placement, others in zip(candidate.placements, shapes, strict=True)]
-            yield self.library.candidate(effect, placements)
+            yield EffectCandidate.of(
+                Component.of(effect, one.drive, others[number], one.names)
+                for one, others in zip(candidate.components, shapes, strict=True))
 
     def _simplify(self) -> None:
         """Drop candidates and drives, and try variants, as long as that lowers the cost."""
@@ -320,24 +313,28 @@ class Search(ScannedSets):
                 continue
             effect = candidate.effect
             # The drives where it matters most; fewer of them may be better though one less is not.
-            strength = {one: self.drop_cost(best, one) for one in candidate.placements}
-            ranked = sorted(candidate.placements, key=lambda one: -strength[one])
+            strength = {one: self.drop_cost(best, one) for one in candidate.components}
+            ranked = sorted(candidate.components, key=lambda one: -strength[one])
             for count in range(1, len(ranked)):
                 if sum(strength[one] for one in ranked[count:]) < 3 * self.decisions.rival_margin:
                     yield self._exchanged(best, candidate,
-                                          self.library.candidate(effect, ranked[:count]))
-            if len({one.names for one in candidate.placements}) > 1:
+                                          EffectCandidate.of(ranked[:count]))
+            if len({one.names for one in candidate.components}) > 1:
                 for names in effect.variants:
-                    yield self._exchanged(best, candidate, self.library.candidate(effect, [
-                        self.library.placement(one.term, names) for one in candidate.placements]))
-            for placement in candidate.placements:
+                    yield self._exchanged(best, candidate, EffectCandidate.of(
+                        replace(one, names=names) for one in candidate.components))
+            for component in candidate.components:
                 for names in effect.variants:
                     # The others take part in every scan.
-                    if names != placement.names and not set(names) <= set(effect.scanned):
-                        other = self.library.placement(placement.term, names)
-                        rest = [one for one in candidate.placements if one is not placement]
-                        yield self._exchanged(best, candidate, self.library.candidate(
-                            effect, [*rest, other]))
+                    if names != component.names and not set(names) <= set(effect.scanned):
+                        yield self._exchanged(best, candidate, self._with(
+                            candidate, component, replace(component, names=names)))
+
+    @staticmethod
+    def _with(candidate: EffectCandidate, gone: Component, *instead: Component) -> EffectCandidate:
+        """Return the candidate with something else, or nothing, for one of its components."""
+        return EffectCandidate.of([*(one for one in candidate.components if one is not gone),
+                                   *instead])
 
     @staticmethod
     def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:

@@ -125,7 +125,8 @@ class PatternLibrary:
 
     def family_block(self, family: Family) -> Block:
         """Return all columns of a family as one block: any curve along its variable."""
-        return self.regression.transformed_block({self.d: self.series.transform(family.columns)})
+        return self.regression.transformed_block(
+            {self.d: self.series.transform(family.columns.astype(float))})
 
     def price(self, family: Family, drives: int = 1) -> float:
         """Return the price of a pattern of a family: that it is unknown, where, and which."""
