@@ -72,7 +72,12 @@ class _Scanned:
         taken, side = self.columns.projected(fit)
         S = np.tensordot(weights, self.gram, 1) - taken @ fit.covariance @ taken.T
         b = side.reshape(-1, 2) if self.family.paired else (self.family.weights @ side)[:, None]
-        return term_gains(self.of_patterns(self.family, S), b, self.precision, np.zeros_like(b))
+        # A pattern that no sample shows has no scale, and gains nothing.
+        shown = np.einsum('pkk->p', self.precision) > 0
+        found = np.full(len(b), -np.inf)
+        found[shown] = term_gains(self.of_patterns(self.family, S)[shown], b[shown],
+                                  self.precision[shown], np.zeros_like(b[shown]))
+        return found
 
 
 class PatternLibrary:
