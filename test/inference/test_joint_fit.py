@@ -143,6 +143,5 @@ def test_what_remains_is_the_error_less_all_that_is_fitted() -> None:
                 rest = rest - fit.coefficients[k] * series.transform(column.rows[d])
         for block in blocks:
             if d in block.rows:
-                size = np.ones(1) if block.is_fixed else fit.coefficients[fit.places[block]]
-                rest = rest - size @ block.rows[d]
+                rest = rest - fit.coefficients[fit.places[block]] @ block.rows[d]
         assert regression.remaining(fit, d) == pytest.approx(rest, abs=1e-9)
