@@ -5,11 +5,16 @@ import importlib.util
 import subprocess
 import sys
 from glob import glob
+from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 from setuptools.command.install import install
 
 package_name = 'pprs_dynamics'
+# Version, people and addresses stand in package.xml alone.
+DESCRIPTION = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
+MAINTAINER = DESCRIPTION.find('maintainer')
 
 
 class InstallCompiled(install):
@@ -29,11 +34,12 @@ class InstallCompiled(install):
 
 setup(
     name=package_name,
-    version='0.1.0',
-    description='Dynamics of the 3-PPRS parallel robot with friction in every joint',
-    license='Apache-2.0',
-    maintainer='The pprs_dynamics founders',
-    maintainer_email='pprs-dynamics@example.org',
+    version=DESCRIPTION.findtext('version'),
+    description=DESCRIPTION.findtext('description'),
+    license=DESCRIPTION.findtext('license'),
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get('email'),
+    project_urls={url.get('type'): url.text for url in DESCRIPTION.findall('url')},
     packages=find_packages(include=[package_name, f'{package_name}.*']),
     package_data={package_name: ['py.typed', 'config/*.yaml', 'app/browser/*',
                                  'app/report/plotly-basic.*', 'app/report/uplot.*']},

@@ -10,9 +10,11 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+import pprs_dynamics
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
@@ -174,3 +176,8 @@ def test_no_page_is_left_with_a_gap_where_a_figure_belongs() -> None:
     gaps = {page.name: re.findall(r'@[A-Z]+@', page.read_text(encoding='utf-8'))
             for page in pages if not page.stem.endswith('_text')}
     assert not {name: found for name, found in gaps.items() if found}
+
+
+def test_the_version_is_that_of_the_package_description() -> None:
+    described = ElementTree.parse(PACKAGE.parent / 'package.xml').getroot()
+    assert described.findtext('version') == pprs_dynamics.__version__
