@@ -48,6 +48,9 @@ setup(
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', glob('config/*.yaml') + glob('config/*.urdf')),
         (f'share/{package_name}/config/ros2_control', glob('config/ros2_control/*.yaml')),
+        (f'share/{package_name}/config/schemas', glob('config/schemas/*.json')),
+        (f'share/{package_name}/config/plotjuggler', glob('config/plotjuggler/*.xml')),
+        (f'share/{package_name}/config/foxglove', glob('config/foxglove/*.json')),
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
     ],
     python_requires='>=3.11',
@@ -74,6 +77,7 @@ setup(
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',
                  'cosmic-ray>=8.3',  # make mutants
+                 'jsonschema>=4',  # ~/status against its schema
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
                  'colcon-common-extensions', 'colcon-ros',
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.

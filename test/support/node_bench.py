@@ -9,8 +9,10 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+import jsonschema
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -18,6 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
+STATUS = json.loads((Path(__file__).parents[2] / 'config/schemas/status.schema.json').read_text())
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -54,9 +57,10 @@ class Bench:
         return found
 
     def follow_status(self, topic: str) -> None:
-        """Keep every status of a node, decoded, in `status`."""
+        """Keep every status of a node, decoded and as its schema says, in `status`."""
         self.probe.create_subscription(
-            String, topic, lambda message: self.status.append(json.loads(message.data)), LATCHED)
+            String, topic, lambda message: self.status.append(checked_status(message.data)),
+            LATCHED)
 
     def spin_until(self, predicate: Callable[[], Any], timeout: float = 10.0) -> bool:
         """Spin until the predicate holds; False where it does not in time."""
@@ -70,6 +74,13 @@ class Bench:
     def spin_for(self, duration: float) -> None:
         """Spin for a time [s], e.g. to show that nothing comes."""
         self.spin_until(lambda: False, duration)
+
+
+def checked_status(data: str) -> dict[str, Any]:
+    """Return a status, or raise ValidationError where it is not as the schema says."""
+    status: dict[str, Any] = json.loads(data)
+    jsonschema.validate(status, STATUS)
+    return status
 
 
 @contextmanager
