@@ -12,7 +12,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, require_known, truth
 from pprs_dynamics.simulation.engine_model import load_engine
+from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 RATE = 100.0  # [Hz]
@@ -100,8 +100,8 @@ class ArmEngine:
         root = next(name for name in structure.description.links if name not in hung)
         self.root = structure.links[root][1]
         self.gravity = np.asarray(robot.gravity, dtype=float)
-        self.joints = {int(k): name for k in range(self.model.njnt)
-                       if (name := self.model.joint(k).name)}
+        self.state = EngineState(mujoco, self.model, structure, self.root)
+        self.data = self.state.data
 
     def _set_body(self, body: int, parameters: Array) -> None:
         mass = float(parameters[0])
@@ -151,61 +151,18 @@ class ArmEngine:
         passive : mapping of str to (N,) array, optional
             Efforts against friction of passive joints, by joint.
         """
-        structure = self.structure
         m = self.robot.at(motion.position, motion.velocity, motion.acceleration).motion
         self.model.opt.gravity[:] = self.root.R.T @ (self.gravity if gravity is None else gravity)
         found = np.empty_like(motion.position)
-        data, dofs = self.data, [int(self.model.joint(name).dofadr[0])
-                                 for name in structure.drives]
+        data = self.data
         for k in range(len(motion)):
-            self._set_state(m, k)
+            self.state.put(m, k)
             self.engine.mj_inverse(self.model, data)
             needed = data.qfrc_inverse.copy()
             for name, effort in (passive or {}).items():
                 needed[int(self.model.joint(name).dofadr[0])] += effort[k]
-            rows = self._constraints()
-            if not len(rows) and len(dofs) == self.model.nv:
-                found[k] = needed[dofs]
-                continue
-            columns = np.zeros((self.model.nv, len(dofs) + len(rows)))
-            columns[dofs, np.arange(len(dofs))] = 1.0
-            columns[:, len(dofs):] = rows.T
-            # Joints that stand are driven by whatever holds them.
-            moved = np.setdiff1d(np.arange(self.model.nv), self._standing)
-            found[k] = np.linalg.lstsq(columns[moved], needed[moved], rcond=1e-10)[0][:len(dofs)]
+            found[k] = self.state.driven(needed, self._constraints())
         return found
-
-    @cached_property
-    def _standing(self) -> Array:
-        """Degrees of freedom of joints that are locked or held."""
-        structure = self.structure
-        held = set(structure.mobility.held.tolist())
-        standing = [int(self.model.jnt_dofadr[k]) for k, name in self.joints.items()
-                    if name in structure.description.joints and self.model.jnt_type[k] != 0 and (
-                        name not in structure.rows
-                        or int(structure.tables.coordinate[structure.rows[name]]) in held)]
-        return np.array(standing, dtype=int)
-
-    def _set_state(self, m: Any, k: int) -> None:
-        t, data = self.structure.tables, self.data
-        data.qpos[:], data.qvel[:], data.qacc[:] = self.model.qpos0, 0.0, 0.0
-        for at, name in self.joints.items():
-            q, v = int(self.model.jnt_qposadr[at]), int(self.model.jnt_dofadr[at])
-            if self.model.jnt_type[at] == self.engine.mjtJoint.mjJNT_FREE:
-                row, _ = self.structure.links[self.structure.description.joints[name].child]
-                R = self.root.R.T @ m.R[k, row]
-                quaternion = np.empty(4)
-                self.engine.mju_mat2Quat(quaternion, R.ravel())
-                data.qpos[q:q + 3] = self.root.R.T @ (m.p[k, row] - self.root.p)
-                data.qpos[q + 3:q + 7] = quaternion
-                for own, (linear, angular) in ((data.qvel, (m.u, m.w)), (data.qacc, (m.ud, m.wd))):
-                    own[v:v + 3] = self.root.R.T @ linear[k, row]
-                    own[v + 3:v + 6] = m.R[k, row].T @ angular[k, row]
-            elif name in self.structure.rows:
-                row = self.structure.rows[name]
-                c, ratio = t.coordinate[row], t.ratio[row]
-                data.qpos[q] = ratio * m.q[k, c] + t.offset[row]
-                data.qvel[v], data.qacc[v] = ratio * m.v[k, c], ratio * m.a[k, c]
 
     def _constraints(self) -> Array:
         """Return derivatives of the closures and couplings, (r, nv)."""

@@ -31,8 +31,8 @@ from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
 # Each a module of this folder with a docstring, add_arguments and run.
-COMMANDS = ('adopt', 'compare', 'diagnose', 'fit', 'history', 'info', 'next-experiment',
-            'reproduce', 'simulate', 'survey', 'trend', 'workbench')
+COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
+            'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""pprs export: the model as a simulator's file, and what that cannot hold.
+
+The file is replayed in MuJoCo by inverse dynamics, against the model's own forces.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from pprs_dynamics.app.commands.arguments import output_file
+from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.recordings import read_recordings
+from pprs_dynamics.app.report.progress import progress_bar
+from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.simulation.export.exported_robot import export_robot
+from pprs_dynamics.simulation.export.expressed import FORMATS, express
+from pprs_dynamics.simulation.export.replay import (
+    Replay,
+    Replayed,
+    replay_excitation,
+    replay_recordings,
+)
+from pprs_dynamics.simulation.export.writers import written
+from pprs_dynamics.system.output_files import write_text
+
+ENDINGS = ('.urdf', '.xml', '.mjcf')
+FEW = 8  # names that the terminal lists
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('file', metavar='MODEL', help='model file')
+    parser.add_argument('--to', choices=FORMATS, required=True, help='format of the file')
+    parser.add_argument('--output', metavar='FILE', type=output_file(*ENDINGS), required=True,
+                        help='.urdf, or .xml and .mjcf')
+    parser.add_argument('--recording', dest='recordings', metavar='RECORDING', action='append',
+                        default=[], help='its motion is replayed (default: a short excitation); '
+                        'may be repeated')
+    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a '
+                        'recording holds several')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    screen = console()
+    model = load_model(options.file)
+    recordings = read_recordings(options, screen, model)
+    expressed = express(model, options.to)
+    robot = export_robot(expressed, options.to)
+    text = written(robot, options.to)
+    replay = Replay(expressed, robot, text, options.to)
+    with progress_bar(screen, 'replaying') as progress:
+        found = (replay_recordings(model, replay, recordings, progress) if recordings
+                 else replay_excitation(model, replay))
+    write_text(options.output, text)
+    if options.json:
+        write_json(options.json, {'format': options.to, 'output': options.output,
+                                  'not_expressed': list(expressed.not_expressed),
+                                  'replayed': [recording.name for recording in recordings],
+                                  **found.to_dict()})
+    _say(screen, found, expressed.not_expressed)
+    screen.print(f'{options.to}: {shown(options.output)}')
+    return 0
+
+
+def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
+    from rich.table import Table
+
+    table = Table(title='Replayed in MuJoCo: the model\'s efforts less those of the file, rms',
+                  title_justify='left')
+    for name in ('drive', 'effort', 'error', 'expected'):
+        table.add_column(name, justify='left' if name == 'drive' else 'right')
+    for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
+                                    found.expected, strict=True):
+        table.add_row(shown(name), *(f'{number:.4g} {unit}' for number in numbers))
+    screen.print(table)
+    if found.recorded is not None:
+        by_file, by_model = found.recorded
+        screen.print(f'measured less the file {by_file:.4g}, less the model {by_model:.4g}, rms')
+    more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
+    screen.print(f'not expressed: {shown(", ".join(left[:FEW]) or "nothing")}{more}')

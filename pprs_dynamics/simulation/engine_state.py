@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A mechanism's motion in MuJoCo: its joints by name, and what the drives do when loops hold."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.description import Frame
+from pprs_dynamics.physics.mechanism.structure import Structure
+
+LEAST_SINGULAR = 1e-10  # of the largest singular value; closures may say a thing twice
+
+
+class EngineState:
+    """The state of a model of MuJoCo whose joints are those of a structure.
+
+    Parameters
+    ----------
+    engine : module
+        MuJoCo.
+    model : mujoco.MjModel
+    structure : Structure
+    root : Frame
+        MuJoCo's world in the structure's base.
+    """
+
+    def __init__(self, engine: Any, model: Any, structure: Structure, root: Frame) -> None:
+        self.engine, self.model, self.data = engine, model, engine.MjData(model)
+        self.structure, self.root = structure, root
+        self.joints = {int(k): name for k in range(model.njnt) if (name := model.joint(k).name)}
+
+    @cached_property
+    def drives(self) -> list[int]:
+        """Degrees of freedom of the drives."""
+        return [int(self.model.joint(name).dofadr[0]) for name in self.structure.drives]
+
+    @cached_property
+    def _standing(self) -> Array:
+        """Degrees of freedom of joints that are locked or held."""
+        structure = self.structure
+        held = set(structure.mobility.held.tolist())
+        standing = [int(self.model.jnt_dofadr[k]) for k, name in self.joints.items()
+                    if name in structure.description.joints and self.model.jnt_type[k] != 0 and (
+                        name not in structure.rows
+                        or int(structure.tables.coordinate[structure.rows[name]]) in held)]
+        return np.array(standing, dtype=int)
+
+    def put(self, m: Any, k: int) -> None:
+        """Put positions, velocities and accelerations of sample k of a motion in place."""
+        t, data = self.structure.tables, self.data
+        data.qpos[:], data.qvel[:], data.qacc[:] = self.model.qpos0, 0.0, 0.0
+        for at, name in self.joints.items():
+            q, v = int(self.model.jnt_qposadr[at]), int(self.model.jnt_dofadr[at])
+            if self.model.jnt_type[at] == self.engine.mjtJoint.mjJNT_FREE:
+                row, _ = self.structure.links[self.structure.description.joints[name].child]
+                R = self.root.R.T @ m.R[k, row]
+                quaternion = np.empty(4)
+                self.engine.mju_mat2Quat(quaternion, R.ravel())
+                data.qpos[q:q + 3] = self.root.R.T @ (m.p[k, row] - self.root.p)
+                data.qpos[q + 3:q + 7] = quaternion
+                for own, (linear, angular) in ((data.qvel, (m.u, m.w)), (data.qacc, (m.ud, m.wd))):
+                    own[v:v + 3] = self.root.R.T @ linear[k, row]
+                    own[v + 3:v + 6] = m.R[k, row].T @ angular[k, row]
+            elif name in self.structure.rows:
+                row = self.structure.rows[name]
+                c, ratio = t.coordinate[row], t.ratio[row]
+                data.qpos[q] = ratio * m.q[k, c] + t.offset[row]
+                data.qvel[v], data.qacc[v] = ratio * m.v[k, c], ratio * m.a[k, c]
+
+    def driven(self, needed: Array, rows: Array) -> Array:
+        """Return the drives' efforts, (D,), that with forces of closures give what is needed.
+
+        Parameters
+        ----------
+        needed : (nv,) array
+            Efforts of all joints of the tree.
+        rows : (r, nv) array
+            Derivatives of the closures.
+        """
+        dofs = self.drives
+        if not len(rows) and len(dofs) == self.model.nv:
+            return needed[dofs]
+        columns = np.zeros((self.model.nv, len(dofs) + len(rows)))
+        columns[dofs, np.arange(len(dofs))] = 1.0
+        columns[:, len(dofs):] = rows.T
+        # Joints that stand are driven by whatever holds them.
+        moved = np.setdiff1d(np.arange(self.model.nv), self._standing)
+        found: Array = np.linalg.lstsq(columns[moved], needed[moved],
+                                       rcond=LEAST_SINGULAR)[0][:len(dofs)]
+        return found

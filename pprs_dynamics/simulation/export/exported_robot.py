@@ -1,0 +1,289 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Any model as a mechanism: a tree of bodies with closures, for files of simulators.
+
+The 3-PPRS becomes three chains and a platform. In MJCF the platform is free and held by three
+balls; in URDF it hangs on the first chain by three hinges in a row, so that programs that know no
+free joints draw it, and two balls are cut.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError, SingularityError
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.description import (
+    FIXED,
+    FLOATING,
+    PARAMETERS,
+    PRISMATIC,
+    REVOLUTE,
+    Description,
+    Frame,
+    Joint,
+    Loop,
+    body_at,
+    rotation_of,
+)
+from pprs_dynamics.physics.mechanism.linkage import survey
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.structure import build_structure
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.axis_model import AxisModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.robot import AXIS, DRIVES, Robot
+from pprs_dynamics.simulation.export.expressed import (
+    STANDARD_GRAVITY,
+    URDF,
+    Expressed,
+)
+
+HOME_HEIGHT = 0.5  # [m], of the 3-PPRS' platform
+FREE, HINGE, SLIDE = 'free', 'hinge', 'slide'
+# Simulators want some mass of everything that moves [kg, kg m^2]; ten decimals below real ones.
+LEAST = 1e-12
+SOUND = 1e-9  # of the largest moment of inertia, by which others may break the triangle's rule
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body and the joint that it hangs on.
+
+    Parameters
+    ----------
+    row : int
+        Of the mechanism's tables.
+    name, joint : str
+    kind : {'free', 'hinge', 'slide'}
+    parent : int
+        Row, 0 for the base.
+    frame : Frame
+        In the parent's, at position 0; of a free one at home.
+    axis : (3,) array
+        In the body's frame.
+    mass : float
+        [kg]
+    centre : (3,) array
+        [m]
+    moments : (3,) array
+        Principal moments of inertia about the centre [kg m^2].
+    axes : (3, 3) array
+        Their axes as columns.
+    home : float
+        Position of the joint.
+    """
+
+    row: int
+    name: str
+    joint: str
+    kind: str
+    parent: int
+    frame: Frame
+    axis: Array
+    mass: float
+    centre: Array
+    moments: Array
+    axes: Array
+    home: float
+
+    @property
+    def tensor(self) -> Array:
+        """Inertia about the centre in the body's axes, (3, 3) [kg m^2]."""
+        tensor: Array = self.axes @ np.diag(self.moments) @ self.axes.T
+        return tensor
+
+
+@dataclass(frozen=True)
+class ExportedRobot:
+    """A robot as it stands in a file.
+
+    Parameters
+    ----------
+    name : str
+    mechanism : Mechanism
+    joints : dict of str to dict
+        See `Expressed`.
+    bodies : tuple of Body
+        Parents first.
+    """
+
+    name: str
+    mechanism: Mechanism
+    joints: dict[str, dict[str, float]]
+    bodies: tuple[Body, ...]
+
+    @property
+    def frames(self) -> Iterator[tuple[str, int, Frame]]:
+        """Links without a joint of their own: name, row and frame there."""
+        structure = self.mechanism.structure
+        own = {body.name for body in self.bodies} | {structure.moved_by[0]}
+        for name, (row, frame) in structure.links.items():
+            if name not in own:
+                yield name, row, frame
+
+
+def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
+    """Return what a file of a format says.
+
+    Raises
+    ------
+    ModelError
+        For bodies that no real ones are, and closures that no format has.
+    """
+    model = expressed.model
+    if isinstance(model, DriveModel):
+        name, mechanism = 'three_pprs', _platform(_loaded(model), model, kind)
+    elif isinstance(model, ArmModel):
+        name, mechanism = model.block, _loaded(model)
+    else:
+        name, mechanism = 'single_axis', _axis(model)
+    return ExportedRobot(name, mechanism, expressed.joints, tuple(_bodies(mechanism)))
+
+
+def _loaded(model: DriveModel | ArmModel) -> Any:
+    """Return the robot with the effects on its bodies in them."""
+    robot: Any = model.robot
+    for effect in model.effects:
+        if isinstance(effect, BodyEffect):
+            robot = effect.changed(robot)
+    return robot
+
+
+def _bodies(mechanism: Mechanism) -> Iterator[Body]:
+    structure, t = mechanism.structure, mechanism.structure.tables
+    _, _, home = survey(t, structure.home, np.arange(len(structure.home)))
+    found: dict[int, tuple[str, str, int]] = {}
+    for joint in structure.description.joints.values():
+        row = structure.links[joint.child][0]
+        if joint.kind == FLOATING and structure.moved_by[row] == joint.child:
+            parent = structure.links[joint.parent][0]
+            if parent:
+                raise ModelError('robot.urdf', joint.name, 'hang on the base: a free body on a '
+                                 'moving one cannot be exported')
+            found[row] = (joint.name, FREE, parent)
+        elif structure.rows.get(joint.name) is not None:
+            row = structure.rows[joint.name]
+            found[row] = (joint.name, HINGE if t.turns[row] else SLIDE, int(t.parent[row]))
+    for row in sorted(found):
+        joint_name, kind, parent = found[row]
+        c = int(t.coordinate[row])
+        frame = (Frame(home.R[0, row], home.p[0, row]) if kind == FREE
+                 else Frame(t.place_R[row], t.place_p[row]))
+        name = structure.moved_by[row]
+        yield Body(row, name, joint_name, kind, parent, frame, t.axis[row],
+                   *_inertia(name, mechanism.by_joint[row]),
+                   float(t.ratio[row] * structure.home[c] + t.offset[row]))
+
+
+def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
+    """Return mass, centre, principal moments and their axes."""
+    mass = float(parameters[0])
+    if not mass > 0:
+        return LEAST, np.zeros(3), np.full(3, LEAST), np.eye(3)
+    centre = parameters[1:4] / mass
+    xx, xy, yy, xz, yz, zz = parameters[4:]
+    about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+             - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
+    moments, axes = np.linalg.eigh(about)
+    slack = SOUND * max(float(np.abs(parameters[4:]).max()), LEAST)
+    if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
+        raise ModelError(f'inertia of {name}', tuple(float(value) for value in moments),
+                         'be principal moments of a real body, of which none is negative and each '
+                         'two sum to at least the third: no simulator takes another')
+    axes = axes.copy()
+    axes[:, 0] *= np.linalg.det(axes)
+    moments = np.maximum(moments, LEAST)
+    # What rounding left of the triangle's rule, which simulators take to the letter.
+    moments[2] = min(moments[2], moments[0] + moments[1])
+    return mass, centre, moments, axes
+
+
+def _axis(model: AxisModel) -> Mechanism:
+    """Return the axis, on the slope where gravity along it is what the model says."""
+    g = max(abs(model.gravity), -STANDARD_GRAVITY[2])
+    up = -model.gravity / g
+    direction = np.array([math.sqrt(1 - up * up), 0.0, up])
+    carriage = body_at(model.mass, (0.0, 0.0, 0.0), np.zeros((3, 3)))
+    joint = Joint(AXIS, PRISMATIC, 'base', 'carriage', Frame(), direction)
+    description = Description('', {'base': np.zeros(PARAMETERS), 'carriage': carriage},
+                              {AXIS: joint}, '')
+    structure = build_structure(description, 'base', 'carriage', (AXIS,))
+    rows = np.array([structure.rows[AXIS]])
+    return Mechanism(structure, rows, structure.inertial[rows], np.zeros(1), (0.0, 0.0, -g))
+
+
+def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
+    """Return the 3-PPRS."""
+    geometry, masses = robot.geometry, robot.masses
+    R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
+    platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
+    links = {'base': np.zeros(PARAMETERS)}
+    joints: dict[str, Joint] = {}
+    loops: list[Loop] = []
+    home: dict[str, float] = {}
+    turned = {}
+    e_x, e_y, e_z = np.eye(3)
+
+    def hang(joint: str, joint_kind: str, parent: str, child: str, frame: Frame, axis: Array,
+             ) -> None:
+        joints[joint] = Joint(joint, joint_kind, parent, child, frame, axis)
+
+    for i in range(3):
+        delta, beta = geometry.chain_angles[i], geometry.platform_angles[i]
+        n = i + 1
+        mass = masses.rods[i]
+        across = mass * l ** 2 / 12
+        links[f'slide_{n}'] = body_at(masses.slides[i], (0.0,) * 3, np.zeros((3, 3)))
+        links[f'lift_{n}'] = body_at(masses.lifts[i], (0.0,) * 3, np.zeros((3, 3)))
+        links[f'rod_{n}'] = body_at(mass, (-l / 2, 0.0, 0.0), np.diag([0.0, across, across]))
+        foot = Frame.of((R * math.cos(delta), R * math.sin(delta), 0.0), (0.0, 0.0, delta))
+        hang(f'slide_{n}', PRISMATIC, 'base', f'slide_{n}', foot, e_y)
+        hang(f'lift_{n}', PRISMATIC, f'slide_{n}', f'lift_{n}', Frame(), e_z)
+        hang(f'hinge_{n}', REVOLUTE, f'lift_{n}', f'rod_{n}', Frame(), e_y)
+        cos_u = (R - r * math.cos(beta - delta)) / l
+        if abs(cos_u) >= 1:
+            raise SingularityError(0, f'the rod of chain {n} does not reach at home',
+                                   'the unturned platform must close above the base')
+        u = geometry.elbow_sign * math.acos(cos_u)
+        home |= {f'slide_{n}': r * math.sin(beta - delta),
+                 f'lift_{n}': HOME_HEIGHT - l * math.sin(u), f'hinge_{n}': u}
+        turned[n] = rotation_of((0.0, 0.0, delta)) @ rotation_of((0.0, u, 0.0))
+        end = Frame(p=np.array([r * math.cos(beta), r * math.sin(beta), 0.0]))
+        loops.append(Loop(f'ball_{n}', 'spherical', f'rod_{n}', Frame(p=np.array([-l, 0.0, 0.0])),
+                          'platform', end))
+    links['platform'] = platform
+    if kind == URDF:
+        ball, *loops = loops
+        at = Frame(turned[1].T, ball.frame_a.p)
+        for letter, parent, child, axis in (
+                ('x', 'rod_1', 'ball_1_x', e_x), ('y', 'ball_1_x', 'ball_1_y', e_y),
+                ('z', 'ball_1_y', 'ball_1_z', e_z)):
+            links[child] = np.zeros(PARAMETERS)
+            hang(f'ball_1_{letter}', REVOLUTE, parent, child, at, axis)
+            at = Frame()
+            home[f'ball_1_{letter}'] = 0.0
+        hang('platform_mount', FIXED, 'ball_1_z', 'platform', ball.frame_b.inverse, e_x)
+        poses = {}
+    else:
+        hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
+        poses = {'platform': Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))}
+    strokes = dict(zip(DRIVES, (*[model.limits.slide_stroke] * 3, *[model.limits.lift_stroke] * 3),
+                       strict=True))
+    efforts = dict(zip(DRIVES, model.effort_limits.tolist(), strict=True))
+    joints = {name: replace(joint, lower=strokes[name][0], upper=strokes[name][1],
+                            effort=efforts[name]) if name in strokes else joint
+              for name, joint in joints.items()}
+    description = Description('', links, joints, '')
+    structure = build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)
+    bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
+    return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
+                     robot.gravity)
+

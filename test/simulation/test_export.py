@@ -1,0 +1,291 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Exported files: simulators make of them what the model says, and what they lack is named."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import made_up_arm as arm
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+from robots_with_loops import five_bar
+
+from pprs_dynamics import ArmModel, DriveModel
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.simulation.arm_run import draw_motion
+from pprs_dynamics.simulation.export.exported_robot import export_robot
+from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
+from pprs_dynamics.simulation.export.writers import closures, written
+
+EXACT = 1e-9  # of the largest effort
+NO_LOADS = {'friction.drives.coulomb': (0.0,) * 6, 'friction.revolute.coulomb': 0.0,
+            'friction.spherical.coulomb': 0.0, 'friction.spherical.viscous': 0.0}
+
+
+def text_of(model: Any, kind: str) -> str:
+    return written(export_robot(express(model, kind), kind), kind)
+
+
+def exported(model: str | Path, kind: str, folder: Path, *more: str) -> tuple[Path, dict[str, Any]]:
+    """Run the command and return the file and the JSON."""
+    file, result = folder / f'robot.{"urdf" if kind == URDF else "xml"}', folder / 'result.json'
+    assert main(['export', str(model), '--to', kind, '--output', str(file), '--json', str(result),
+                 *more]) == 0
+    return file, json.loads(result.read_text())
+
+
+def paper(**changes: Any) -> DriveModel:
+    model = build_model({**DriveModel.load().values, **changes})
+    assert isinstance(model, DriveModel)
+    return model
+
+
+def efforts_by_mujoco(text: str, model: DriveModel, motion: Any) -> tuple[Any, Any]:
+    """Return what MuJoCo's inverse dynamics of the file gives the drives, and what the model says.
+
+    The state is put together here from the closed form of the kinematics, joint by joint.
+    """
+    engine = mujoco.MjModel.from_xml_string(text)
+    engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(engine)
+    forces = model.drive_forces(motion)
+    chains = forces.mechanism.chains
+    joints = {**{name: (chains.position[:, k], chains.velocity[:, k], chains.acceleration[:, k])
+                 for k, name in enumerate(model.drives)},
+              **{f'hinge_{i + 1}': (chains.rod_angle[:, i], chains.u_dot[:, i], chains.u_ddot[:, i])
+                 for i in range(3)}}
+    drives = [engine.joint(name).dofadr[0] for name in model.drives]
+    free = engine.joint('platform')
+    at, by = int(free.qposadr[0]), int(free.dofadr[0])
+    found = np.empty_like(forces.total)
+    for k in range(len(motion)):
+        for name, values in joints.items():
+            joint = engine.joint(name)
+            data.qpos[joint.qposadr[0]] = values[0][k]
+            data.qvel[joint.dofadr[0]], data.qacc[joint.dofadr[0]] = values[1][k], values[2][k]
+        x, y, z, w = motion.orientation[k]
+        data.qpos[at:at + 7] = (*motion.position[k], w, x, y, z)
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, np.array([w, x, y, z]))
+        for own, linear, angular in (
+                (data.qvel, motion.linear_velocity, motion.angular_velocity),
+                (data.qacc, motion.linear_acceleration, motion.angular_acceleration)):
+            own[by:by + 3], own[by + 3:by + 6] = linear[k], R.reshape(3, 3).T @ angular[k]
+        mujoco.mj_inverse(engine, data)
+        J = data.efc_J.reshape(-1, engine.nv)[:9]
+        assert np.abs(data.efc_pos[:9]).max() < 1e-12
+        assert np.abs(J @ data.qvel).max() < 1e-10
+        needed = data.qfrc_inverse + data.qfrc_constraint
+        unknown = np.zeros((engine.nv, 15))
+        unknown[drives, range(6)] = 1.0
+        unknown[:, 6:] = J.T
+        found[k] = np.linalg.solve(unknown, needed)[:6]
+    return found, forces.total
+
+
+@pytest.fixture(scope='module')
+def motion() -> Any:
+    return Excitation(duration=6.0, seed=3).motion(np.arange(0.0, 6.0, 0.03))
+
+
+@pytest.mark.parametrize('more', [
+    {'masses.centre': (0.01, -0.02, 0.03), 'masses.inertia': (5e-3, 6e-3, 1e-2, 1e-3, -5e-4, 2e-4),
+     'geometry.platform_angles': (0.1, 2.2, 4.3)},
+    {'masses.rods': (0.0, 0.3, 0.2), 'geometry.elbow': 'down', 'gravity': (0.3, -0.2, -9.7)},
+    {'effects.active': ('payload_mass', 'payload_offset', 'rod_mass', 'base_tilt'),
+     'effects.payload_mass.mass': 0.4, 'effects.payload_offset.x': 0.01,
+     'effects.payload_offset.y': 0.0, 'effects.payload_offset.z': 0.02,
+     'effects.rod_mass.mass': 0.1, 'effects.base_tilt.x': 0.03, 'effects.base_tilt.y': -0.02},
+    {'effects.active': ('viscous_friction', 'drive_inertia', 'drive_spring', 'revolute_friction',
+                        'revolute_stiffness'),
+     'effects.viscous_friction.lift_2.coefficient': 7.0,
+     'effects.drive_inertia.slide_1.mass': 0.3,
+     'effects.drive_spring.lift_1.stiffness': 20.0, 'effects.drive_spring.lift_1.position': 0.1,
+     'effects.revolute_friction.viscous': 0.05, 'effects.revolute_friction.torque': 0.0,
+     'effects.revolute_stiffness.stiffness': 0.2, 'effects.revolute_stiffness.angle': 0.4},
+], ids=['bodies', 'elbow down', 'effects on bodies', 'effects in joints'])
+def test_mujoco_needs_the_forces_of_the_model_where_all_is_expressed(
+    more: dict[str, Any], motion: Any,
+) -> None:
+    model = paper(**NO_LOADS, **more)
+    expressed = express(model, MJCF)
+    assert expressed.not_expressed == ()
+    found, expected = efforts_by_mujoco(text_of(model, MJCF), model, motion)
+    assert found == pytest.approx(expected, abs=EXACT * np.abs(expected).max())
+
+
+def test_what_is_not_expressed_is_named_and_is_what_is_missing(tmp_path: Path) -> None:
+    file, result = exported('config/paper.yaml', MJCF, tmp_path)
+    assert result['not_expressed'] == [
+        'friction.drives.coulomb', 'friction.revolute.coulomb', 'friction.spherical.coulomb',
+        'friction.spherical.viscous']
+    assert result['replay_error'] > 0.1
+    assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
+    engine = mujoco.MjModel.from_xml_path(str(file))
+    names = [engine.joint(k).name for k in range(engine.njnt)]
+    assert sorted(names) == sorted(
+        ['platform', *(f'{part}_{i}' for part in ('slide', 'lift', 'hinge') for i in (1, 2, 3))])
+    assert {engine.body(f'{part}_{i}').name for part in ('slide', 'lift', 'rod')
+            for i in (1, 2, 3)} <= {engine.body(k).name for k in range(engine.nbody)}
+    assert [engine.actuator(k).name for k in range(engine.nu)] == list(DriveModel.drives)
+
+
+def test_dry_friction_and_effects_of_sensors_and_of_loads(tmp_path: Path) -> None:
+    model = paper(**NO_LOADS, **{
+        'effects.active': ('coulomb_friction', 'stribeck_friction', 'effort_gain',
+                           'external_wrench'),
+        'effects.coulomb_friction.lift_3.force': 2.5,
+        'effects.stribeck_friction.slide_2.force': 1.0,
+        'effects.stribeck_friction.slide_2.velocity': 0.01,
+        'effects.effort_gain.lift_1.gain': 0.1,
+        **{f'effects.external_wrench.{kind}_{axis}': 1.0
+           for kind in ('force', 'moment') for axis in 'xyz'}})
+    assert express(model, MJCF).not_expressed == (
+        'stribeck_friction', 'effort_gain', 'external_wrench')
+    engine = mujoco.MjModel.from_xml_string(text_of(model, MJCF))
+    losses = {engine.joint(k).name: engine.dof_frictionloss[engine.jnt_dofadr[k]]
+              for k in range(engine.njnt)}
+    assert {name for name, loss in losses.items() if loss} == {'lift_3'}
+    assert losses['lift_3'] == 2.5
+
+
+def test_urdf_has_neither_springs_nor_rotors_nor_loops_nor_gravity() -> None:
+    model = paper(**NO_LOADS, **{
+        'effects.active': ('drive_inertia', 'drive_spring', 'base_tilt', 'payload_mass'),
+        'effects.drive_inertia.slide_1.mass': 0.3, 'effects.payload_mass.mass': 0.1,
+        'effects.drive_spring.lift_1.stiffness': 20.0, 'effects.drive_spring.lift_1.position': 0.1,
+        'effects.base_tilt.x': 0.03, 'effects.base_tilt.y': 0.0})
+    assert express(model, URDF).not_expressed == (
+        'drive_inertia', 'drive_spring', 'base_tilt', 'ball_2', 'ball_3')
+
+
+def test_the_robot_stands_in_the_simulator_on_the_forces_of_the_model() -> None:
+    model = paper()
+    engine = mujoco.MjModel.from_xml_string(text_of(model, MJCF))
+    data = mujoco.MjData(engine)
+    mujoco.mj_resetDataKeyframe(engine, data, engine.key('home').id)
+    mujoco.mj_forward(engine, data)
+    start = data.body('platform').xpos.copy()
+    rest = Excitation().motion([0.0])
+    assert rest.position[0] == pytest.approx(start)
+    data.ctrl[:] = model.drive_forces(rest).total[0]
+    for _ in range(100):
+        mujoco.mj_step(engine, data)
+    assert data.body('platform').xpos == pytest.approx(start, abs=1e-3)
+    data.ctrl[3:] = 0.0
+    for _ in range(100):
+        mujoco.mj_step(engine, data)
+    assert data.body('platform').xpos[2] < start[2] - 0.05
+    assert np.abs(data.efc_pos[:9]).max() < 2e-3  # the balls hold while it falls
+
+
+@pytest.mark.parametrize('name', ['hexapod', 'delta'])
+@pytest.mark.parametrize('kind', [MJCF, URDF])
+def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
+    file, result = exported(f'config/{name}.yaml', kind, tmp_path)
+    assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-8)
+    model = load_model(f'config/{name}.yaml')
+    assert isinstance(model, ArmModel)
+    # Read as any robot's file, it moves as the model's bodies do.
+    own = {key: value for key, value in model.values.items()
+           if not key.startswith(('robot.urdf', 'friction.joints'))
+           and (kind == URDF or not key.startswith('robot.loops'))}
+    base = 'world' if kind == MJCF else model.values['robot.base']
+    again = build_model({**own, f'robot.{kind}': str(file), 'robot.base': base})
+    motion = draw_motion(model, 3.0, 1)
+    expected = model.drive_forces(motion).parts['rigid_body']
+    assert isinstance(again, ArmModel)
+    assert again.drive_forces(motion).parts['rigid_body'] == pytest.approx(
+        expected, abs=1e-8 * np.abs(expected).max())
+    if kind == URDF:
+        assert {'ball_1', 'ball_2'} & {each[:6] for each in result['not_expressed']}
+        assert pinocchio.buildModelFromUrdf(str(file)).nv > 12
+
+
+def test_a_hinge_that_closes_a_loop(tmp_path: Path) -> None:
+    _, result = exported(five_bar().write(tmp_path), MJCF, tmp_path)
+    assert result['not_expressed'] == []
+    assert result['replay_error'] < 1e-9 * result['effort'] + 1e-9
+
+
+def test_an_arm_in_another_library(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path, friction__viscous=[8.0, 5.0, 20.0],
+                         friction__coulomb=[6.0, 4.0, 9.0])
+    model = load_model(path)
+    assert isinstance(model, ArmModel)
+    file, result = exported(path, URDF, tmp_path)
+    assert result['not_expressed'] == []
+    assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
+    motion = draw_motion(model, 5.0, 2)
+    expected = model.drive_forces(motion).parts['rigid_body']
+    other = pinocchio.buildModelFromUrdf(str(file))
+    other.gravity.linear = np.array([0.0, 0.0, -9.81])
+    data = other.createData()
+    order = [other.joints[other.getJointId(name)].idx_v for name in model.drives]
+    found = np.empty_like(expected)
+    for k in range(len(motion)):
+        q, v, a = (np.zeros(3) for _ in range(3))
+        q[order], v[order], a[order] = (motion.position[k], motion.velocity[k],
+                                        motion.acceleration[k])
+        found[k] = pinocchio.rnea(other, data, q, v, a)[order]
+    assert found == pytest.approx(expected, abs=EXACT * np.abs(expected).max())
+    assert other.existFrame('flange')
+
+
+@pytest.mark.parametrize('kind', [MJCF, URDF])
+@pytest.mark.parametrize('gravity', [0.0, 4.0, -9.81])
+def test_a_single_axis(kind: str, gravity: float, tmp_path: Path) -> None:
+    text = Path('config/single_axis.yaml').read_text().replace(
+        'gravity: 0.0', f'gravity: {gravity}')
+    (tmp_path / 'axis.yaml').write_text(text)
+    _, result = exported(tmp_path / 'axis.yaml', kind, tmp_path)
+    assert result['not_expressed'] == ['axis.offset']
+    assert result['replay_error'] == pytest.approx(3.165, abs=0.01)
+    assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
+
+
+def test_a_recording_is_replayed(tmp_path: Path) -> None:
+    run = str(tmp_path / 'run.csv')
+    assert main(['simulate', '--duration', '6', '--noise', '0.01', '--output', run]) == 0
+    _, result = exported('config/paper.yaml', MJCF, tmp_path, '--recording', run)
+    assert result['replay_error'] == pytest.approx(result['expected_error'], rel=1e-3)
+    # The file lacks the friction that follows loads; the model has it, as the robot has.
+    assert result['measured_error_of_model'] < 0.3 * result['measured_error']
+    assert result['replayed'] == ['run.csv']
+
+
+def test_a_body_that_cannot_be_is_refused_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    text = Path('config/paper.yaml').read_text()
+    (tmp_path / 'robot.yaml').write_text(text + '''
+    effects:
+      active: [platform_inertia]
+      platform_inertia: {xx: 0.5, yy: 0.0, zz: 0.0}
+''')
+    assert main(['export', str(tmp_path / 'robot.yaml'), '--to', 'mjcf', '--output',
+                 str(tmp_path / 'robot.xml')]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith('pprs export: inertia of platform is')
+    assert len(said.splitlines()) == 1
+    assert not (tmp_path / 'robot.xml').exists()
+
+
+def test_a_closure_that_mujoco_lacks_is_refused() -> None:
+    model = load_model('config/delta.yaml')
+    assert isinstance(model, ArmModel)
+    structure = model.robot.structure
+    other = replace(structure, loops=tuple(
+        replace(loop, kind='universal') for loop in structure.loops))
+    with pytest.raises(ModelError, match=r'robot.loops.ball_1l.type is .universal., must be'):
+        closures(other)
