@@ -13,10 +13,9 @@ from typing import Any
 
 from pprs_dynamics.app.commands.arguments import output_file
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import read_recordings
+from pprs_dynamics.app.commands.recordings import read_inputs
 from pprs_dynamics.app.report.progress import progress_bar
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import FORMATS, express
 from pprs_dynamics.simulation.export.replay import (
@@ -48,8 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(options.file)
-    recordings = read_recordings(options, screen, model)
+    options.model = options.file
+    inputs = read_inputs(options, screen)
+    model, recordings = inputs.model, inputs.fitted
     expressed = express(model, options.to)
     robot = export_robot(expressed, options.to)
     text = written(robot, options.to)
