@@ -149,6 +149,11 @@ class Closing:
                 raise ModelError('robot.loops', name, 'have both frames the same way round: one '
                                  'is half a turn off at home')
 
+    def are_redundant(self, q: Array, free: Array) -> bool:
+        """Return whether the coordinates that are not free depend on each other."""
+        _, J = self.derivatives(q)
+        return _rank(J) > _rank(J[:, free])
+
     def mobility(self, q: Array, drives: Integers, moves: Array) -> Mobility:
         """Return what is free at a closed home.
 

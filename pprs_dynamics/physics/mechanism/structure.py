@@ -344,7 +344,7 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
                       [loop.name for loop in loops], size)
     given = [name for name in home if name in build.rows]
     free = np.array([name not in given or name not in drives for name in build.coordinates])
-    q = closing.home(start, np.flatnonzero(free)) if loops else start
+    q = _home(closing, start, free) if loops else start
     structure = Structure(
         description, t, drives,
         tuple('revolute' if description.joints[name].kind in TURNING else PRISMATIC
@@ -355,6 +355,23 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
     return replace(structure, mobility=mobility,
                    tables=build.tables(loops, mobility.passive, mobility.rows, size))
+
+
+def _home(closing: Closing, start: Array, free: Array) -> Array:
+    """Return the closed coordinates; drives that were given move only where they contradict.
+
+    What they contradict may be each other: mobility then says so.
+    """
+    try:
+        return closing.home(start, np.flatnonzero(free))
+    except ModelError as error:
+        try:
+            q = closing.home(start, np.arange(len(start)))
+        except ModelError:
+            raise error from None
+        if closing.are_redundant(q, free):
+            return q
+        raise
 
 
 def _require_joints(description: Description, drives: tuple[str, ...], block: str,

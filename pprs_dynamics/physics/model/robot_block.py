@@ -103,7 +103,7 @@ def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterato
             blocks.setdefault(name, {})[last] = value
     for name in blocks:
         if name not in friction_rows(structure):
-            raise UnknownNameError('passive joint', name, friction_rows(structure),
+            raise UnknownNameError('joint', name, friction_rows(structure),
                                    'friction.joints')
     if blocks:
         yield LinkageFriction(structure, blocks)

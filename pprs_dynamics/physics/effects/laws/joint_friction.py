@@ -23,22 +23,23 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState
+from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 
 ROTATING = ('spherical', 'revolute', 'universal')
 
 
 def friction_rows(structure: Structure) -> dict[str, tuple[int, int]]:
-    """Return passive joints and rotating loops by name: joint of the tables or -1, loop or -1."""
-    moved = set(structure.tables.coordinate[1:].tolist()) - set(structure.mobility.held.tolist())
-    joints = {name: (structure.rows[name], -1) for name in structure.passive
-              if int(structure.tables.coordinate[structure.rows[name]]) in moved}
+    """Return joints that move and rotating loops by name: joint of the tables or -1, loop or -1."""
+    held = set(structure.mobility.held.tolist())
+    joints = {name: (row, -1) for name, row in structure.rows.items()
+              if int(structure.tables.coordinate[row]) not in held}
     return joints | {loop.name: (-1, k) for k, loop in enumerate(structure.loops)
                      if loop.kind in ROTATING}
 
 
-def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float]], width: float,
-                   ) -> JointFriction:
+def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float]],
+                   reversal: Reversal) -> JointFriction:
     """Return the table of some joints' friction.
 
     Parameters
@@ -47,9 +48,11 @@ def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float
     blocks : mapping of str to mapping
         `viscous`, `torque`, `coulomb` and `radius` by joint; 0 where one is left out, but the
         radius of a slide, which is 1.
-    width : float
-        In which sgn turns over [rad/s, m/s].
+    reversal : Reversal
+        In drives by their velocity, in all others by their rate.
     """
+    widths = dict(zip(structure.drives, np.broadcast_to(
+        reversal.velocity, len(structure.drives)).tolist(), strict=True))
     rows = friction_rows(structure)
     joint, loop = (np.array([rows[name][side] for name in blocks], dtype=np.int64)
                    for side in (0, 1))
@@ -60,7 +63,7 @@ def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float
     radius = np.array([1.0 if slide else float(block.get('radius', 0.0))
                        for slide, block in zip(slides, blocks.values(), strict=True)])
     return JointFriction(joint, loop, viscous, torque, coulomb * radius,
-                         np.full(len(blocks), width))
+                         np.array([widths.get(name, reversal.rate) for name in blocks]))
 
 
 class LinkageFriction(Effect):
@@ -78,11 +81,11 @@ class LinkageFriction(Effect):
     def __init__(self, structure: Structure, blocks: Mapping[str, Mapping[str, float]]) -> None:
         self.structure, self.blocks = structure, {name: dict(one) for name, one in blocks.items()}
 
-    def table(self, width: float) -> JointFriction:
-        """Return the friction with a width of turning over."""
-        return friction_table(self.structure, self.blocks, width)
+    def table(self, reversal: Reversal) -> JointFriction:
+        """Return the friction with widths of turning over."""
+        return friction_table(self.structure, self.blocks, reversal)
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         assert isinstance(state, LinkageState)
-        return state.linkage.joint_friction(state.robot, self.table(state.reversal.rate))
+        return state.linkage.joint_friction(state.robot, self.table(state.reversal))

@@ -1,0 +1,308 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Robots with loops: efforts against MuJoCo, friction against the 3-PPRS, power, refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import robots_with_loops as robots
+from oracles.mujoco_loops import MujocoLoops
+
+from pprs_dynamics import ArmModel, DriveModel, JointMotion, load_model
+from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.effects.laws.joint_friction import friction_rows
+from pprs_dynamics.physics.mechanism import linkage
+from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+
+SAMPLES = 30
+ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
+          'three_rrr': robots.three_rrr}
+SIZES = {'hexapod': (0.03, 0.4, 4.0), 'delta': (0.3, 3.0, 30.0), 'five_bar': (0.3, 3.0, 30.0),
+         'three_rrr': (0.2, 3.0, 30.0)}
+
+
+def states(model: ArmModel, size: tuple[float, float, float], samples: int = SAMPLES,
+           seed: int = 0) -> JointMotion:
+    """Return independent random states about home."""
+    home = model.robot.structure.home[model.robot.structure.tables.drives]
+    q, v, a = np.random.default_rng(seed).uniform(-1, 1, size=(3, samples, len(home)))
+    return JointMotion(home + size[0] * q, size[1] * v, size[2] * a)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
+    text = ROBOTS[name]()
+    model = ArmModel.load(text.write(tmp_path))
+    motion = states(model, SIZES[name])
+    found = model.drive_forces(motion).total
+    moved = model.mechanism(motion).linkage
+    engine = MujocoLoops(text)
+    expected = np.empty_like(found)
+    for k in range(len(motion)):
+        expected[k], opened = engine.efforts(*engine.state(moved, k))
+        assert opened < 1e-10
+    assert np.max(np.abs(found - expected)) < 1e-9 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
+    model = ArmModel.load(ROBOTS[name]().write(tmp_path))
+    motion = states(model, SIZES[name])
+    rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
+    total = model.drive_forces(motion).total
+    assert rows @ model.robot.inertial.ravel() == pytest.approx(
+        total, abs=1e-11 * np.max(np.abs(total)))
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01} for one in friction_rows(
+        ArmModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
+    model = ArmModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
+    motion = states(model, SIZES[name])
+    compiled = model.drive_forces(motion).parts
+    monkeypatch.setattr(linkage, 'compiled_or_none', lambda function: None)
+    slow = model.drive_forces(motion).parts
+    assert set(slow) == set(compiled)
+    for part, values in compiled.items():
+        assert slow[part] == pytest.approx(values, abs=1e-9), part
+
+
+PAPER_FRICTION = ('friction.revolute', 'friction.spherical')
+
+
+def three_pprs(tmp_path: Path) -> tuple[DriveModel, ArmModel]:
+    """Return the paper's robot in closed form, and as a tree with loops."""
+    paper = DriveModel.load()
+    values = {**paper.values, 'masses.inertia': (0.005, 0.006, 0.01, 0.0, 0.0, 0.0)}
+    paper = DriveModel.from_parameters(values)
+    path = HelicalPath()
+    home = paper.drive_forces(path.motion(np.zeros(1))).mechanism
+    text = robots.three_pprs(paper, home)
+    joints = {}
+    for n in (1, 2, 3):
+        for kind, name in (('revolute', f'hinge_{n}'), ('spherical', f'ball_{n}')):
+            joints[name] = {key: float(values[f'friction.{kind}.{key}'])
+                            for key in ('viscous', 'coulomb')}
+            joints[name]['radius'] = float(values[f'friction.{kind}.diameter']) / 2
+    model = ArmModel.load(text.write(tmp_path, {
+        'joints': joints, 'reversal_rate': float(values['friction.reversal_rate']),
+        'reversal_velocity': float(values['friction.reversal_velocity'])}))
+    return paper, model
+
+
+def paths(seeds: int = 3) -> list:
+    """Return the paper's path, and excitations."""
+    return [HelicalPath(), *(Excitation(duration=10.0, seed=seed) for seed in range(seeds))]
+
+
+@pytest.mark.parametrize('which', range(4))
+def test_the_3_pprs_with_loops_is_its_closed_form(tmp_path: Path, which: int) -> None:
+    """On its paths, and on states scattered about them: rigid body and passive friction."""
+    paper, model = three_pprs(tmp_path)
+    path = paths()[which]
+    forces = paper.drive_forces(path.motion(np.linspace(0.0, path.duration, 400)))
+    s = forces.mechanism
+    assert model.drives == paper.drives
+    found = model.drive_forces(JointMotion(s.position, s.velocity, s.acceleration))
+    for part in ('rigid_body', 'passive_friction'):
+        assert found.parts[part] == pytest.approx(forces.parts[part], abs=1e-10), part
+
+
+def energy(model: ArmModel, moved: linkage.Motion) -> np.ndarray:
+    """Return kinetic and potential energy from masses, centres and inertia alone, (N,) [J]."""
+    robot, total = model.robot, 0.0
+    for row, one in zip(robot.bodies, robot.inertial, strict=True):
+        mass, h = one[0], one[1:4]
+        xx, xy, yy, xz, yz, zz = one[4:]
+        I = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # noqa: E741
+        R, u = moved.R[:, row], moved.u[:, row]
+        w = np.einsum('nji,nj->ni', R, moved.w[:, row])
+        own = np.einsum('nji,nj->ni', R, u)
+        total = total + (0.5 * mass * np.sum(own ** 2, axis=1)
+                         + np.einsum('ni,ni->n', own, np.cross(w, h))
+                         + 0.5 * np.einsum('ni,ij,nj->n', w, I, w)
+                         - (mass * moved.p[:, row] + R @ h) @ np.array(robot.gravity))
+    return total
+
+
+@pytest.mark.parametrize('name', ['hexapod', 'delta'])
+def test_power_of_the_drives_is_energy_and_what_joints_rub(tmp_path: Path, name: str) -> None:
+    """The drives' power against friction is that of every joint at its own rate."""
+    text = ROBOTS[name]()
+    plain = ArmModel.load(text.write(tmp_path))
+    rubbing = {one: {'viscous': 0.2} for one in friction_rows(plain.robot.structure)}
+    model = ArmModel.load(text.write(tmp_path, {'joints': rubbing}))
+    home = plain.robot.structure.home[plain.robot.structure.tables.drives]
+    h = 1e-3
+    time = np.arange(-4, 5) * h
+    w = np.linspace(1.0, 2.0, len(home))
+    swing = SIZES[name][0] * np.sin(np.outer(time, w) + np.arange(len(home)))
+    rate = SIZES[name][0] * w * np.cos(np.outer(time, w) + np.arange(len(home)))
+    motion = JointMotion(home + swing, rate, -w ** 2 * swing)
+    m = plain.mechanism(motion).linkage.motion
+    stored = energy(plain, m)
+    weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
+    forces = model.drive_forces(motion)
+    power = forces.parts['rigid_body'][4] @ motion.velocity[4]
+    assert power == pytest.approx(float(weights @ stored), abs=1e-8)
+    s, rubbed = plain.robot.structure, 0.0
+    for row, loop in friction_rows(s).values():
+        if row >= 0:
+            rubbed += 0.2 * (s.tables.ratio[row] * m.v[4, s.tables.coordinate[row]]) ** 2
+        else:
+            a, b = s.tables.loop_a[loop], s.tables.loop_b[loop]
+            rubbed += 0.2 * np.sum((m.w[4, b] - m.w[4, a]) ** 2)
+    assert forces.parts['passive_friction'][4] @ motion.velocity[4] == pytest.approx(
+        rubbed, abs=1e-8)
+    assert rubbed > 1e-4
+
+
+def broken(name: str, change: Callable[[robots.RobotText], None], tmp_path: Path) -> str:
+    """Return what is said of a robot that was changed."""
+    text = ROBOTS[name]()
+    change(text)
+    with pytest.raises(PprsError) as error:
+        load_model(text.write(tmp_path))
+    assert '\n' not in str(error.value)
+    return str(error.value)
+
+
+def test_a_robot_that_cannot_be_is_one_sentence_with_numbers(tmp_path: Path) -> None:
+    def too_few(text: robots.RobotText) -> None:
+        text.drives = text.drives[:-1]
+
+    def too_many(text: robots.RobotText) -> None:
+        text.drives = [*text.drives, 'left_elbow']
+        text.parts = [part.replace('name="left_elbow" type="continuous"',
+                                   'name="left_elbow" type="revolute"') for part in text.parts]
+
+    def far(text: robots.RobotText) -> None:
+        text.loops['tip']['b']['xyz'] = [5.0, 0.0, 0.0]
+
+    def unknown(text: robots.RobotText) -> None:
+        text.loops['tip']['b']['link'] = 'right_rot'
+
+    def another_kind(text: robots.RobotText) -> None:
+        text.loops['tip']['type'] = 'screw'
+
+    def no_mass(text: robots.RobotText) -> None:
+        text.parts = [part.replace('mass value="0.6"', 'mass value="0"').replace(
+            'mass value="0.4"', 'mass value="0"') for part in text.parts]
+
+    said = broken('hexapod', too_few, tmp_path)
+    assert '6 degrees of freedom, 5 drives' in said
+    assert 'leg_6' in said
+    assert '2 degrees of freedom at home to 3 drives' in broken('five_bar', too_many, tmp_path)
+    assert 'tip' in (said := broken('five_bar', far, tmp_path))
+    assert 'mm' in said
+    assert 'robot.loops.tip.b.link' in broken('five_bar', unknown, tmp_path)
+    assert 'spherical, revolute' in broken('five_bar', another_kind, tmp_path)
+    assert 'mass' in broken('five_bar', no_mass, tmp_path)
+
+
+def test_a_rod_that_spins_between_two_balls_is_held(tmp_path: Path) -> None:
+    text = robots.delta()
+    # A third hinge along the rod: its upper end becomes a ball.
+    for k, part in enumerate(text.parts):
+        if 'name="swing_1l"' in part:
+            text.parts[k] = part.replace('child link="rod_1l"', 'child link="yoke_1l"')
+    text.link('yoke_1l')
+    text.joint('spin_1l', 'continuous', 'yoke_1l', 'rod_1l')
+    model = ArmModel.load(text.write(tmp_path))
+    assert model.robot.structure.held == ('spin_1l',)
+    assert model.robot.structure.mobility.freedoms == 4
+    plain = ArmModel.load(robots.delta().write(tmp_path))
+    motion = states(plain, SIZES['delta'])
+    assert model.drive_forces(motion).total == pytest.approx(
+        plain.drive_forces(motion).total, abs=1e-6)
+
+
+def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
+    legs = ArmModel.load(robots.hexapod().write(tmp_path))
+    home = legs.robot.structure.home[legs.robot.structure.tables.drives]
+    rest = np.zeros((2, 6))
+    with pytest.raises(WorkspaceError) as error:
+        legs.drive_forces(JointMotion(home + [[0.0] * 6, [1.2] + [0.0] * 5], rest, rest))
+    assert error.value.sample == 1
+    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    home = model.robot.structure.home[model.robot.structure.tables.drives]
+    # Towards the pose at which both rods are in line.
+    q = home + np.linspace(0, 1, 200)[:, None] * (np.array([3.1, 0.04]) - home)
+    with pytest.raises((SingularityError, WorkspaceError)) as error:
+        model.drive_forces(JointMotion(q, np.zeros_like(q), np.zeros_like(q)))
+    assert 0 < error.value.sample < 200
+
+
+def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
+    """A counterweight that slides as the drive turns is an inertia and a weight more."""
+    text = robots.RobotText('winch', tool='drum')
+    text.link('base')
+    text.link('drum', 2.0, (0, 0, 0), (0.1, 0.1, 0.1))
+    text.link('weight', 3.0, (0, 0, 0), (1, 1, 1))
+    text.joint('turn', 'revolute', 'base', 'drum', axis=(0, 1, 0))
+    text.joint('slide', 'prismatic', 'base', 'weight', axis=(0, 0, 1),
+               more='\n    <mimic joint="turn" multiplier="-0.2" offset="0.5"/>')
+    text.drives = ['turn']
+    model = ArmModel.load(text.write(tmp_path))
+    q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
+    expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
+    assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
+    """A five-bar with a connect constraint, whose reference configuration is closed."""
+    (tmp_path / 'bar.xml').write_text('''<mujoco><worldbody>
+      <body name="left" pos="-0.1 0 0"><joint name="a" axis="0 0 1"/>
+        <inertial pos="0.1 0 0" mass="0.5" diaginertia="0.001 0.002 0.003"/>
+        <body name="left_rod" pos="0 0.2 0"><joint name="c" axis="0 0 1"/>
+          <inertial pos="0.05 0.1 0" mass="0.3" diaginertia="0.001 0.002 0.002"/></body></body>
+      <body name="right" pos="0.1 0 0"><joint name="b" axis="0 0 1"/>
+        <inertial pos="0.1 0 0" mass="0.4" diaginertia="0.001 0.002 0.003"/>
+        <body name="right_rod" pos="0 0.2 0"><joint name="d" axis="0 0 1"/>
+          <inertial pos="-0.05 0.1 0" mass="0.3" diaginertia="0.001 0.002 0.002"/></body></body>
+      </worldbody><equality><connect body1="left_rod" body2="right_rod" anchor="0.1 0.2 0"/>
+      </equality></mujoco>''')
+    (tmp_path / 'bar.yaml').write_text(
+        '/**:\n  ros__parameters:\n    robot: {mjcf: bar.xml, base: world, tool: left_rod, '
+        'drives: [a, b], gravity: [0.0, -9.81, 0.0]}\n')
+    model = load_model(tmp_path / 'bar.yaml')
+    assert isinstance(model, ArmModel)
+    assert model.robot.structure.mobility.freedoms == 2
+    import mujoco
+    engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'bar.xml'))
+    engine.opt.gravity = (0, -9.81, 0)
+    engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(engine)
+    motion = states(model, (0.2, 2.0, 10.0))
+    found, m = model.drive_forces(motion).total, model.mechanism(motion).linkage.motion
+    for k in range(len(motion)):
+        order = [model.robot.structure.tables.coordinate[model.robot.structure.rows[name]]
+                 for name in 'acbd']
+        data.qpos[:], data.qvel[:] = m.q[k, order], m.v[k, order]
+        mujoco.mj_forward(engine, data)
+        data.qacc[:] = m.a[k, order]
+        constraint = data.efc_J.reshape(-1, 4)
+        engine.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        mujoco.mj_inverse(engine, data)
+        engine.opt.disableflags = 0
+        columns = np.column_stack((np.eye(4)[:, [0, 2]], constraint.T))
+        expected = np.linalg.lstsq(columns, data.qfrc_inverse, rcond=1e-11)[0][:2]
+        assert found[k] == pytest.approx(expected, abs=1e-9 * np.max(np.abs(found)))
+
+
+def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
+    path = robots.five_bar().write(tmp_path)
+    text = path.read_text()
+    path.write_text(text.replace('urdf: five_bar.urdf', 'gravity: [0.0, 0.0, 0.0]'))
+    with pytest.raises(ModelError, match=r'robot\.urdf'):
+        load_model(path)
+    path.write_text(text.replace('base: base', 'base: base\n      mjcf: bar.xml'))
+    with pytest.raises(ModelError, match='instead'):
+        load_model(path)
