@@ -224,7 +224,7 @@ def tell(bench: Bench) -> dict[str, str]:
     mass = next((one['parameters']['mass'] for one in load['effects']
                  if one['name'] == 'payload_mass'), None)
     claimed = {one['name'] for one in free.get('effects', ())} & {
-        'payload_mass', 'payload_moment', 'payload_inertia', 'effort_gain'}
+        'payload_mass', 'effort_gain'}
     fall, twice = (f'{100 * (1 - one["overall"]["rms"] / before["overall"]["rms"]):.0f} % lower'
                    if before and one else 'not measured' for one in (after, again))
     errors = [[name, f'{fit["error_before"][name]:.3g}', f'{fit["error_after"][name]:.3g}',

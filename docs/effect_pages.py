@@ -38,8 +38,8 @@ SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
 OVER = {'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
         'effort_offset': 'time', 'force_ripple': 'position', 'friction_drift': 'time',
-        'homing_error': 'position', 'link_mass': 'position', 'payload_inertia': 'acceleration',
-        'payload_mass': 'position', 'payload_moment': 'position', 'payload_offset': 'position',
+        'homing_error': 'position', 'link_mass': 'position', 'joint_friction': 'velocity',
+        'payload_mass': 'position', 'payload_offset': 'position',
         'platform_inertia': 'acceleration', 'revolute_stiffness': 'position',
         'rod_mass': 'position', 'base_tilt': 'position', 'external_wrench': 'position'}
 # Values of one drive or of the structure where the parameters' scales do not show the law.

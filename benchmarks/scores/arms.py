@@ -69,7 +69,7 @@ def judge(outcome: Outcome) -> dict[str, bool]:
     told = next((one['drives'] for one in outcome['effects'] if one['name'] == name), None)
     true = outcome['truth'][0]['drives']
     # A payload that is not at the tool's origin has a first moment, too.
-    whole = {name, 'payload_moment'} if name == 'payload_mass' else {name}
+    whole = {name}
     judged = {'first_or_set': first or in_set, 'exact': first and set(named) <= whole,
               'wrong_alone': bool(named) and name not in named and not in_set}
     if told is not None and true is not None:

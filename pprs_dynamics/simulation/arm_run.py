@@ -19,15 +19,22 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
 from pprs_dynamics.physics.mechanism.closures import ROWS
-from pprs_dynamics.physics.mechanism.description import Frame
+from pprs_dynamics.physics.mechanism.description import Frame, body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
-from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, require_known, truth
+from pprs_dynamics.simulation.arm_forms import (
+    FORMS,
+    SIZE,
+    STEEPNESS,
+    JointMoment,
+    require_known,
+    truth,
+)
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
@@ -36,6 +43,7 @@ RATE = 100.0  # [Hz]
 HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
+SHIFT_OF_SLIDE = 0.1  # [m/rad], zero errors of a robot's legs over those of turning joints
 SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
 ENCODER = 2e-5  # [rad, m]
 COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sample to sample
@@ -133,11 +141,13 @@ class ArmEngine:
         self._put(self.robot.with_body(tool, point), row)
 
     def add_to_link(self, body: int, mass: float) -> None:
-        """Make a body denser by a mass [kg]."""
+        """Put a point mass at the centre of a body [kg]."""
+        row = int(self.robot.bodies[body])
         parameters = self.robot.inertial[body]
-        self._set_body(self.links[int(self.robot.bodies[body])],
-                       parameters * (1 + mass / parameters[0]))
-        self.engine.mj_setConst(self.model, self.data)
+        link = self.robot.body_names[body]
+        _, frame = self.structure.links[link]
+        centre = frame.inverse.of_point(parameters[1:4] / parameters[0])
+        self._put(self.robot.with_body(link, body_at(mass, tuple(centre), np.zeros((3, 3)))), row)
 
     def torques(self, motion: JointMotion, gravity: Array | None = None,
                 passive: Mapping[str, Array] | None = None) -> Array:
@@ -220,11 +230,8 @@ def _bare(path: Path) -> str:
 def draw_motion(model: ArmModel, duration: float, seed: int) -> JointMotion:
     """Return a random Fourier series of all drives within their limits and the workspace."""
     structure, random = model.robot.structure, np.random.default_rng(seed)
-    lower, upper = np.maximum(structure.lower, -np.pi), np.minimum(structure.upper, np.pi)
-    middle = (lower + upper) / 2
-    if structure.loops:
-        middle = structure.home[structure.tables.drives]
-    reach = np.minimum(0.9 * np.minimum(upper - middle, middle - lower), WIDEST)
+    middle, room = structure.room(np.pi)
+    reach = np.minimum(0.9 * room, WIDEST)
     shape = random.normal(size=(len(model.drives), JointSeries.size(HARMONICS)))
     time = np.arange(0.0, duration, 1 / RATE)
     raw = JointSeries(shape, middle, duration, HARMONICS)
@@ -289,18 +296,26 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         hidden.append(truth('payload_mass', None, {'mass': mass}, 'a point 5 cm before the tool'))
     if 'link_mass' in chosen:
         # What turns about an upright axis shows in no weight, and the last link is the payload's.
-        links = [j for j in range(1, len(model.drives)) if j != model.robot.carrier]
+        links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
+                 and (j or model.robot.structure.loops)]
         if not links:
             raise HiddenEffectError('link_mass needs a link between the first and that of the tool')
-        joint = int(random.choice(links))
-        mass = scale * float(random.uniform(0.1, 0.3)) * float(model.robot.masses[joint])
-        engine.add_to_link(joint, mass)
-        hidden.append(truth('link_mass', None, {f'link_{joint + 1}': mass}, 'denser'))
+        body = int(random.choice(links))
+        mass = scale * float(random.uniform(0.1, 0.3)) * float(model.robot.masses[body])
+        engine.add_to_link(body, mass)
+        hidden.append(truth('link_mass', None, {model.robot.body_names[body]: {'mass': mass}},
+                            'a point at its centre'))
+    passive = {}
+    if 'joint_friction' in chosen:
+        name, effort, parameters = _hidden_joint(model, motion, plain, random, scale)
+        passive[name] = effort
+        hidden.append(truth('joint_friction', None, {name: parameters},
+                            'T w / sqrt(w^2 + w_0^2)'))
     if 'base_tilt' in chosen:
         angle = scale * float(random.uniform(0.01, 0.03))
         gravity = 9.81 * np.array([0.0, np.sin(angle), -np.cos(angle)])
         hidden.append(truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x'))
-    bodies = engine.torques(motion, gravity) if hidden else plain
+    bodies = engine.torques(motion, gravity, passive) if hidden else plain
     if progress is not None:
         progress(0.8)
     efforts = bodies + _own_friction(model, motion)
@@ -328,13 +343,35 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     shift = np.zeros(len(largest))
     if 'homing_error' in chosen:
         joint = int(random.integers(1, len(model.drives)))
-        shift[joint] = scale * float(random.uniform(0.01, 0.03))
+        slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
+        unit = SHIFT_OF_SLIDE if slides_in_loop else 1.0
+        shift[joint] = scale * unit * float(random.uniform(0.01, 0.03))
         hidden.append(truth('homing_error', [model.drives[joint]], {
             model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
     position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden))
+
+
+def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
+                  scale: float) -> tuple[str, Array, dict[str, float]]:
+    """Return dry friction of a passive joint: its name, efforts against it (N,), and size."""
+    structure = model.robot.structure
+    joints = [name for name, (row, _) in friction_rows(structure).items()
+              if row >= 0 and name not in structure.drives]
+    if not joints:
+        raise HiddenEffectError('joint_friction needs a passive joint')
+    name = str(random.choice(joints))
+    m = model.robot.at(motion.position, motion.velocity, motion.acceleration).motion
+    row = structure.rows[name]
+    c, ratio = structure.tables.coordinate[row], structure.tables.ratio[row]
+    rate, felt = ratio * m.v[:, c], np.abs(ratio * m.T[:, c]).max(axis=0)
+    # As large on the drive that feels it most as a hidden force on a drive is.
+    d = int(np.argmax(felt))
+    torque = scale * SIZE(random) * float(np.abs(plain[:, d]).max()) / float(felt[d])
+    width = STEEPNESS * float(np.abs(rate).max())
+    return name, torque * rate / np.sqrt(rate ** 2 + width ** 2), {'torque': torque}
 
 
 def _own_friction(model: ArmModel, motion: JointMotion) -> Array:

@@ -42,13 +42,11 @@ class MujocoLoops:
                                   objtype=mujoco.mjtObj.mjOBJ_BODY, name1=loop['a']['link'],
                                   name2=loop['b']['link'], data=data)
         self.model = spec.compile()
-        # The compiler places the second anchor by the reference configuration: loops are open there.
-        for e, (name, loop) in enumerate(
-                (name, loop) for name, loop in robot.loops.items()
-                for _ in range(1 + (loop['type'] == 'revolute'))):
-            along = APART * np.array([0, 0, 1.0]) * int(self.model.equality(e).name[-1])
-            assert self.model.equality(e).name.startswith(name)
-            self.model.eq_data[e, 3:6] = np.array(loop['b']['xyz']) + along
+        # The compiler places the second anchor where the first is at zero: loops are open there.
+        for e in range(self.model.neq):
+            name, _, k = self.model.equality(e).name.rpartition('_')
+            along = APART * np.array([0, 0, 1.0]) * int(k)
+            self.model.eq_data[e, 3:6] = np.array(robot.loops[name]['b']['xyz']) + along
         self.data = mujoco.MjData(self.model)
         self.drives = [int(self.model.joint(name).dofadr[0]) for name in robot.drives]
 

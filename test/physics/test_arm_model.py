@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pprs_dynamics import ArmModel, JointMotion, PprsError, load_model
+from pprs_dynamics import ArmModel, DriveModel, JointMotion, PprsError, load_model
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, read_for, write_recording
@@ -26,10 +26,9 @@ from pprs_dynamics.physics.effects.drive_effect import DriveRange
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
-from pprs_dynamics.physics.effects.laws.payload_inertia import PayloadInertia
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
-from pprs_dynamics.physics.effects.laws.payload_moment import PayloadMoment
 from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -71,16 +70,11 @@ def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
             '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial></link>'
             '<joint name="grip" type="fixed"><parent link="flange"/><child link="load"/></joint>')
     model = ArmModel.load(arm.write_arm(tmp_path))
-    about_tool = np.diag(inertia) + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    xx, yy, zz = np.diag(about_tool)
-    effects = (PayloadMass({'mass': mass}),
-               PayloadMoment(dict(zip('xyz', mass * centre, strict=True))),
-               PayloadInertia({'xx': xx, 'yy': yy, 'zz': zz, 'xy': about_tool[0, 1],
-                               'xz': about_tool[0, 2], 'yz': about_tool[1, 2]}))
+    values = dict(zip(('mass', 'x', 'y', 'z', 'xx', 'yy', 'zz'), (mass, *centre, *inertia),
+                      strict=True))
+    effect = PayloadMass.bound(model.robot).from_file(values)
     motion = states()
-    state = model.mechanism(motion)
-    for effect in effects:
-        state = effect.apply(state)
+    state = effect.apply(model.mechanism(motion))
     assert state.rigid_force == pytest.approx(
         mujoco_torques(arm.urdf(more=body), motion), abs=1e-9)
 
@@ -100,7 +94,8 @@ def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
     names = [p.name for p in ExternalWrench.parameters]
     wrench = ExternalWrench({name: 9.81 if name == 'force_z' else 0.0 for name in names})
     state = model.mechanism(rest)
-    assert wrench.force(state) == pytest.approx(PayloadMass({'mass': 1.0}).force(state), abs=1e-9)
+    assert wrench.force(state) == pytest.approx(
+        PayloadMass.bound(model.robot).from_file({'mass': 1.0}).force(state), abs=1e-9)
 
 
 def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
@@ -193,14 +188,7 @@ def test_effects_say_where_they_act(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match='acts in a serial arm'):
         load_model(path)
     with pytest.raises(ModelError, match='acts in a 3-PPRS'):
-        load_model_with_payload_moment()
-
-
-def load_model_with_payload_moment() -> None:
-    from pprs_dynamics import DriveModel
-    from pprs_dynamics.physics.model.model_file import build_model
-    build_model({**DriveModel.load().values, 'effects.payload_moment.x': 0.1,
-                 'effects.payload_moment.y': 0.1, 'effects.payload_moment.z': 0.1})
+        build_model({**DriveModel.load().values, 'effects.link_mass.beam.mass': 0.1})
 
 
 def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:

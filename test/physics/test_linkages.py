@@ -229,7 +229,7 @@ def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
     home = legs.robot.structure.home[legs.robot.structure.tables.drives]
     rest = np.zeros((2, 6))
     with pytest.raises(WorkspaceError) as error:
-        legs.drive_forces(JointMotion(home + [[0.0] * 6, [1.2] + [0.0] * 5], rest, rest))
+        legs.drive_forces(JointMotion(home + np.outer([0, 1.2], np.eye(6)[0]), rest, rest))
     assert error.value.sample == 1
     model = ArmModel.load(robots.five_bar().write(tmp_path))
     home = model.robot.structure.home[model.robot.structure.tables.drives]

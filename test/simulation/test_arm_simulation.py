@@ -61,16 +61,16 @@ def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
     before = engine.torques(motion)
     engine.add_to_link(1, 0.7)
     loaded = build_model({**model.values, 'effects.active': ['link_mass'],
-                          'effects.link_mass.link_2': 0.7}, model.source)
+                          'effects.link_mass.beam.mass': 0.7}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
         loaded.drive_forces(motion).parts['link_mass'], abs=1e-8)
 
 
-@pytest.mark.parametrize('name', ['link_3', 'link_4'])
+@pytest.mark.parametrize('name', ['slider', 'nowhere'])
 def test_a_link_that_is_the_payloads_or_not_there_is_refused(model: ArmModel, name: str) -> None:
-    with pytest.raises(ModelError, match=f'link_mass.{name} is 0.7, must be left out'):
+    with pytest.raises(ModelError, match=f'unknown key effects.link_mass.{name}.mass'):
         build_model({**model.values, 'effects.active': ['link_mass'],
-                     f'effects.link_mass.{name}': 0.7}, model.source)
+                     f'effects.link_mass.{name}.mass': 0.7}, model.source)
 
 
 def test_without_effects_the_model_leaves_noise(model: ArmModel) -> None:

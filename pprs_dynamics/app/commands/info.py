@@ -1,33 +1,59 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs info: what is in a recording, and what is wrong with it."""
+"""pprs info: what is in a recording, and what is wrong with it; what a robot with loops is."""
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
+from pprs_dynamics.app.commands.arguments import PAGE, output_file
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import add_recordings
 from pprs_dynamics.app.front_door.inputs import read_checked
+from pprs_dynamics.app.report.mechanism_view import (
+    describe_mechanism,
+    mechanism_lines,
+    write_mechanism_page,
+)
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.tables import recording_table
 from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.recording import describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
+from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.model_file import load_model
+
+
+class InfoError(PprsError, ValueError):
+    """Nothing that could be told."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser)
+    add_recordings(parser, required=False)
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
+                        help='an arm or a robot with loops, drawn at home')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = load_model(options.model)
+    content: dict[str, Any] = {}
+    if isinstance(model, ArmModel):
+        content['robot'] = describe_mechanism(model)
+        for line in mechanism_lines(model):
+            screen.print(shown(line))
+        if options.report:
+            write_mechanism_page(options.report, model, Path(options.model).stem)
+    elif options.report or not options.recordings:
+        raise InfoError('a RECORDING is needed: without one, info tells of an arm or of a robot '
+                        'with loops, and --report draws it')
     with staged_bar(screen) as progress:
         recordings = [read_checked(model, path, options.topic, progress)
                       for path in options.recordings]
@@ -44,5 +70,6 @@ def run(options: argparse.Namespace) -> int:
         index, clause = repeat
         screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
     if options.json:
-        write_json(options.json, {'recordings': [asdict(summary) for summary in summaries]})
+        write_json(options.json, {
+            **content, 'recordings': [asdict(summary) for summary in summaries]})
     return 0

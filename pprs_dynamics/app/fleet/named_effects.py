@@ -73,7 +73,7 @@ def fit_named_effects(model: ForceModel, recording: Recording,
 def _terms(design: Design, regression: Regression, request: EffectRequest) -> Iterator[Term]:
     effect = request.effect
     if not issubclass(effect, DriveEffect):
-        yield from (term for term in design.structure if term.effect is effect
+        yield from (term for term in design.structure if term.effect.name == effect.name
                     and any(np.any(rows) for rows in term.rows.values()))
         return
     for d in regression.drives:

@@ -261,7 +261,7 @@ def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
     rows: list[dict[str, Any]] = []
     for effect in diagnosis.effects:
         for key, one in effect.parameters.items():
-            drive, _, parameter = key.rpartition('.')
+            drive, parameter = effect.effect.place_and_parameter(key)
             rows.append({'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
                          'value': one.value, 'std': one.std, 'unit': one.unit,
                          'evidence': effect.evidence})

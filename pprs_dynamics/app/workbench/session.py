@@ -271,6 +271,7 @@ class Session:
         """
         request = EffectRequest.named(effect, drives, self.drives)
         request.require_place(self.model)
+        request = replace(request, effect=self.model.bound(request.effect))
         with self._changing(revision):
             view = self.view_state
             offer = next((one.candidate for one in view.offers
@@ -311,7 +312,7 @@ class Session:
             if key not in known:
                 raise SessionError(f'{effect} has no parameter {key!r}, must be one of '
                                    f'{", ".join(known)}')
-            drive, _, name = key.rpartition('.')
+            drive, name = tick.effect.place_and_parameter(key)
             parameter = next(p for p in tick.effect.parameters if p.name == name)
             checked = parameter.check(f'{effect}.{key}', value)
             place = (self.drives.index(drive) if drive else None, name)

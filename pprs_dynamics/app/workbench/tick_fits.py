@@ -146,7 +146,9 @@ class TickFits:
     def candidates(self) -> list[type[CatalogueEffect]]:
         """Return the effects that the model may lack, by name."""
         design = self.design
-        return [effect for effect in catalogue().values() if self.model.offers(effect) and (
+        offered = [self.model.bound(effect) for effect in catalogue().values()
+                   if self.model.offers(effect)]
+        return [effect for effect in offered if (
             any(design.acts_on(effect, d) for d in range(len(self.drives)))
             if issubclass(effect, DriveEffect)
             else any(term.effect is effect for term in design.structure))]

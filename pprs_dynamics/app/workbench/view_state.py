@@ -161,11 +161,11 @@ def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceMode
     shapes = {parameter.name for parameter in effect.shape}
     rows = []
     for key, one in view.estimates.get(effect.name, {}).items():
-        parameter = known[key.rpartition('.')[2]]
+        parameter = known[effect.place_and_parameter(key)[1]]
         rows.append({
             'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
             'std': finite(one.std), 'description': parameter.description,
-            'unit': units.get(key.partition('.')[0], DriveUnits()).of(parameter.unit),
+            'unit': units.get(effect.place_and_parameter(key)[0], DriveUnits()).of(parameter.unit),
             'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
             'is_chosen': key in chosen})

@@ -117,8 +117,9 @@ def fit_effect(
     moved = [one for one in calibrations(last, found, widths) if _is_move(design, one)]
     fitted = with_widths(fitted_model(last, found), last.design, widths)
     final = _with_numbers(fitted, model, moved)
-    parameters = {key: Estimate(float(final.values[f'effects.{request.name}.{key}']), one.std,
-                                one.unit) for key, one in said.parameters.items()}
+    prefix = f'effects.{request.name}.'
+    parameters = {key: Estimate(float(final.values[prefix + key]), one.std, one.unit)
+                  for key, one in said.parameters.items() if prefix + key in final.values}
     report(1.0)
     return EffectFit(
         request, _names(design, candidate), final, fitted_model(search, plain_set), parameters,

@@ -121,16 +121,17 @@ def of_identifiability(fitted: EffectFit) -> list[str]:
     if fitted.own_share < OWN_SHARE:
         return [f'these recordings cannot tell {fitted.request.name} from what the model has: of '
                 f'its square only {fitted.own_share:.1e} is its own']
+    effect = fitted.request.effect
     angles = {p.name for p in fitted.request.effect.parameters if p.is_angle}
 
     def is_angle(key: str) -> bool:
-        return key.rpartition('.')[2] in angles
+        return effect.place_and_parameter(key)[1] in angles
 
     told = {key: one for key, one in fitted.parameters.items()
             if not is_angle(key) and one.value != 0.0}
     vague = [key for key, one in told.items() if abs(one.value) < SURE * one.std]
     linear = {p.name for p in fitted.request.effect.linear or fitted.request.effect.shape}
-    sizes = [key for key in told if key.rpartition('.')[2] in linear] or list(told)
+    sizes = [key for key in told if effect.place_and_parameter(key)[1] in linear] or list(told)
     if sizes and all(key in vague for key in sizes):
         shown = '; '.join(f'{key} = {_with_std(told[key])}' for key in sizes[:3])
         return [f'its parameters are not identifiable from these recordings: {shown}']
@@ -142,7 +143,7 @@ def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
     bounds = fitted.request.effect.unphysical_below
     low = {}
     for key, one in fitted.parameters.items():
-        bound = bounds.get(key.rpartition('.')[2])
+        bound = bounds.get(fitted.request.effect.place_and_parameter(key)[1])
         if bound is not None and one.value + SURE * one.std < bound:
             low[key] = one
     if not low:

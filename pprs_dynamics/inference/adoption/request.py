@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
@@ -112,4 +112,4 @@ def requested(text: str, model: ForceModel) -> EffectRequest | CurveRequest:
         return CurveRequest.of(rest, model.drives)
     request = EffectRequest.of(text, model.drives)
     request.require_place(model)
-    return request
+    return replace(request, effect=model.bound(request.effect))

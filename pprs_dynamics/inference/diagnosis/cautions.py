@@ -92,13 +92,12 @@ def _unexcited(search: Search, best: CandidateSet) -> list[str]:
     adopted = {candidate.name for candidate in best.effects}
     weak = []
     for term in search.design.structure:
-        if term.effect.name in adopted:
+        if term.effect.name in adopted or term.effect.is_of_one_place:
             continue
         own = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])
         sizes = np.diag(own) * scales ** 2
-        present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)
-                   if c.name not in search.design.absent(term.effect)}
+        present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)}
         names = [name for name, size in present.items() if size < search.decisions.unexcited]
         if names:
             weak.append(term.effect.name if len(names) == len(present)

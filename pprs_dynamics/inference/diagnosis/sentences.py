@@ -253,7 +253,7 @@ def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
     order = ['', *diagnosis.residuals.drives]
     rows = []
     for key, estimate in found.parameters.items():
-        drive, _, name = key.rpartition('.')
+        drive, name = found.effect.place_and_parameter(key)
         if estimate.value or estimate.std:
             rows.append((drive, known[name], estimate))
     return sorted(rows, key=lambda row: order.index(row[0]))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 
@@ -61,8 +62,8 @@ class ArmMotions:
     def __init__(self, model: ArmModel, limits: ArmLimits, duration: float) -> None:
         tree, left = model.robot.structure, 1 - limits.margin
         self.model, self.duration = model, duration
-        lower, upper = np.maximum(tree.lower, -WIDEST), np.minimum(tree.upper, WIDEST)
-        self.middle, self.reach = (lower + upper) / 2, left * (upper - lower) / 2
+        self.middle, reach = tree.room(WIDEST)
+        self.reach = left * reach
         self.speed = left * np.minimum(tree.speed, limits.velocity)
         self.acceleration = np.full(len(model.drives), left * limits.acceleration)
         self.effort = np.maximum(left * tree.effort - limits.effort_reserve, 0.0)
@@ -89,9 +90,12 @@ class ArmMotions:
             np.broadcast_to(share, len(uses)) / np.maximum(uses, TINY))[:, None])
         few = time[::CHECKED // LOOKED_AT]
         for _ in range(SHRINKS):
-            efforts = self.model.drive_forces(found.motion(few)).total
-            if np.all(np.abs(efforts) <= self.effort):
-                break
+            try:
+                efforts = self.model.drive_forces(found.motion(few)).total
+                if np.all(np.abs(efforts) <= self.effort):
+                    break
+            except WorkspaceError:
+                pass  # loops that do not close, or nearly lose hold
             found = replace(found, coefficients=SHRINK * found.coefficients)
         return found
 

@@ -74,11 +74,10 @@ class FittedTerm:
 
     @classmethod
     def at_scale(cls, effect: type[CatalogueEffect], drive: int | None,
-                 shape: Mapping[str, float], absent: frozenset[str] = frozenset()) -> FittedTerm:
+                 shape: Mapping[str, float]) -> FittedTerm:
         """Return an effect with its coefficients at the sizes at which they matter."""
-        present = [c for c in effect.coefficients if c.name not in absent]
-        return cls(effect, drive, shape, tuple(c.name for c in present),
-                   np.array([c.scale for c in present] or [1.0]))
+        return cls(effect, drive, shape, tuple(c.name for c in effect.coefficients),
+                   np.array([c.scale for c in effect.coefficients] or [1.0]))
 
     @property
     def size(self) -> int:

@@ -161,9 +161,11 @@ def _excitation(search: Search, nothing: CandidateSet) -> Question:
     regression = search.regression
     weak = []
     for term in search.design.structure:
+        if term.effect.is_of_one_place:
+            continue
         block = regression.block(term.rows)
         gain = np.diag(regression.own_information(nothing.fit, block))
-        found = FittedTerm.at_scale(term.effect, None, {}, search.design.absent(term.effect))
+        found = FittedTerm.at_scale(term.effect, None, {})
         here = [term.names.index(name) for name in found.names]
         if np.any(gain[here] * found.scales ** 2 < DECISIONS.unexcited):
             weak.append(found)

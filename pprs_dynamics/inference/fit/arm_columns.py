@@ -18,7 +18,6 @@ from pprs_dynamics.measurement.motion.reconstruction import (
     reconstruct,
     treated_forces,
 )
-from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.arm_model import ArmModel
 
@@ -57,7 +56,7 @@ class ArmColumns:
         treat = found.treat
         total = treated_forces(model, found)['total']
         count = len(model.drives)
-        inertial = np.empty((len(treat), count, PARAMETERS * count))
+        inertial = np.empty((len(treat), count, model.robot.inertial.size))
         for chunk in found.chunks():
             s: Any = chunk.motion
             rows = model.robot.regressor(s.position, s.velocity, s.acceleration)

@@ -113,7 +113,8 @@ def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
         _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
         links, {f'{model.block}.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
                 'friction.coulomb': std[COULOMB], 'friction.offset': std[OFFSET]},
-        tuple(names[masses > DETERMINED].tolist()), tuple(names[~moving].tolist()))
+        tuple(np.array(model.robot.body_joints)[masses > DETERMINED].tolist()),
+        tuple(names[~moving].tolist()))
 
 
 def _with(model: ArmModel, inertial: Array, own: Array, width: Array) -> ArmModel:

@@ -134,9 +134,11 @@ class ArmSensitivities(Sensitivities):
             step = coefficient.scale
             moved: Any = effect.at({**values, coefficient.name:
                                     values.get(coefficient.name, 0.0) + step})
-            if isinstance(moved, BodyEffect) and coefficient.name in moved.absent(state.robot):
+            if not isinstance(moved, BodyEffect):
+                at: Any = state
+                change = (moved.force(at) - effect.at(values).force(at)) / step
                 for columns in (full, bare):
-                    columns.append(np.zeros_like(reference))
+                    columns.append(self.sensed(change, state))
                 continue
             if values:
                 model = replace(self.model, effects=tuple(

@@ -57,8 +57,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
@@ -224,12 +223,6 @@ class Design:
         return (issubclass(effect, DriveEffect) and self.given.offers(effect)
                 and not (isinstance(present, DriveEffect) and self.drives[drive] in present.drives)
                 and (not effect.is_friction or self.moves(drive)))
-
-    def absent(self, effect: type[CatalogueEffect]) -> frozenset[str]:
-        """Return the coefficients of an effect that the model has no body for."""
-        if isinstance(self.model, ArmModel) and issubclass(effect, BodyEffect):
-            return effect.absent(self.model.robot)
-        return frozenset()
 
     def drive_rows(self, effect: type[DriveEffect], drive: int,
                    shape: Mapping[str, float]) -> Array:

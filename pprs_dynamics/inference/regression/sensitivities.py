@@ -107,8 +107,9 @@ class Sensitivities(ABC):
         self.numbers = known_numbers(given)
         present = {effect.name for effect in given.effects}
         self.searched: tuple[type[StructureEffect], ...] = tuple(
-            effect for effect in catalogue().values() if issubclass(effect, StructureEffect)
-            and given.offers(effect) and effect.name not in present)
+            bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
+            and given.offers(effect) and effect.name not in present
+            if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
 
     @abstractmethod
     def columns(self, forces: Any) -> dict[str, Array]:

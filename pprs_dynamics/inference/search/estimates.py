@@ -198,11 +198,12 @@ def estimate_present(search: Search, found: CandidateSet, fitted: ForceModel, na
     effect = next(type(e) for e in search.design.given.effects if e.name == name)
     units = {p.name: p.unit for p in getattr(effect, 'parameters', ())}
     prefix = f'effects.{name}.'
+    place_of = getattr(effect, 'place_and_parameter', lambda key: ('', key))
     return {key: Estimate(float(value), known.get(key, float('nan')),
-                          _units(search.design, key.rpartition('.')[0] or None)(
-                              units[key.rpartition('.')[2]]))
+                          _units(search.design, drive or None)(units[parameter]))
             for full, value in fitted.values.items() if full.startswith(prefix)
-            for key in [full.removeprefix(prefix)]}
+            for key in [full.removeprefix(prefix)]
+            for drive, parameter in [place_of(key)]}
 
 
 def calibrations(search: Search, found: CandidateSet, widths: Mapping[int, float],

@@ -233,6 +233,8 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
         every = {**kind.from_coefficients(one.coefficients), **one.shape}
         drive = '' if one.drive is None else f'{design.drives[one.drive]}.'
         for parameter in kind.parameters:
+            if kind.is_of_one_place and every[parameter.name] == parameter.default:
+                continue  # of all the links or joints that it is not on
             values[f'effects.{kind.name}.{drive}{parameter.name}'] = within(
                 parameter, every[parameter.name])
     if names:

@@ -9,7 +9,6 @@ import copy
 from dataclasses import replace
 from typing import Any
 
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.three_pprs.robot import Robot
 
 
@@ -24,10 +23,3 @@ def with_masses(robot: Robot, **masses: Any) -> Robot:
     for name, value in masses.items():
         object.__setattr__(altered, name, value)
     return replace(robot, masses=altered)
-
-
-def with_payload(robot: Robot | Mechanism, mass: float) -> Robot | Mechanism:
-    """Return the robot with a mass more [kg]: at the platform's centre, or at the tool."""
-    if isinstance(robot, Mechanism):
-        return robot.with_payload(mass)
-    return with_masses(robot, payload=robot.masses.payload + mass)

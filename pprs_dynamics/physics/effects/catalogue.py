@@ -30,12 +30,11 @@ from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
 from pprs_dynamics.physics.effects.laws.homing_error import HomingError
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
-from pprs_dynamics.physics.effects.laws.payload_inertia import PayloadInertia
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
-from pprs_dynamics.physics.effects.laws.payload_moment import PayloadMoment
 from pprs_dynamics.physics.effects.laws.payload_offset import PayloadOffset
 from pprs_dynamics.physics.effects.laws.platform_drag import PlatformDrag
 from pprs_dynamics.physics.effects.laws.platform_inertia import PlatformInertia
@@ -72,11 +71,10 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         FrictionDrift,
         HomingError,
         Hysteresis,
+        JointFrictionEffect,
         LinkMass,
         LoadFriction,
-        PayloadInertia,
         PayloadMass,
-        PayloadMoment,
         PayloadOffset,
         PlatformDrag,
         PlatformInertia,

@@ -180,6 +180,9 @@ class CatalogueEffect(Effect):
     shows_at_reversals : bool
         True where the effect shows most where friction turns over, so that friction which does so
         otherwise than modelled looks like it.
+    is_of_one_place : bool
+        True where each variant is at a place of its own, a link or a joint: that a motion does
+        not show every one of them is not worth telling.
     """
 
     card: ClassVar[Card]
@@ -197,6 +200,7 @@ class CatalogueEffect(Effect):
     bends_columns: ClassVar[bool] = False
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
+    is_of_one_place: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):
@@ -213,6 +217,27 @@ class CatalogueEffect(Effect):
 
     def __hash__(self) -> int:
         return hash(self.name)
+
+    @classmethod
+    def place_and_parameter(cls, key: str) -> tuple[str, str]:
+        """Return the drive of a key `drive.parameter`, '' for none, and the parameter.
+
+        Parameters of bodies and joints have dots of their own.
+        """
+        if any(key == parameter.name for parameter in cls.parameters):
+            return '', key
+        drive, _, name = key.rpartition('.')
+        return drive, name
+
+    @classmethod
+    def bound(cls, robot: Any) -> type[Self]:
+        """Return the effect with the parameters that it has on a robot; by default its own.
+
+        Parameters
+        ----------
+        robot : Mechanism
+        """
+        return cls
 
     @classmethod
     @abstractmethod

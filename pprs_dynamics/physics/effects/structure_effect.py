@@ -54,11 +54,6 @@ class BodyEffect(StructureEffect):
         """Return the robot, a `Robot` or an `Arm`, with the effect; by default as it was."""
         return robot
 
-    @classmethod
-    def absent(cls, robot: Any) -> frozenset[str]:
-        """Return the coefficients that a robot has no body for; by default none."""
-        return frozenset()
-
     def load(self, state: Any) -> StructureLoad | None:
         """Return a load beside bodies and gravity; None, the default, for none."""
         return None

@@ -39,6 +39,11 @@ class Frame:
         """The other frame in this one."""
         return Frame(self.R.T, -self.R.T @ self.p)
 
+    def of_point(self, point: Array) -> Array:
+        """Return a point of this frame in the one that it stands in."""
+        placed: Array = self.R @ point + self.p
+        return placed
+
     @classmethod
     def of(cls, xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Frame:
         """Return the frame at xyz [m], turned by roll, pitch and yaw about fixed axes [rad]."""

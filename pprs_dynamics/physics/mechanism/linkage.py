@@ -9,7 +9,6 @@ branch that home is on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -101,26 +100,6 @@ def _survey(t: Tables, m: Motion, column_of: Any, gaps: Any, J: Any) -> None:
     for r in range(len(t.row_loop)):
         gaps[r] = gap(t, m, r)
     gradients(t, m, column_of, J)
-
-
-def _effort(t: Tables, m: Motion, start: Any, home: Any, v: Any, a: Any, passive_of: Any,
-            drive_of: Any, inertial: Any, gravity: Any, friction: JointFriction, W: Any, U: Any,
-            o: Loads, own: Any, efforts: Any) -> int:
-    failed = _follow(t, m, start, home, v, a, passive_of, drive_of)
-    if failed >= 0:
-        return failed
-    for s in range(len(m.q)):
-        one, load = motion_at(m, s), loads_at(o, s)
-        apply_bodies(t, one, inertial, gravity, load)
-        for d in range(len(t.drives)):
-            # Rotor, viscous and dry friction with its width, offset.
-            efforts[s, d] = (load.efforts[d] + own[0, d] * a[s, d] + own[1, d] * v[s, d]
-                             + own[2, d] * np.tanh(v[s, d] / own[3, d]) + own[4, d])
-        if len(friction.joint):
-            react(t, one, load)
-            twist(t, one, W[s], U[s])
-            rub(t, one, load, friction, W[s], efforts[s])
-    return -1
 
 
 def samples_last(arrays: Any) -> Any:
@@ -244,45 +223,3 @@ def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion
         _survey(t, views, column_of, gaps[:, None], J[..., None])
     return gaps, J[:, :len(columns)], m
 
-
-class Sample:
-    """Efforts of the drives at one sample after the other, as a control loop asks for them.
-
-    Parameters
-    ----------
-    t : Tables
-    home : (C,) array
-    inertial : (J + 1, 10) array
-    gravity : (3,) array
-    friction : JointFriction
-    own : (5, D) array
-        Rotor inertia, viscous and dry friction, its width, and offset of the drives.
-    """
-
-    def __init__(self, t: Tables, home: Array, inertial: Array, gravity: Array,
-                 friction: JointFriction, own: Array) -> None:
-        self._m, self._home, self._drives = new_motion(t, 1), np.array(home), t.drives
-        self._o, self._start = new_loads(t, self._m), np.array(home)
-        self._m.q[:] = home
-        shape = (1, len(t.parent), 3, len(t.drives))
-        passive_of, drive_of = (columns_of(which, len(home)) for which in (t.passive, t.drives))
-        self._before = (t, self._m, self._start, self._home)
-        self._after = (passive_of, drive_of, inertial, gravity, friction, np.zeros(shape),
-                       np.zeros(shape), self._o, own)
-        self._loop: Callable[..., int] | None = compiled_or_none(_effort)
-
-    @property
-    def is_compiled(self) -> bool:
-        """Whether it can be called."""
-        return self._loop is not None
-
-    def __call__(self, q: Array, v: Array, a: Array) -> Array | None:
-        """Return the efforts (D,), or None where the loops do not close."""
-        assert self._loop is not None
-        self._m.q[0, self._drives] = q
-        efforts = np.empty((1, len(q)))
-        if self._loop(*self._before, v[None], a[None], *self._after, efforts) >= 0:
-            self._start[:] = self._home
-            return None
-        found: Array = efforts[0]
-        return found

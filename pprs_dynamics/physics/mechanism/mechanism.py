@@ -10,6 +10,7 @@ R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 8.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -51,6 +52,8 @@ class Mechanism:
         Inertia of the rotors, seen at the drives [kg m^2, kg].
     gravity : (3,) sequence
         In the base's frame [m/s^2].
+    radii : mapping of str to float
+        At which loads of joints rub [m], where known.
     """
 
     structure: Structure
@@ -58,6 +61,7 @@ class Mechanism:
     inertial: Array
     armature: Array
     gravity: tuple[float, float, float]
+    radii: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def masses(self) -> Array:
@@ -69,6 +73,13 @@ class Mechanism:
     def body_names(self) -> tuple[str, ...]:
         """Links that the bodies are of: the first on each joint."""
         return tuple(self.structure.moved_by[int(row)] for row in self.bodies)
+
+    @property
+    def body_joints(self) -> tuple[str, ...]:
+        """Joints that move the bodies; of a floating joint the link."""
+        joints = {row: name for name, row in self.structure.rows.items()}
+        return tuple(joints.get(int(row), name)
+                     for row, name in zip(self.bodies, self.body_names, strict=True))
 
     @property
     def carrier(self) -> int:
@@ -283,12 +294,6 @@ class Linkage:
             found[..., 4 + k] = column.transpose(0, 2, 1)
         return found.reshape(samples, drives, -1)
 
-    def joint_friction(self, mechanism: Mechanism, friction: JointFriction) -> Array:
-        """Return the drives' efforts against friction of passive joints, (N, D)."""
-        loads = self.loads(mechanism, with_reactions=True)
-        return friction_efforts(self.structure.tables, self.motion, loads, friction,
-                                self.twists[0])
-
 
 def home_determinant(structure: Structure) -> float:
     """Return the determinant of the loops at home."""
@@ -338,6 +343,17 @@ class LinkageState(JointMotion):
     def guide_load(self) -> Array:
         """What a drive's gear carries: the size of its effort without friction [N m, N]."""
         return np.abs(self.rigid_force)
+
+    @cached_property
+    def reactions(self) -> Loads:
+        """What joints and closures transmit without friction."""
+        return self.linkage.loads(self.robot, with_reactions=True)
+
+    def against_friction(self, friction: JointFriction) -> Array:
+        """Return the drives' efforts against friction of joints, (N, D)."""
+        linkage = self.linkage
+        return friction_efforts(linkage.structure.tables, linkage.motion, self.reactions, friction,
+                                linkage.twists[0])
 
     def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> LinkageState:
         """Return a state of this motion with other bodies, and with an additional load."""

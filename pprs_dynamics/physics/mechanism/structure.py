@@ -104,6 +104,20 @@ class Structure:
             names.setdefault(row, link)
         return names
 
+    def room(self, widest: float) -> tuple[Array, Array]:
+        """Return the middle of the drives' motion and the way to either side, (D,) each.
+
+        Of a robot with loops the middle is home: the middles of all ranges may be no pose.
+
+        Parameters
+        ----------
+        widest : float
+            Beyond which ranges do not count [rad, m].
+        """
+        lower, upper = np.maximum(self.lower, -widest), np.minimum(self.upper, widest)
+        middle = self.home[self.tables.drives] if self.loops else (lower + upper) / 2
+        return middle, np.maximum(np.minimum(upper - middle, middle - lower), 0.0)
+
     @property
     def held(self) -> tuple[str, ...]:
         """Coordinates that neither drives nor loops determine: they stand."""

@@ -48,7 +48,7 @@ from pprs_dynamics.physics.model.keys import (
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
-from pprs_dynamics.physics.model.robot_block import passive_friction, read_structure
+from pprs_dynamics.physics.model.robot_block import joint_radii, passive_friction, read_structure
 
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
 BLOCKS_PER_PERIOD = 100.0
@@ -85,6 +85,11 @@ class ArmModel(ForceModel):
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
         return self.robot.structure.drives
+
+    @property
+    def mechanism_of_effects(self) -> Mechanism:
+        """The mechanism as described."""
+        return self.robot
 
     @property
     def block(self) -> str:
@@ -178,11 +183,10 @@ class ArmModel(ForceModel):
             robot = _mechanism(structure, values)
             effects = (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
                        AxisOffset(values['friction.offset']), *passive_friction(structure, values),
-                       *added_effects(parameters, cls, structure.drives))
+                       *added_effects(parameters, cls, structure.drives, robot))
             loaded = robot
             for effect in effects:
                 if isinstance(effect, BodyEffect):
-                    _require_present(effect, robot)
                     loaded = effect.changed(loaded)
                     _require_bodies(effect, loaded)
             common = values['friction.reversal_velocity']
@@ -259,7 +263,7 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
-                      values[f'{block}.gravity'])
+                      values[f'{block}.gravity'], joint_radii(values))
     if block != ARM_BLOCK:
         _require_driven_bodies(robot)
     return robot
@@ -276,15 +280,6 @@ def _require_driven_bodies(robot: Mechanism) -> None:
         moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
         if not moved - still + robot.armature[d] > 0:
             raise ModelError('robot.drives', name, 'move a body: no link that it moves has a mass')
-
-
-def _require_present(effect: BodyEffect, robot: Mechanism) -> None:
-    """Raise ModelError where an effect changes a body that the mechanism does not have."""
-    for name in sorted(effect.absent(robot)):
-        if effect.values[name]:
-            raise ModelError(
-                f'effects.{effect.name}.{name}', effect.values[name], 'be left out: this arm has '
-                'no such link, or it is the one that carries the tool, of which payload_mass tells')
 
 
 def _require_bodies(effect: CatalogueEffect, robot: Mechanism) -> None:

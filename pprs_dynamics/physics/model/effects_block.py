@@ -21,8 +21,12 @@ LISTS = ('effects.active', 'effects.measured')
 
 def added_effects(
     parameters: Mapping[str, Any], kind: type[ForceModel], drives: tuple[str, ...],
+    robot: Any = None,
 ) -> Iterator[CatalogueEffect]:
-    """Yield the effects that are active in a model of a kind with drives, all blocks checked."""
+    """Yield the effects that are active in a model of a kind with drives, all blocks checked.
+
+    Parameters of some are those that they have on the `robot`.
+    """
     active = parameters.get('effects.active', [])
     if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
         raise ModelError('effects.active', active, 'be a list of names of effects')
@@ -39,6 +43,7 @@ def added_effects(
         if found is None:
             raise UnknownNameError('effect', name, catalogue(), 'effects')
         _check_place(name, block, found, kind, drives)
+        found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
         effect = found.from_file(block, complete=name in active)
         if name in active:

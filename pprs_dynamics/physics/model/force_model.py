@@ -195,6 +195,15 @@ class ForceModel(ABC):
         """Return whether an effect of the catalogue can act in what this is a model of."""
         return cls.kind in effect.acts_in
 
+    @property
+    def mechanism_of_effects(self) -> Any:
+        """The mechanism that effects take their parameters from; None where they have their own."""
+        return None
+
+    def bound(self, effect: type[CatalogueEffect]) -> type[CatalogueEffect]:
+        """Return an effect of the catalogue with the parameters that it has in this model."""
+        return effect.bound(self.mechanism_of_effects)
+
     @abstractmethod
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
         """Return the forces for a motion of this kind."""

@@ -31,8 +31,10 @@ def prepare(model: DriveModel | ArmModel) -> None:
     """
     if isinstance(model, ArmModel):
         with suppress(PprsError):
-            zero = np.zeros((SAMPLES, len(model.drives)))
-            at_rest = JointMotion(zero, zero, zero, np.arange(SAMPLES, dtype=float))
+            structure = model.robot.structure
+            closed = np.tile(structure.home[structure.tables.drives], (SAMPLES, 1))
+            zero = np.zeros_like(closed)
+            at_rest = JointMotion(closed, zero, zero, np.arange(SAMPLES, dtype=float))
             model.sound_at(at_rest).drive_forces(at_rest)
         return
     home = PlatformMotion.at_rest(np.tile([0.0, 0.0, HEIGHT], (SAMPLES, 1)),

@@ -94,6 +94,13 @@ def _require_one_motor_each(values: Mapping[str, Any], block: str) -> None:
                              f'transmission {kind} in the URDF: coupled joints are not covered')
 
 
+def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
+    """Return the radii at which loads of joints rub, where the file has them [m]."""
+    return {key.removeprefix('friction.joints.').removesuffix('.radius'): value
+            for key, value in values.items()
+            if key.startswith('friction.joints.') and key.endswith('.radius') and value}
+
+
 def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterator[LinkageFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
     blocks: dict[str, dict[str, float]] = {}

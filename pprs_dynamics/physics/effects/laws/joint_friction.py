@@ -15,17 +15,21 @@ with Triangular Platform, 2007, on the friction of revolute and ball joints.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from functools import cache
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.added_body import flattened, nested
+from pprs_dynamics.physics.effects.effect import ARM, Card, Effect, Parameter
+from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
-from pprs_dynamics.physics.mechanism.mechanism import LinkageState
+from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 
+RADIUS = 0.01  # [m] at which a load rubs where the model does not say
 ROTATING = ('spherical', 'revolute', 'universal')
 
 
@@ -66,6 +70,74 @@ def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float
                          np.array([widths.get(name, reversal.rate) for name in blocks]))
 
 
+class JointFrictionEffect(PassiveJointEffect):
+    """Friction of passive joints beyond the model's."""
+
+    name: ClassVar[str] = 'joint_friction'
+    acts_in = frozenset({ARM})
+    is_friction: ClassVar[bool] = True
+    is_of_one_place: ClassVar[bool] = True
+    linear = ()
+    radii: ClassVar[Mapping[str, float]] = {}
+    card = Card(
+        'tau -> tau + T\' (c w + (T + mu r F) sgn(w)), of one passive joint',
+        'errors of several drives at once, in the proportions in which they move the joint, with '
+        'the sign of its rate or growing with it',
+        'a bearing that runs dry, is overtightened or worn; a seal; a cable loom over the joint',
+        'take the load off, move the joint by hand and compare it with its like; lubricate it and '
+        'repeat: the error must fall',
+        'Itul, Pisla, The Influence of Friction on the Dynamic Model for a 6-DOF Parallel Robot, '
+        '2007')
+
+    @classmethod
+    def bound(cls, robot: Any) -> Any:
+        """Return the effect in the passive joints of a mechanism."""
+        if not isinstance(robot, Mechanism):
+            return cls
+        joints = [name for name in friction_rows(robot.structure)
+                  if name not in robot.structure.drives]
+        return _in_joints(tuple((name, robot.radii.get(name, RADIUS)) for name in joints))
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from blocks by joint."""
+        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
+
+    def to_file(self) -> dict[str, Any]:
+        """Return blocks of the joints that it is in."""
+        return nested({name: value for name, value in self.values.items() if value})
+
+    def force(self, state: Any, memory: Any = None) -> Array:
+        """Return the drives' efforts [N m, N], (N, D)."""
+        assert isinstance(state, LinkageState)
+        blocks: dict[str, dict[str, float]] = nested(
+            {name: value for name, value in self.values.items() if value})
+        for name, block in blocks.items():
+            block['radius'] = self.radii[name]
+        table = friction_table(state.robot.structure, blocks, state.reversal)
+        return state.against_friction(table)
+
+
+@cache
+def _in_joints(joints: tuple[tuple[str, float], ...]) -> type[JointFrictionEffect]:
+    """Return the effect in joints with the radii at which the load rubs [m]."""
+    linear, variants, bounds = [], [], {}
+    for name, _ in joints:
+        linear += [
+            Parameter(f'{name}.viscous', 'c', 'N m s/rad', f'viscous friction of {name}', -1e4,
+                      1e4, 0.0, scale=0.1),
+            Parameter(f'{name}.torque', 'T', 'N m', f'dry friction of {name}, whatever its load',
+                      -1e4, 1e4, 0.0, scale=0.1),
+            Parameter(f'{name}.coulomb', 'mu', '1', f'dry friction of {name} over its load',
+                      -100.0, 100.0, 0.0, scale=0.1)]
+        variants += [(f'{name}.viscous',), (f'{name}.torque',),
+                     (f'{name}.viscous', f'{name}.torque'), (f'{name}.coulomb',)]
+        bounds.update({f'{name}.{last}': 0.0 for last in ('viscous', 'torque', 'coulomb')})
+    return type('JointFrictionEffect', (JointFrictionEffect,), {
+        'linear': tuple(linear), 'variants': tuple(variants), 'radii': dict(joints),
+        'unphysical_below': bounds, '__module__': __name__})
+
+
 class LinkageFriction(Effect):
     """The model's own friction in passive joints.
 
@@ -88,4 +160,4 @@ class LinkageFriction(Effect):
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         assert isinstance(state, LinkageState)
-        return state.linkage.joint_friction(state.robot, self.table(state.reversal))
+        return state.against_friction(self.table(state.reversal))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A link of an arm heavier or lighter than its model's.
+"""A body on a link that the model does not have, or a link heavier or lighter than its model's.
 
 References
 ----------
@@ -11,32 +11,26 @@ parameters.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import ClassVar
+from functools import cache
+from typing import Any, ClassVar
 
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.effects.added_body import AddedBody, Place
+from pprs_dynamics.physics.effects.effect import ARM, Card
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
-MOST_LINKS = 7  # that are told apart; arms hardly have more
 
+class LinkMass(AddedBody):
+    """A body more on a link, by default where the link's centre of mass is.
 
-class LinkMass(BodyEffect):
-    """Mass more in what a joint moves up to the next, spread as the model's mass is.
-
-    The link that carries the tool is left to the payload's effects.
+    The link that carries the tool is left to the payload.
     """
 
     name: ClassVar[str] = 'link_mass'
     acts_in = frozenset({ARM})
-    idealised: ClassVar[bool] = False
-    linear = tuple(
-        Parameter(f'link_{k}', f'm_{k}+', 'kg', f'mass beyond that of what joint {k} of arm.joints '
-                  'moves up to the next', -1e3, 1e3, 0.0, scale=0.2)
-        for k in range(1, MOST_LINKS + 1))
-    variants = tuple((parameter.name,) for parameter in linear)
+    is_of_one_place: ClassVar[bool] = True
+    linear = ()
     card = Card(
-        '(m_k, m_k c_k, I_k) -> (1 + m_k+ / m_k) (m_k, m_k c_k, I_k)',
+        'tau -> tau + what moves a body on the link: m_+ at c, with [I] about c, in its axes',
         'errors of this joint and of those that carry it, as large as the weight of the link '
         'times its distance from each axis, and in the same proportion to their accelerations; '
         'none of the joints behind it',
@@ -46,16 +40,21 @@ class LinkMass(BodyEffect):
         'compare with the data sheet, or weigh the link when it is taken apart',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
-    def changed(self, robot: Mechanism) -> Mechanism:
-        """Return the arm with the other links."""
-        inertial = robot.inertial.copy()
-        for k, parameter in enumerate(self.linear[:len(inertial)]):
-            inertial[k] *= 1 + self.values[parameter.name] / inertial[k, 0]
-        return replace(robot, inertial=inertial)
-
     @classmethod
-    def absent(cls, robot: Mechanism) -> frozenset[str]:
-        """Return the links that the arm does not have, and the one that carries the tool."""
-        last = robot.carrier
-        return frozenset(parameter.name for k, parameter in enumerate(cls.linear)
-                         if k >= len(robot.inertial) or k == last)
+    def bound(cls, robot: Any) -> Any:
+        """Return the effect on the links of a mechanism that have mass."""
+        if not isinstance(robot, Mechanism):
+            return cls
+        places = []
+        for k, name in enumerate(robot.body_names):
+            if k == robot.carrier:
+                continue
+            _, frame = robot.structure.links[name]
+            centre = frame.inverse.of_point(robot.inertial[k, 1:4] / robot.inertial[k, 0])
+            places.append((f'{name}.', name, tuple(round(float(x), 6) for x in centre)))
+        return _on(tuple(places))
+
+
+@cache
+def _on(places: tuple[Place, ...]) -> type[LinkMass]:
+    return LinkMass.on(places)

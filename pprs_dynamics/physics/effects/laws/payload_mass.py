@@ -11,9 +11,11 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from functools import cache
+from typing import Any, ClassVar
 
-from pprs_dynamics.physics.effects.altered_masses import with_payload
+from pprs_dynamics.physics.effects.added_body import AddedBody
+from pprs_dynamics.physics.effects.altered_masses import with_masses
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
@@ -39,7 +41,7 @@ class PayloadMass(BodyEffect):
         'so move fast',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
     arm_card = Card(
-        'tau -> tau + what moves a mass m_+ at the origin of the tool',
+        'tau -> tau + what moves a body at the tool: m_+ at c, with [I] about c',
         'an error of the joints that carry the arm, as large as its weight times its distance from '
         'each axis, and with it one that follows the accelerations of the tool',
         'a tool or workpiece that the model was not told of, or one that was taken off; a hose or '
@@ -48,6 +50,25 @@ class PayloadMass(BodyEffect):
         'the drives that is wrong by 5 % makes this mass wrong by 5 %',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Robot | Mechanism) -> Robot | Mechanism:
+    @classmethod
+    def bound(cls, robot: Any) -> Any:
+        """Return the body at the tool of a mechanism."""
+        return _payload_on(robot.structure.tool) if isinstance(robot, Mechanism) else cls
+
+    def changed(self, robot: Robot) -> Robot:
         """Return the robot with the other payload."""
-        return with_payload(robot, self.values['mass'])
+        return with_masses(robot, payload=robot.masses.payload + self.values['mass'])
+
+
+class _ToolBody(AddedBody):
+    """A body at the tool of a mechanism, by default at its origin."""
+
+    name: ClassVar[str] = PayloadMass.name
+    acts_in = frozenset({ARM})
+    card = PayloadMass.card
+    arm_card = PayloadMass.arm_card
+
+
+@cache
+def _payload_on(tool: str) -> type[_ToolBody]:
+    return _ToolBody.on((('', tool, (0.0, 0.0, 0.0)),))

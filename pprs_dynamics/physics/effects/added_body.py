@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A body more on a link of a mechanism: mass, centre, inertia about the centre."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from pprs_dynamics.physics.effects.effect import Parameter
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.description import body_at
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+
+AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
+Place = tuple[str, str, tuple[float, float, float]]
+
+
+def body_parameters(prefix: str, link: str, centre: tuple[float, ...]) -> tuple[Parameter, ...]:
+    """Return the parameters of a body on a link; `prefix` stands before their names."""
+    return (
+        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}', -1e3, 1e3,
+                  0.0 if prefix else None, scale=0.1),
+        *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
+                    -1e2, 1e2, at, scale=0.05) for axis, at in zip(AXES, centre, strict=True)),
+        *(Parameter(f'{prefix}{axes}', f'I_{axes}', 'kg m^2', f'its inertia {axes} about its '
+                    f'centre, in {link}', -1e4, 1e4, 0.0, scale=0.05)
+          for axes in (*MOMENTS, *PRODUCTS)))
+
+
+def body_coefficients(prefix: str, link: str) -> tuple[Parameter, ...]:
+    """Return what efforts are linear in: the first moment instead of the centre."""
+    mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0))
+    return (mass, *(Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
+                              f'mass times its place along {axis} of {link}, from the centre',
+                              -1e3, 1e3, 0.0, scale=0.05) for axis in AXES), *rest[3:])
+
+
+class AddedBody(BodyEffect):
+    """Bodies more on links.
+
+    Class attributes
+    ----------------
+    places : tuple of (prefix, link, centre)
+        Of the parameters; the link; where a body is unless its parameters say otherwise.
+    """
+
+    places: ClassVar[tuple[Place, ...]] = ()
+    idealised: ClassVar[bool] = False
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        super().__init__(values)
+        self._linear = self.to_coefficients(self.values)
+
+    @classmethod
+    def on(cls, places: tuple[Place, ...]) -> type[Self]:
+        """Return the effect with these places."""
+        linear = tuple(one for place in places for one in body_parameters(*place))
+        coefficients = tuple(one for prefix, link, _ in places
+                             for one in body_coefficients(prefix, link))
+        names = []
+        for prefix, _, _ in places:
+            mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
+            names += [(mass,), (mass, *moment)]
+            if not prefix:
+                inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
+                names += [(mass, *moment, *inertia),
+                          (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
+        made: type[Self] = type(cls.__name__, (cls,), {
+            'places': places, 'linear': linear, 'coefficients': coefficients,
+            'variants': tuple(names), '__module__': cls.__module__})
+        return made
+
+    @classmethod
+    def at(cls, coefficients: Mapping[str, float]) -> Self:
+        """Return the effect with these coefficients; those not given are zero."""
+        every = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
+        effect = cls(cls.from_coefficients(every))
+        effect._linear = every  # a moment without a mass has no centre
+        return effect
+
+    @classmethod
+    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the coefficients that belong to parameters."""
+        if not cls.places:
+            return super().to_coefficients(values)
+        found = {}
+        for prefix, _, centre in cls.places:
+            mass = values.get(f'{prefix}mass', 0.0)
+            found[f'{prefix}mass'] = mass
+            for axis, at in zip(AXES, centre, strict=True):
+                found[f'{prefix}moment_{axis}'] = mass * (values.get(f'{prefix}{axis}', at) - at)
+            for axes in (*MOMENTS, *PRODUCTS):
+                found[f'{prefix}{axes}'] = values.get(f'{prefix}{axes}', 0.0)
+        return found
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """Return the linear parameters that belong to coefficients."""
+        if not cls.places:
+            return super().from_coefficients(coefficients)
+        found = {}
+        for prefix, _, centre in cls.places:
+            mass = coefficients.get(f'{prefix}mass', 0.0)
+            found[f'{prefix}mass'] = mass
+            for axis, at in zip(AXES, centre, strict=True):
+                moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
+                found[f'{prefix}{axis}'] = at + (moment / mass if mass else 0.0)
+            for axes in (*MOMENTS, *PRODUCTS):
+                found[f'{prefix}{axes}'] = coefficients.get(f'{prefix}{axes}', 0.0)
+        return found
+
+    def changed(self, robot: Mechanism) -> Mechanism:
+        """Return the mechanism with the bodies."""
+        for prefix, link, centre in self.places:
+            c = [self._linear[f'{prefix}{name}'] for name in (
+                'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
+            if not any(c):
+                continue
+            mass, moment = c[0], np.array(c[1:4])
+            xx, yy, zz, xy, xz, yz = c[4:]
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            if mass:
+                body = body_at(mass, tuple(np.array(centre) + moment / mass), inertia)
+            else:
+                body = np.array([0.0, *moment, xx, xy, yy, xz, yz, zz])
+            robot = robot.with_body(link, body)
+        return robot
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from `{parameter: value}`, or from blocks by link."""
+        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
+
+    def to_file(self) -> dict[str, Any]:
+        """Return the bodies that are there."""
+        return nested({name: value for name, value in self.values.items()
+                       if value or not name.count('.')})
+
+
+def flattened(values: Any) -> Any:
+    """Return `{name.parameter: value}` of blocks by name, one level deep."""
+    if not isinstance(values, Mapping):
+        return values
+    flat = {}
+    for name, block in values.items():
+        if isinstance(block, Mapping):
+            flat.update({f'{name}.{last}': value for last, value in block.items()})
+        else:
+            flat[name] = block
+    return flat
+
+
+def nested(values: Mapping[str, float]) -> dict[str, Any]:
+    """Return blocks by name of `{name.parameter: value}`; names without a dot stay."""
+    blocks: dict[str, Any] = {}
+    for key, value in values.items():
+        name, dot, last = key.rpartition('.')
+        if dot:
+            blocks.setdefault(name, {})[last] = value
+        else:
+            blocks[key] = value
+    return blocks
+
+

@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The commands on robots with loops: what is hidden in the engine is named, where it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from pprs_dynamics.app.commands.pprs import main
+
+HEXAPOD = 'config/hexapod.yaml'
+
+
+def simulated(folder: Path, *effects: str, model: str = HEXAPOD, seed: int = 3) -> Path:
+    """Return a recording with effects; what they are is beside it."""
+    path = folder / 'run.csv'
+    hidden = [word for effect in effects for word in ('--effect', effect)]
+    assert main(['simulate', '--model', model, '--output', str(path), '--seed', str(seed),
+                 '--json', str(folder / 'truth.json'), *hidden]) == 0
+    return path
+
+
+def truth(folder: Path) -> list[dict]:
+    return json.loads((folder / 'truth.json').read_text())['effects']
+
+
+def test_info_tells_of_bodies_joints_loops_and_mobility(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found, page = tmp_path / 'info.json', tmp_path / 'info.html'
+    assert main(['info', '--model', HEXAPOD, '--json', str(found), '--report', str(page)]) == 0
+    said = capsys.readouterr().out
+    assert '13 bodies of 10.2 kg' in said
+    assert '6 degrees of freedom, 6 drives' in said
+    robot = json.loads(found.read_text())['robot']
+    assert [loop['name'] for loop in robot['loops']] == [f'ball_{k}' for k in range(1, 7)]
+    assert {joint['role'] for joint in robot['joints']} == {'driven', 'passive'}
+    assert 1 < robot['condition_number'] < 100
+    assert 'leg_6' in page.read_text()
+    assert main(['info']) == 2
+
+
+def test_friction_of_one_passive_joint_is_named_and_adopted(tmp_path: Path) -> None:
+    run = simulated(tmp_path, 'joint_friction')
+    (joint, hidden), = truth(tmp_path)[0]['parameters'].items()
+    answer, model = tmp_path / 'why.json', tmp_path / 'with.yaml'
+    assert main(['diagnose', str(run), '--model', HEXAPOD, '--json', str(answer)]) == 0
+    found = json.loads(answer.read_text())['effects']
+    assert [one['name'] for one in found] == ['joint_friction']
+    torque = found[0]['parameters'][f'{joint}.torque']
+    assert torque['value'] == pytest.approx(hidden['torque'], rel=0.15)
+    assert main(['adopt', 'joint_friction', str(run), '--model', HEXAPOD, '--output',
+                 str(model)]) == 0
+    block = yaml.safe_load(model.read_text())['/**']['ros__parameters']['effects']
+    assert list(block['joint_friction']) == [joint]
+    assert main(['compare', str(run), '--model', str(model), '--json', str(answer)]) == 0
+    assert json.loads(answer.read_text())['overall']['rms'] < 0.2
+
+
+def test_a_payload_is_found_with_its_centre(tmp_path: Path) -> None:
+    run = simulated(tmp_path, 'payload_mass', seed=2)
+    answer = tmp_path / 'why.json'
+    assert main(['diagnose', str(run), '--model', HEXAPOD, '--json', str(answer)]) == 0
+    found = json.loads(answer.read_text())['effects'][0]
+    assert found['name'] == 'payload_mass'
+    hidden = truth(tmp_path)[0]['parameters']['mass']
+    assert found['parameters']['mass']['value'] == pytest.approx(hidden, rel=0.03)
+    assert found['parameters']['z']['value'] == pytest.approx(0.05, abs=0.01)
+
+
+@pytest.mark.parametrize('model', [HEXAPOD, 'config/delta.yaml'])
+def test_nothing_hidden_is_adequate(tmp_path: Path, model: str) -> None:
+    run = simulated(tmp_path, model=model, seed=1)
+    answer = tmp_path / 'why.json'
+    assert main(['diagnose', str(run), '--model', model, '--json', str(answer)]) == 0
+    assert json.loads(answer.read_text())['verdict'] == 'adequate'
