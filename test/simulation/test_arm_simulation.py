@@ -79,7 +79,12 @@ def test_without_effects_the_model_leaves_noise(model: ArmModel) -> None:
     assert np.std(error, axis=0) == pytest.approx(np.full(3, 0.3), rel=0.1)
 
 
-@pytest.mark.parametrize('name', NAMES)
+def test_an_arm_has_no_passive_joint_that_could_rub(model: ArmModel) -> None:
+    with pytest.raises(HiddenEffectError, match='needs a passive joint'):
+        simulate_arm(model, ('joint_friction',), 4, duration=10.0)
+
+
+@pytest.mark.parametrize('name', [name for name in NAMES if name != 'joint_friction'])
 def test_every_hidden_effect_shows(model: ArmModel, name: str) -> None:
     plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=10.0)
                      for names in ((), (name,)))
