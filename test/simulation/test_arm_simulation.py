@@ -20,6 +20,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, simulate_arm
+from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 
 @pytest.fixture(scope='module')
