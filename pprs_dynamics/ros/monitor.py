@@ -13,6 +13,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import EffectError, PprsError
 from pprs_dynamics.measurement.residuals.live import (
     ARM_WINDOW,
@@ -35,6 +36,7 @@ from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED, publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
+from pprs_dynamics.simulation.export.tree_positions import TreePositions
 
 PARAMETERS = (
     FRAME,
@@ -76,6 +78,9 @@ class MonitorNode(ExplainsRefusals):
         self._model_effort = publisher(self, JointState, '~/model_effort')
         self._residual = publisher(self, JointState, '~/residual')
         self._error = publisher(self, Float64MultiArray, '~/error')
+        self._all_joints = publisher(self, JointState, '~/joint_states_full')
+        self._tree: TreePositions | None = None
+        self._latest: tuple[int, Array] | None = None
         subscription(self, JointState, 'joint_states', self._on_state, raw=True)
         steady_timer(self, 1.0 / own['update_rate'], self._judge)
         self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
@@ -95,6 +100,7 @@ class MonitorNode(ExplainsRefusals):
         except Rejection as rejection:
             self._reject(rejection)
             return
+        self._latest = stamp, position
         if self._cannot_begin:
             return  # samples would pile up
         if self._origin is None:
@@ -103,10 +109,25 @@ class MonitorNode(ExplainsRefusals):
         self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position, effort)
         self._windows.push(stamp, position, effort)
 
+    def _draw(self) -> None:
+        """Publish where all joints are, for programs that draw the robot."""
+        if self._latest is None or not self._all_joints.get_subscription_count():
+            return
+        (stamp, position), self._latest = self._latest, None
+        try:
+            model = self._settings.model
+            self._tree = self._tree or TreePositions(model)
+            joints = self._tree.at(position - model.position_error)
+        except PprsError as error:
+            self.get_logger().warning(f'not drawn: {error}', throttle_duration_sec=5.0)
+            return
+        self._all_joints.publish(conversions.joint_positions(stamp, self._tree.names, joints))
+
     def _judge(self) -> None:
+        self._draw()
         try:
             if self._begins_anew:
-                self._cannot_begin = True
+                self._cannot_begin, self._tree = True, None
                 self._comparison.use_model(self._settings.model)
                 self._begins_anew = self._cannot_begin = False
             compared = self._comparison.evaluate()

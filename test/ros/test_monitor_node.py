@@ -164,3 +164,15 @@ def test_positions_that_no_platform_has_are_told_and_survived(monitor: MonitorBe
     assert monitor.node._counters['WORKSPACE'] > 0
     monitor.send(400)
     assert max(monitor.error[-1].data) < RECONSTRUCTION
+
+
+def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBench) -> None:
+    monitor.send(100)
+    joints = monitor.bench.listen(JointState, '/monitor/joint_states_full', 1000)
+    assert monitor.bench.connected()
+    monitor.send(200)
+    assert monitor.bench.spin_until(lambda: joints)
+    found = dict(zip(joints[-1].name, joints[-1].position, strict=True))
+    assert {'hinge_1', 'hinge_2', 'hinge_3', 'ball_1_x', *DRIVES} <= set(found)
+    row = (stamps(joints)[-1] - START) * RATE // 1_000_000_000
+    assert [found[drive] for drive in DRIVES] == pytest.approx(monitor.position[row])

@@ -25,6 +25,7 @@ from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
+from pprs_dynamics.simulation.export.tree_positions import TreePositions
 from pprs_dynamics.simulation.export.writers import closures, written
 
 EXACT = 1e-9  # of the largest effort
@@ -289,3 +290,23 @@ def test_a_closure_that_mujoco_lacks_is_refused() -> None:
         replace(loop, kind='universal') for loop in structure.loops))
     with pytest.raises(ModelError, match=r'robot.loops.ball_1l.type is .universal., must be'):
         closures(other)
+
+
+def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
+    model = DriveModel.load()
+    tree = TreePositions(model)
+    robot = pinocchio.buildModelFromXML(text_of(model, URDF))
+    data = robot.createData()
+    position = model.drive_forces(motion).mechanism.position
+    for k in range(0, len(motion), 20):
+        q = pinocchio.neutral(robot)
+        for name, value in zip(tree.names, tree.at(position[k]), strict=True):
+            joint = robot.joints[robot.getJointId(name)]
+            # Joints without limits are a cosine and a sine there.
+            q[joint.idx_q:joint.idx_q + joint.nq] = (
+                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)])
+        pinocchio.framesForwardKinematics(robot, data, q)
+        platform = data.oMf[robot.getFrameId('platform')]
+        assert platform.translation == pytest.approx(motion.position[k], abs=1e-9)
+        turn = pinocchio.Quaternion(platform.rotation).coeffs()
+        assert abs(turn @ motion.orientation[k]) == pytest.approx(1.0, abs=1e-12)

@@ -67,6 +67,13 @@ def joint_state(
     return message
 
 
+def joint_positions(stamp: int, names: Sequence[str], position: Array) -> JointState:
+    """Return positions of joints at a time [ns], without efforts."""
+    message = JointState(name=list(names), position=doubles(position))
+    message.header.stamp = time(stamp)
+    return message
+
+
 def read_drives(message: JointState, field: str, may_be_nan: bool = False,
                 drives: Sequence[str] = DRIVES) -> Array:
     """Return one field of a JointState in the order of drives, matched by name, (D,).

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The robot drawn in RViz or Foxglove as it moves: tf of all links, passive joints too.
+
+    pprs export robot.yaml --to urdf --output robot.urdf
+    ros2 launch pprs_dynamics display.launch.py urdf:=robot.urdf model:=/path/robot.yaml
+"""
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from launch.actions import DeclareLaunchArgument, LogInfo
+from launch.substitutions import Command, LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+from launch import LaunchDescription
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the nodes and their arguments."""
+    arguments = {
+        'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
+                  'model file, with a path'),
+        'joint_states': ('joint_states', 'topic of the measurements'),
+        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1'),
+    }
+    given = {name: LaunchConfiguration(name) for name in ('urdf', *arguments)}
+    actions = [
+        DeclareLaunchArgument('urdf', description='file that pprs export has written'),
+        *(DeclareLaunchArgument(name, default_value=value, description=text)
+          for name, (value, text) in arguments.items()),
+        Node(package='pprs_dynamics', executable='monitor', output='screen',
+             parameters=[given['model'], {'joint_prefix': given['prefix']}],
+             remappings=[('joint_states', given['joint_states'])])]
+    try:
+        get_package_prefix('robot_state_publisher')
+    except PackageNotFoundError:
+        actions.append(LogInfo(msg='robot_state_publisher is not installed: no tf; the joints are '
+                               'on /monitor/joint_states_full'))
+    else:
+        description = ParameterValue(Command(['cat "', given['urdf'], '"']), value_type=str)
+        actions.append(Node(
+            package='robot_state_publisher', executable='robot_state_publisher', output='screen',
+            parameters=[{'robot_description': description}],
+            remappings=[('joint_states', '/monitor/joint_states_full')]))
+    return LaunchDescription(actions)
