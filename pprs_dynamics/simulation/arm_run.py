@@ -303,13 +303,14 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         body = int(random.choice(links))
         mass = scale * float(random.uniform(0.1, 0.3)) * float(model.robot.masses[body])
         engine.add_to_link(body, mass)
-        hidden.append(truth('link_mass', None, {model.robot.body_names[body]: {'mass': mass}},
+        hidden.append(truth('link_mass', None, {f'{model.robot.body_names[body]}.mass': mass},
                             'a point at its centre'))
     passive = {}
     if 'joint_friction' in chosen:
         name, effort, parameters = _hidden_joint(model, motion, plain, random, scale)
         passive[name] = effort
-        hidden.append(truth('joint_friction', None, {name: parameters},
+        hidden.append(truth('joint_friction', None, {
+            f'{name}.{key}': value for key, value in parameters.items()},
                             'T w / sqrt(w^2 + w_0^2)'))
     if 'base_tilt' in chosen:
         angle = scale * float(random.uniform(0.01, 0.03))
