@@ -25,6 +25,7 @@ from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
+from pprs_dynamics.simulation.export.replay import Replay, replay_excitation
 from pprs_dynamics.simulation.export.tree_positions import TreePositions
 from pprs_dynamics.simulation.export.writers import closures, written
 
@@ -211,6 +212,27 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     if kind == URDF:
         assert {'ball_1', 'ball_2'} & {each[:6] for each in result['not_expressed']}
         assert pinocchio.buildModelFromUrdf(str(file)).nv > 12
+
+
+@pytest.mark.parametrize(('joint', 'parameter', 'left'), [
+    ('elbow_1l', 'viscous', ()), ('elbow_1l', 'torque', ()),
+    ('elbow_1l', 'coulomb', ('joint_friction',)), ('ball_1l', 'viscous', ('joint_friction',))])
+def test_friction_of_passive_joints_that_was_adopted(
+    joint: str, parameter: str, left: tuple[str, ...],
+) -> None:
+    model = load_model('config/delta.yaml')
+    bare = {key: value for key, value in model.values.items()
+            if not key.startswith('friction.joints')}
+    model = build_model({**bare, 'friction.coulomb': (0.0,) * 3,
+                         'effects.active': ('joint_friction',),
+                         f'effects.joint_friction.{joint}.{parameter}': 0.02}, model.source)
+    expressed = express(model, MJCF)
+    assert expressed.not_expressed == left
+    robot = export_robot(expressed, MJCF)
+    found = replay_excitation(model, Replay(expressed, robot, written(robot, MJCF), MJCF))
+    assert found.error == pytest.approx(found.expected, abs=1e-8)
+    # Dry friction turns over at once in the file, within a width in the model.
+    assert (found.error.max() < 1e-8) == (not left and parameter == 'viscous')
 
 
 def test_a_hinge_that_closes_a_loop(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisO
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect, LinkageFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import (
     JointFriction,
     PassiveFriction,
@@ -56,6 +56,7 @@ OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
     DriveInertia: {'mass': ARMATURE},
     DriveSpring: {'stiffness': STIFFNESS, 'position': SPRINGREF},
 }
+OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION}
 OF_HINGES: Mapping[type[Effect], Mapping[str, str]] = {
     RevoluteFriction: {'viscous': DAMPING, 'torque': FRICTION},
     RevoluteStiffness: {'stiffness': STIFFNESS, 'angle': SPRINGREF},
@@ -85,8 +86,8 @@ class Expressed:
 class _Sorting:
     """Sorts what a model has into what a format holds and what it does not."""
 
-    def __init__(self, kind: str) -> None:
-        self.held = HELD[kind]
+    def __init__(self, kind: str, loops: frozenset[str]) -> None:
+        self.held, self.loops = HELD[kind], loops
         self.joints: dict[str, dict[str, float]] = {}
         self.left: list[str] = []
         self.effects: list[Effect] = []
@@ -136,9 +137,22 @@ class _Sorting:
             names = OF_HINGES[type(effect)]
             return self.take({hinge: {names[key]: value for key, value in values.items()}
                               for hinge in HINGES})
+        if isinstance(effect, JointFrictionEffect):
+            return self._holds_friction(effect.values)
         # A change of bodies and no force beside them.
         return isinstance(effect, BodyEffect) and (
             type(effect).load is BodyEffect.load and type(effect).apply is BodyEffect.apply)
+
+    def _holds_friction(self, values: Mapping[str, float]) -> bool:
+        """Sort friction of passive joints, by `<joint>.<parameter>`: all of it or none."""
+        joints: dict[str, dict[str, float]] = {}
+        for key, value in values.items():
+            joint, _, parameter = key.rpartition('.')
+            if value and (joint in self.loops or parameter not in OF_PASSIVE):
+                return False
+            if value:
+                joints.setdefault(joint, {})[OF_PASSIVE[parameter]] = value
+        return self.take(joints)
 
 
 def express(model: ForceModel, kind: str) -> Expressed:
@@ -149,7 +163,9 @@ def express(model: ForceModel, kind: str) -> Expressed:
     model : ForceModel
     kind : {'urdf', 'mjcf'}
     """
-    sorting = _Sorting(kind)
+    sorting = _Sorting(kind, frozenset(
+        loop.name for loop in model.robot.structure.loops) if isinstance(
+            model, ArmModel) else frozenset())
     own: tuple[Effect, ...]
     changed: Model
     if isinstance(model, DriveModel):
@@ -233,15 +249,14 @@ def _drive_friction(model: ForceModel, sorting: _Sorting, block: str) -> AxisFri
 
 
 def _passive(effect: LinkageFriction, sorting: _Sorting) -> LinkageFriction:
-    loops = {loop.name for loop in effect.structure.loops}
     kept: dict[str, dict[str, float]] = {}
     for name, numbers in effect.blocks.items():
         kept[name] = {}
         for key, value in numbers.items():
-            number = {'viscous': DAMPING, 'torque': FRICTION}.get(key)
+            number = OF_PASSIVE.get(key)
             if key == 'radius' or not value:
                 continue
-            if name not in loops and number and sorting.take({name: {number: value}}):
+            if name not in sorting.loops and number and sorting.take({name: {number: value}}):
                 kept[name][key] = value
             else:
                 sorting.left.append(f'friction.joints.{name}.{key}')
