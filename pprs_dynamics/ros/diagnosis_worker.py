@@ -3,7 +3,7 @@
 
 """The monitor's live diagnosis: windows of the stream, diagnosed in a process of its own.
 
-The process has the lowest priority and one thread; the node only copies arrays to it and looks,
+The process has a low priority and one thread; the node only copies arrays to it and looks,
 now and then, whether there is an answer. It is ended with the node, and started anew where it
 ended by itself.
 """
@@ -21,7 +21,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 
-LOWEST_PRIORITY = 19
+# A tenth of a node's share of a busy processor: at 19 a machine under load never answered.
+LOW_PRIORITY = 10
 LEAST_WINDOW = 0.5  # share of the span that a window must have to be diagnosed
 
 
@@ -123,7 +124,7 @@ class DiagnosisWorker:
 def _work(pipe: Any) -> None:
     """Answer windows until the pipe is closed."""
     with suppress(OSError):
-        os.nice(LOWEST_PRIORITY)
+        os.nice(LOW_PRIORITY)
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
     from pprs_dynamics.measurement.files.recording import Recording
