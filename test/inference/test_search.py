@@ -187,10 +187,22 @@ def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -
               'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
     found = select(MODEL, [recording_of(hidden)], DECISIONS)
     assert names(found.best) == ['coulomb_friction', 'viscous_friction']
+    assert found.rivals(DECISIONS.rival_margin) == []
     # One that is both is told with its cost.
     assert found.sets[0] is found.best
     both = next(one for one in found.sets if names(one) == ['asymmetric_friction'])
     assert both.cost > found.best.cost
+
+
+def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
+    found = select(MODEL, [recording_of({'viscous_friction': {'slide_3': {'coefficient': 6.0}}})],
+                   DECISIONS)
+    assert names(found.kept) == ['viscous_friction']
+    # It is among the sets, near or not, and never told as another explanation.
+    assert any(names(one) == ['asymmetric_friction'] for one in found.sets)
+    assert 'asymmetric_friction' not in {
+        name for rival in found.rivals(1e6) for name in rival.instead
+        if names(rival.found) == ['asymmetric_friction']}
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:

@@ -203,8 +203,8 @@ def test_a_drive_without_any_noise_has_finite_noise() -> None:
     bands = shapes.at_bands.shape[1]
     nothing, counts = np.zeros((1, bands)), np.full((1, bands), 10.0)
     with np.errstate(all='raise'):
-        found = shapes.improved(shapes.start(nothing, counts), nothing, counts,
-                                np.ones((1, bands)), steps=20)
+        found = shapes.fitted(shapes.start(nothing, counts), nothing, counts,
+                              np.ones((1, bands)))
         weights = 1 / (found @ shapes.at_bands) ** 2
     assert np.isfinite(weights).all()
     assert (found > 0).all()

@@ -26,6 +26,8 @@ from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
+SAME = 1e-6  # of a column's square may lie outside the span of others that do the same
+
 
 @dataclass(frozen=True)
 class Rival:
@@ -139,9 +141,30 @@ class Ranking:
                 break
             theirs = {candidate.name for candidate in other.effects} - ignored
             missing, instead = sorted(mine - theirs), sorted(theirs - mine)
-            if missing and instead:
+            if missing and instead and not self._is_freer(other, missing, instead):
                 rivals.append(Rival(other, tuple(missing), tuple(instead)))
         return rivals
+
+    def _is_freer(self, other: CandidateSet, missing: Sequence[str], instead: Sequence[str],
+                  ) -> bool:
+        """Return whether what a set has instead does all that is missing, with more coefficients.
+
+        Viscous friction is asymmetric friction that is the same in both directions: a freer form
+        that costs more is no other explanation.
+        """
+        for one in (one for c in self.kept.effects if c.name in missing for one in c.components):
+            theirs = [other.blocks[two].rows[one.drive] for c in other.effects
+                      if c.name in instead for two in c.components
+                      if one.drive is not None and two.drive == one.drive]
+            if one.drive is None or not theirs:
+                return False
+            mine, columns = self.kept.blocks[one].rows[one.drive], np.concatenate(theirs)
+            if len(columns) <= len(mine):
+                return False
+            left = mine - np.linalg.lstsq(columns.T, mine.T, rcond=None)[0].T @ columns
+            if np.sum(left ** 2) > SAME * np.sum(mine ** 2):
+                return False
+        return True
 
     def suspects(self, margin: float) -> list[tuple[EffectCandidate, CandidateSet]]:
         """Return effects that nearly pay beside the best, with their sets: noise would do it."""

@@ -32,8 +32,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.residuals.bands import SINGLE_BANDS, FrequencyBands
 
-# Scoring ends once a step lowers -2 ln of the likelihood by less on every drive; steps in the
-# logarithms of the amplitudes are bounded, and damped by a share of the information.
+# Scoring ends once a full step promises to lower -2 ln of the likelihood by less on every drive;
+# steps in the logarithms of the amplitudes are bounded, and damped by a share of the information.
 CONVERGED, MOST_STEPS, LONGEST_STEP, DAMPING = 1e-4, 30, 4.0, 1e-3
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Noise of a constant: along the slope of the lowest SLOPE_OCTAVES, CONTINUED_OCTAVES further down.
@@ -124,20 +124,24 @@ class NoiseShapes:
         before, damping = deviance(power), np.full(len(amplitudes), DAMPING)
         for _ in range(MOST_STEPS):
             slope = amplitudes * ((free / power - squares / power ** 2) @ phi.T)
+            # An amplitude at its least that would rather fall stands still.
+            moves = (amplitudes > least) | (slope < 0)
             scaled = amplitudes[:, :, None] * phi
             information = (scaled * (free / power ** 2)[:, None]) @ scaled.transpose(0, 2, 1)
-            diagonal = np.einsum('djj->dj', information)
-            diagonal += damping[:, None] * diagonal + 1e-9 * diagonal.max(axis=1, keepdims=True)
-            step = np.linalg.solve(information, -slope[:, :, None])[:, :, 0]
-            trial = np.maximum(
-                amplitudes * np.exp(np.clip(step, -LONGEST_STEP, LONGEST_STEP)), least)
+            # To unit diagonal: an amplitude far too small has hardly any information as it is.
+            scale = moves / np.sqrt(np.einsum('djj->dj', information))
+            information *= scale[:, :, None] * scale[:, None, :]
+            np.einsum('djj->dj', information)[:] = 1.0 + damping[:, None]
+            along = scale * np.linalg.solve(information, (-scale * slope)[:, :, None])[:, :, 0]
+            decrement = -np.sum(slope * along, axis=1)
+            step = np.clip(along, -LONGEST_STEP, LONGEST_STEP)
+            trial = np.maximum(amplitudes * np.exp(step), least)
             after = deviance(trial @ phi)
             better = after <= before
             amplitudes = np.where(better[:, None], trial, amplitudes)
-            power, gained = amplitudes @ phi, before - after
-            before = np.minimum(before, after)
+            power, before = amplitudes @ phi, np.minimum(before, after)
             damping = np.where(better, damping / 5, 10 * np.maximum(damping, DAMPING / 10))
-            if np.all(better & (gained < CONVERGED)):
+            if np.all(decrement < CONVERGED):
                 break
         return amplitudes
 
