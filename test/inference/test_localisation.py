@@ -66,6 +66,17 @@ def test_a_range_and_its_shares_are_those_of_the_error_in_it() -> None:
                                     'share_of_time', 'text'}
 
 
+def test_what_holds_nearly_all_of_a_recording_is_no_place() -> None:
+    recording = noisy(FIRST_SEED + 203)
+    late = recording.time > recording.time[len(recording) // 100]
+    measured = recording.measured.copy()
+    measured[:, 0] += np.where(late, 0.3, 0.0) * np.sign(recording.variables['velocity'][:, 0])
+    where = localise(replace(recording, measured=measured)).drives['slide_1'].statements
+    assert where
+    assert all(one.share_of_time <= 0.95 for one in where if one.kind in (
+        'range', 'directed_range', 'fast')), [one.text for one in where]
+
+
 def test_friction_names_the_direction_and_says_which_way_the_model_errs() -> None:
     recording = noisy(FIRST_SEED + 201)
     sign = np.tanh(recording.variables['velocity'][:, 0] / 0.001)

@@ -25,6 +25,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.measurement.residuals.bins import MOST_SHARE
 from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.system.parallel import each
@@ -33,6 +34,7 @@ MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
 ROUNDING = 1e-9  # of the effort, below which a difference is no error
 MOST_STATEMENTS = 3  # per drive
 PROPOSALS = 4  # fitted in full, of each scan
+PLACES = ('range', 'directed_range', 'fast')  # patterns that say where an error lies
 PROPOSED = -30.0  # lowest score of a pattern that is fitted in full
 
 
@@ -169,6 +171,9 @@ def _best(library: PatternLibrary, fit: JointFit, blocks: list[Block], stated: s
     scored = []
     for candidate, near in chosen.values():
         refined = library.refined(candidate, near)
+        if refined.pattern.kind in PLACES and np.mean(
+                refined.rows[library.d][0] != 0) > MOST_SHARE:
+            continue
         found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
         scored.append((fit.deviance - found.deviance - refined.price, refined, found))
     scored.sort(key=lambda one: -one[0])

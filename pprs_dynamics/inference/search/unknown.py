@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.patterns import (
     build_families,
     trial_limits,
 )
-from pprs_dynamics.measurement.residuals.bins import LEAST_SHARE
+from pprs_dynamics.measurement.residuals.bins import LEAST_SHARE, MOST_SHARE
 from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.system.parallel import each
 
@@ -259,8 +259,9 @@ class PatternLibrary:
             high = np.where(end == 1, trials, limits[1])
             rows = np.asarray(((values >= low[:, None]) & (values <= high[:, None])) * sign,
                               dtype=float)
-            # A handful of samples is an incident, not a range.
-            held = np.abs(rows).sum(axis=1) >= LEAST_SHARE * len(values)
+            # A handful of samples is an incident, not a range; so is what all but them leave.
+            share = np.abs(rows).mean(axis=1)
+            held = (share >= LEAST_SHARE) & (share <= MOST_SHARE)
             x = self.series.transform(rows)
             taken, side = Columns(self.regression, {self.d: x}).projected(fit)
             own = x ** 2 @ weights - np.einsum('ip,pq,iq->i', taken, fit.covariance, taken)

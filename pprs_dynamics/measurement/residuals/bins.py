@@ -12,6 +12,8 @@ from pprs_dynamics.arrays import Array
 BINS = 12
 # A bin must hold this share of the samples, else its mean is that of an incident.
 LEAST_SHARE = 0.01
+# A range that holds more of them is no place: it is all of the recording but an incident.
+MOST_SHARE = 0.95
 
 
 def bin_edges(values: Array, bins: int) -> Array:
