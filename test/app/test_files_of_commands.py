@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import errno
 import os
+import signal
 import warnings
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from pprs_dynamics.app.commands import info
 from pprs_dynamics.app.commands.arguments import INPUTS, OUTPUTS, number, output_file
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser, main
 from pprs_dynamics.measurement.files.recording import write_recording
+from pprs_dynamics.system.output_files import scratch_folder
 
 
 @pytest.fixture
@@ -161,3 +163,23 @@ def test_numbers_of_the_command_line_are_within_their_bounds() -> None:
     for text in ('0', '-1', '2.1', 'nan', 'inf', '1_0', '', '\uff11'):
         with pytest.raises(argparse.ArgumentTypeError, match='greater than 0 and at most 2 N'):
             read(text)
+
+
+def test_a_command_that_is_terminated_leaves_nothing_half_written(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(_: argparse.Namespace) -> int:
+        with scratch_folder(tmp_path / 'bag') as folder:
+            (folder / 'half').write_text('x')
+            os.kill(os.getpid(), signal.SIGTERM)
+        return 0
+
+    monkeypatch.setattr(info, 'run', run)
+    # Without a handler of its own the test would end here, not fail.
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        with pytest.raises(SystemExit) as end:
+            main(['info', str(tmp_path / 'any.csv')])
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert end.value.code == 128 + signal.SIGTERM
+    assert list(tmp_path.iterdir()) == []

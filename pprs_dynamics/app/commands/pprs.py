@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import argparse
 import ast
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -39,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
     use_one_thread()
     given = sys.argv[1:] if arguments is None else list(arguments)
-    with lasting_output() as output, warnings.catch_warnings():
+    with lasting_output() as output, warnings.catch_warnings(), _cleaned_up():
         warnings.showwarning = _show_warning
         status = _ended(given)
     if output.error is None or isinstance(output.error, BrokenPipeError):
@@ -47,6 +50,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return status
     _say(f'output: {output.error.strerror or output.error}', given)
     return 2
+
+
+@contextmanager
+def _cleaned_up() -> Iterator[None]:
+    """End on SIGTERM as on an error, so that what is half-written is taken away."""
+    if threading.current_thread() is not threading.main_thread():  # which alone gets signals
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _ended(given: Sequence[str]) -> int:
