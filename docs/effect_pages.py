@@ -28,11 +28,13 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_kinematics import (
     solve_forward_kinematics,
 )
+from pprs_dynamics.simulation.arm_run import draw_motion
 
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
@@ -47,6 +49,8 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'force_ripple': {'force': 0.3, 'phase': 0.0, 'pitch': 0.01},
            'hysteresis': {'force': 0.5, 'distance': 0.002},
            'homing_error': {'zero': 0.002},
+           'joint_friction': {'fork_4.torque': 0.3},
+           'link_mass': {'beam.mass': 0.5},
            'load_friction': {'coefficient': 0.05},
            'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
            'time_delay': {'delay': 0.02}}
@@ -96,12 +100,16 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
 
 
 def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
-    """Return the same of a joint of a small arm."""
+    """Return the same of a joint of a small arm; of friction in loops, of a hexapod's leg."""
     with tempfile.TemporaryDirectory() as folder:
-        model = made_up_arm.real_arm(Path(folder))
+        if effect is JointFrictionEffect:
+            model = ArmModel.load('config/hexapod.yaml')
+            motion = draw_motion(model, SECONDS, 3)
+        else:
+            model = made_up_arm.real_arm(Path(folder))
+            motion = made_up_arm.motion(SECONDS, RATE, seed=3)
         changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
     assert isinstance(changed, ArmModel)
-    motion = made_up_arm.motion(SECONDS, RATE, seed=3)
     plain = model.drive_forces(motion)
     added = changed.drive_forces(motion).total - plain.total
     joint = int(np.argmax((added ** 2).sum(axis=0)))

@@ -16,13 +16,16 @@ from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
-Place = tuple[str, str, tuple[float, float, float]]
+Place = tuple[str, str, tuple[float, float, float], float]
+KEPT = 0.05  # of a body that cannot be taken off it
 
 
-def body_parameters(prefix: str, link: str, centre: tuple[float, ...]) -> tuple[Parameter, ...]:
-    """Return the parameters of a body on a link; `prefix` stands before their names."""
+def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,
+                    ) -> tuple[Parameter, ...]:
+    """Return the parameters of a body on a link of some mass; `prefix` is before their names."""
     return (
-        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}', -1e3, 1e3,
+        Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
+                  -(1 - KEPT) * mass, 1e3,
                   0.0 if prefix else None, scale=0.1),
         *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
                     -1e2, 1e2, at, scale=0.05) for axis, at in zip(AXES, centre, strict=True)),
@@ -33,7 +36,7 @@ def body_parameters(prefix: str, link: str, centre: tuple[float, ...]) -> tuple[
 
 def body_coefficients(prefix: str, link: str) -> tuple[Parameter, ...]:
     """Return what efforts are linear in: the first moment instead of the centre."""
-    mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0))
+    mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
     return (mass, *(Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
                               f'mass times its place along {axis} of {link}, from the centre',
                               -1e3, 1e3, 0.0, scale=0.05) for axis in AXES), *rest[3:])
@@ -44,8 +47,9 @@ class AddedBody(BodyEffect):
 
     Class attributes
     ----------------
-    places : tuple of (prefix, link, centre)
-        Of the parameters; the link; where a body is unless its parameters say otherwise.
+    places : tuple of (prefix, link, centre, mass)
+        Of the parameters; the link; where a body is unless its parameters say otherwise; what the
+        link weighs, which nothing can take off it.
     """
 
     places: ClassVar[tuple[Place, ...]] = ()
@@ -59,10 +63,10 @@ class AddedBody(BodyEffect):
     def on(cls, places: tuple[Place, ...]) -> type[Self]:
         """Return the effect with these places."""
         linear = tuple(one for place in places for one in body_parameters(*place))
-        coefficients = tuple(one for prefix, link, _ in places
+        coefficients = tuple(one for prefix, link, _, _ in places
                              for one in body_coefficients(prefix, link))
         names = []
-        for prefix, _, _ in places:
+        for prefix, _, _, _ in places:
             mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
             names += [(mass,), (mass, *moment)]
             if not prefix:
@@ -88,7 +92,7 @@ class AddedBody(BodyEffect):
         if not cls.places:
             return super().to_coefficients(values)
         found = {}
-        for prefix, _, centre in cls.places:
+        for prefix, _, centre, _ in cls.places:
             mass = values.get(f'{prefix}mass', 0.0)
             found[f'{prefix}mass'] = mass
             for axis, at in zip(AXES, centre, strict=True):
@@ -103,7 +107,7 @@ class AddedBody(BodyEffect):
         if not cls.places:
             return super().from_coefficients(coefficients)
         found = {}
-        for prefix, _, centre in cls.places:
+        for prefix, _, centre, _ in cls.places:
             mass = coefficients.get(f'{prefix}mass', 0.0)
             found[f'{prefix}mass'] = mass
             for axis, at in zip(AXES, centre, strict=True):
@@ -115,7 +119,7 @@ class AddedBody(BodyEffect):
 
     def changed(self, robot: Mechanism) -> Mechanism:
         """Return the mechanism with the bodies."""
-        for prefix, link, centre in self.places:
+        for prefix, link, centre, _ in self.places:
             c = [self._linear[f'{prefix}{name}'] for name in (
                 'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
             if not any(c):

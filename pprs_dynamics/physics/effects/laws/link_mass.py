@@ -45,13 +45,14 @@ class LinkMass(AddedBody):
         """Return the effect on the links of a mechanism that have mass."""
         if not isinstance(robot, Mechanism):
             return cls
-        places = []
+        places: list[Place] = []
         for k, name in enumerate(robot.body_names):
             if k == robot.carrier:
                 continue
             _, frame = robot.structure.links[name]
             centre = frame.inverse.of_point(robot.inertial[k, 1:4] / robot.inertial[k, 0])
-            places.append((f'{name}.', name, tuple(round(float(x), 6) for x in centre)))
+            x, y, z = (round(float(each), 6) for each in centre)
+            places.append((f'{name}.', name, (x, y, z), float(robot.masses[k])))
         return _on(tuple(places))
 
 

@@ -53,7 +53,10 @@ class PayloadMass(BodyEffect):
     @classmethod
     def bound(cls, robot: Any) -> Any:
         """Return the body at the tool of a mechanism."""
-        return _payload_on(robot.structure.tool) if isinstance(robot, Mechanism) else cls
+        if not isinstance(robot, Mechanism):
+            return cls
+        carried = float(robot.masses[robot.carrier]) if robot.carrier >= 0 else 0.0
+        return _payload_on(robot.structure.tool, carried)
 
     def changed(self, robot: Robot) -> Robot:
         """Return the robot with the other payload."""
@@ -70,5 +73,5 @@ class _ToolBody(AddedBody):
 
 
 @cache
-def _payload_on(tool: str) -> type[_ToolBody]:
-    return _ToolBody.on((('', tool, (0.0, 0.0, 0.0)),))
+def _payload_on(tool: str, mass: float) -> type[_ToolBody]:
+    return _ToolBody.on((('', tool, (0.0, 0.0, 0.0), mass),))
