@@ -150,13 +150,14 @@ class Ranking:
         """Return whether what a set has instead does all that is missing, with more coefficients.
 
         Viscous friction is asymmetric friction that is the same in both directions: a freer form
-        that costs more is no other explanation.
+        that costs more is no other explanation. Of friction only: what else is one thing in a
+        recording (a spring and a mass along one sine) is one thing on no other motion.
         """
         for one in (one for c in self.kept.effects if c.name in missing for one in c.components):
             theirs = [other.blocks[two].rows[one.drive] for c in other.effects
-                      if c.name in instead for two in c.components
+                      if c.name in instead and c.effect.is_friction for two in c.components
                       if one.drive is not None and two.drive == one.drive]
-            if one.drive is None or not theirs:
+            if one.drive is None or not one.effect.is_friction or not theirs:
                 return False
             mine, columns = self.kept.blocks[one].rows[one.drive], np.concatenate(theirs)
             if len(columns) <= len(mine):
