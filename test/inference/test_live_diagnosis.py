@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import MotionError
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.live_diagnosis import (
     LiveDiagnosis,
     change_point,
-    share_in_motion,
 )
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 RATE, LENGTH = 100.0, 20.0  # [Hz, s]
@@ -71,8 +73,10 @@ def test_a_robot_that_stands_is_not_diagnosed(model: DriveModel, heavier: DriveM
     encoder = 1e-6 * np.random.default_rng(0).integers(-1, 2, moving.position.shape)
     standing = Recording.from_arrays(
         'standing', moving.time, moving.position[:1] + encoder, effort=moving.effort)
-    assert share_in_motion(moving) > 0.9
-    assert share_in_motion(standing) == 0.0
+    assert share_in_motion(moving.time, moving.position) > 0.9
+    assert share_in_motion(standing.time, standing.position) == 0.0
+    with pytest.raises(MotionError, match='no drive moves'):
+        diagnose(model, [standing])
     live = LiveDiagnosis(model).with_window(standing, 0.0)
     assert live.last is None
     assert 'stands' in live.note

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
@@ -35,6 +36,7 @@ from pprs_dynamics.inference.search.ranking import Ranking, select
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.rests import STANDSTILL, share_in_motion
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.measurement.residuals.paired_errors import rms
@@ -146,9 +148,13 @@ def diagnose(
     Raises
     ------
     PprsError
-        As `measure_residuals`.
+        Where no drive moves, and as `measure_residuals`.
     """
     report = progress or (lambda share: None)
+    if not any(share_in_motion(one.time, one.position) for one in recordings):
+        raise MotionError('position', f'no drive moves faster than {STANDSTILL:g} m/s or rad/s in '
+                          f'{", ".join(one.name for one in recordings)}', 'move: a robot that '
+                          'stands tells nothing of friction, masses or delays', 'shape')
     ranking = select(model, recordings, decisions, lambda share: report(0.9 * share))
     diagnosis = _Answer(ranking, validate, decisions).diagnosis()
     report(1.0)

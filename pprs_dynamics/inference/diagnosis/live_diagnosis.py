@@ -26,6 +26,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import with_drives, with_uncertainty
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.measurement.residuals.paired_errors import (
@@ -62,10 +63,7 @@ class LiveDecisions:
 
 
 LIVE_DECISIONS = LiveDecisions()
-# Slower than any motion that tells of friction [m/s, rad/s]: an encoder's noise looks like it.
-STANDSTILL = 1e-4
 MOST_VALUES = 3  # of an effect that its sentence holds
-GLANCE = 0.1  # [s] over which speeds are taken to tell motion from rest
 
 
 @dataclass(frozen=True)
@@ -198,7 +196,7 @@ class LiveDiagnosis:
         PprsError
             As `diagnose`.
         """
-        if share_in_motion(recording, live.moving) < live.least_motion:
+        if share_in_motion(recording.time, recording.position, live.moving) < live.least_motion:
             return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
         answer = diagnose(self.model, [recording], decisions=decisions)
         noise = answer.noise
@@ -252,18 +250,6 @@ def change_point(time: Array, gains: Array) -> float | None:
     cumulated = np.concatenate(([0.0], np.cumsum(gains)))
     first = int(np.argmin(cumulated))
     return None if first == 0 else float(time[min(first, len(time) - 1)])
-
-
-def share_in_motion(recording: Recording, moving: float = LIVE_DECISIONS.moving) -> float:
-    """Return the share of samples in which some drive moves, by its highest speed."""
-    # From sample to sample an encoder's steps look like motion; over a tenth of a second not.
-    span = max(1, round(GLANCE / float(np.median(np.diff(recording.time)))))
-    step, moved = np.diff(recording.time[::span]), np.diff(recording.position[::span], axis=0)
-    if not len(step):
-        return 0.0
-    speed = np.abs(moved) / step[:, None]
-    return float(np.mean(np.any(
-        speed > np.maximum(moving * speed.max(axis=0), STANDSTILL), axis=1)))
 
 
 def _certainty(without: ForceModel, with_effects: ForceModel, recording: Recording,

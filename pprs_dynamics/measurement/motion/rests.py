@@ -10,6 +10,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 
 SHORTEST_REST = 0.5  # [s]; reversals of a motion are over sooner
+# Slower than any motion that tells of friction [m/s, rad/s]: an encoder's noise looks like it.
+STANDSTILL = 1e-4
+GLANCE = 0.1  # [s] over which speeds are taken to tell motion from rest
 
 
 def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[np.bool_]:
@@ -36,3 +39,27 @@ def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[
     rests: np.typing.NDArray[np.bool_] = maximum_filter1d(
         span < speed * SHORTEST_REST, window, axis=0, mode='nearest')
     return rests
+
+
+def share_in_motion(time: Array, position: Array, moving: float = 0.0) -> float:
+    """Return the share of a recording in which some drive moves.
+
+    Parameters
+    ----------
+    time : (N,) array
+        [s]
+    position : (N, D) array
+        [m, rad]
+    moving : float, optional
+        Share of its highest speed above which a drive moves; always faster than `STANDSTILL`.
+    """
+    if len(time) < 2:
+        return 0.0
+    # From sample to sample an encoder's steps look like motion; over a tenth of a second not.
+    span = max(1, round(GLANCE / float(np.median(np.diff(time)))))
+    step, moved = np.diff(time[::span]), np.diff(position[::span], axis=0)
+    if not len(step):
+        return 0.0
+    speed = np.abs(moved) / step[:, None]
+    return float(np.mean(np.any(
+        speed > np.maximum(moving * speed.max(axis=0), STANDSTILL), axis=1)))
