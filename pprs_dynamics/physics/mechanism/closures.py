@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space, qr
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -171,6 +170,9 @@ class Closing:
         ModelError
             Where the drives do not determine the motion, or are not independent.
         """
+        # Here and not above: robots without loops need it not, and it takes long to import.
+        from scipy.linalg import null_space, qr
+
         _, J = self.derivatives(q)
         passive = np.setdiff1d(np.arange(len(q)), drives)
         J_p = J[:, passive]
