@@ -17,8 +17,15 @@ import pytest
 from made_up_recordings import judged, measured
 
 from pprs_dynamics.app.commands import info
-from pprs_dynamics.app.commands.arguments import INPUTS, OUTPUTS, number, output_file
+from pprs_dynamics.app.commands.arguments import (
+    INPUTS,
+    OUTPUTS,
+    RECORDING,
+    number,
+    output_file,
+)
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser, main
+from pprs_dynamics.app.workbench.server.folders import is_folder
 from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.system.output_files import scratch_folder
 
@@ -183,3 +190,13 @@ def test_a_command_that_is_terminated_leaves_nothing_half_written(
         signal.signal(signal.SIGTERM, before)
     assert end.value.code == 128 + signal.SIGTERM
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_device_is_told_to_be_one_where_a_bag_may_be_a_folder() -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match='it is a device, must be a file'):
+        output_file(*RECORDING)('/dev/null')
+
+
+def test_an_empty_name_is_no_folder_of_the_workbench() -> None:
+    assert not is_folder('')
+    assert is_folder('.')

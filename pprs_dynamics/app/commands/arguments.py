@@ -83,7 +83,7 @@ def output_file(*endings: str) -> Callable[[str], str]:
         try:
             if path.suffix not in endings and not path.is_dir():
                 raise argparse.ArgumentTypeError(f'{displayed(text)!r} must end in {known}')
-            if '' in endings and not path.suffix and os.path.lexists(path):
+            if '' in endings and not path.suffix and (path.is_dir() or path.is_file()):
                 raise UnreadableFileError(
                     path, 'it exists already, and bags are never overwritten')
             writable_file(path)

@@ -82,5 +82,6 @@ class Folders:
 
 def is_folder(path: str) -> bool:
     """Return whether a path is a folder that holds recordings, and none itself."""
-    return Path(path).is_dir() and not (Path(path) / METADATA).exists() and not any(
-        Path(path).glob('*.db3'))
+    # An empty name would be the present folder, which nobody named.
+    return bool(path) and Path(path).is_dir() and not (
+        (Path(path) / METADATA).exists() or any(Path(path).glob('*.db3')))
