@@ -141,4 +141,4 @@ class TrajectoryProxyNode(ExplainsRefusals):
         drives: Any = request.motion
         found = solve_forward_motion(
             model.robot.geometry, drives.position, drives.velocity, drives.acceleration)
-        return request._replace(motion=found.motion)
+        return TrajectoryRequest(found.motion, request.start, request.offsets)

@@ -174,7 +174,7 @@ def private_names(file: Path) -> list[str]:
 
 def test_no_other_file_of_the_nodes_uses_names_that_are_not_public() -> None:
     files = [*(PROJECT / 'pprs_dynamics' / 'ros').rglob('*.py'),
-             PROJECT / 'benchmarks' / 'stream.py', *(PROJECT / 'demo').glob('*.py')]
+             *(PROJECT / 'benchmarks' / 'node').glob('*.py'), *(PROJECT / 'demo').glob('*.py')]
     found = {file.name: private_names(file) for file in files}
     assert found.pop('rclpy_internals.py')
     # The system's own way to end a process.
