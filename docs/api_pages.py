@@ -37,6 +37,10 @@ def front_page() -> str:
     lines = ['# pprs_dynamics', '', pprs_dynamics.__doc__ or '', '']
     for name in pprs_dynamics.__all__:
         thing = getattr(pprs_dynamics, name)
+        if not str(getattr(thing, '__module__', '')).startswith(pprs_dynamics.__name__):
+            # An alias of another library's type, whose page is theirs.
+            lines += [f'## {name}', '', f'`{thing}`', '']
+            continue
         kind = 'autoclass' if inspect.isclass(thing) else (
             'autofunction' if callable(thing) else 'autodata')
         lines += [f'## {name}', '', '```{eval-rst}', f'.. {kind}:: pprs_dynamics.{name}',

@@ -25,7 +25,7 @@ from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.allowance import share_of_allowance
-from pprs_dynamics.inference.search.candidates import EffectCandidate, Placement
+from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.residuals.paired_errors import (
@@ -312,12 +312,12 @@ class Rows:
 
 def set_of(**columns: tuple[str, float, float]) -> Any:
     """Return a set: every column is 10 long, (effect, size of its force, of it its own)."""
-    candidates, places, coefficients = [], {}, []
+    candidates, blocks, places, coefficients = [], [], {}, []
     for number, (effect, size, _) in enumerate(columns.values()):
         block = Block({0: np.array([[10.0]])}, np.zeros((1, 1)))
-        term: Any = SimpleNamespace(drive=0)
-        placement = Placement(term, ('size',), block, 0.0)
-        candidates.append(EffectCandidate(CATALOGUE[effect], (placement,), 0.0, frozenset()))
+        component = Component.of(CATALOGUE[effect], 0, {}, ('size',))
+        candidates.append(EffectCandidate(CATALOGUE[effect], (component,)))
+        blocks.append(block)
         places[block] = slice(number, number + 1)
         coefficients.append(size / 10)
     own = [one for *_, one in columns.values()]
@@ -326,7 +326,10 @@ def set_of(**columns: tuple[str, float, float]) -> Any:
     fitted = SimpleNamespace(places=places, coefficients=np.array(coefficients),
                              covariance=covariance)
     fitted.of = lambda block: fitted.coefficients[places[block]]
-    return SimpleNamespace(effects=tuple(candidates), candidates=tuple(candidates), fit=fitted)
+    return SimpleNamespace(
+        effects=tuple(candidates), candidates=tuple(candidates), fit=fitted,
+        blocks_of=lambda one: [block for candidate, block in zip(candidates, blocks, strict=True)
+                               if candidate is one])
 
 
 DECIDED = Decisions(form_share=0.1, exact_share=0.02, own_form_share=0.05)
@@ -359,7 +362,7 @@ def test_an_idealised_effect_may_leave_a_tenth_in_another_and_a_fiftieth_in_an_e
 
 def test_lack_of_fit_stays_on_its_drives() -> None:
     found = set_of(a=('drive_spring', 100.0, 1.0), b=('coulomb_friction', 20.0, 1.0))
-    block = found.candidates[0].blocks[0]
+    (block,) = found.blocks_of(found.candidates[0])
     block.rows[1] = block.rows.pop(0)
     size, names = share(found, 1)
     assert size > 1e100
