@@ -28,6 +28,7 @@ from workbench_server import Workbench, workbench
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 
 pytestmark = [pytest.mark.nodes, needs_browser]
 
@@ -57,7 +58,7 @@ class Replay:
             for row in rows:
                 message = conversions.joint_state(
                     stamp, self.recording.effort[row], self.recording.position[row],
-                    self.recording.position[row], self.recording.drives)
+                    self.recording.position[row], RobotNames(self.recording.drives, ''))
                 message.velocity = []
                 self.publisher.publish(message)
                 stamp += 10_000_000
