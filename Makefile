@@ -10,13 +10,14 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 # Side by side, processes with several threads each for linear algebra only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo demo-feedforward test reproduce feedforward localisation score adoption benchmark \
+.PHONY: help demo demo-feedforward test fuzz reproduce feedforward localisation score adoption benchmark \
 	reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
 	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
+	@echo 'make fuzz       the tests of properties with new examples (10 minutes)'
 	@echo 'make docs       the documentation as a site, into build/docs/html'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
 	@echo 'make feedforward   the table and picture of docs/feedforward.md (15 minutes)'
@@ -43,6 +44,11 @@ demo-feedforward: $(VENV)/.demo
 test: $(VENV)/.test lint
 	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'not nodes'
 	$(BIN)/python -m pytest test -m nodes
+
+# Property tests with examples that no run has seen.
+fuzz: $(VENV)/.test
+	$(BIN)/python -m pytest -n 2 -m 'not nodes' --hypothesis-profile new \
+	    $$(grep -rl '^from hypothesis' test --include 'test_*.py')
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
