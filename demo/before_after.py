@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.report.figures import BLUE, GREY, RED, pyplot_module, save
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 SHOWN = 5.0  # [s] of the drive in detail
 Curves = list[tuple[Residuals, str, str]]

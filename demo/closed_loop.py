@@ -23,12 +23,12 @@ from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effects import draw_effects

@@ -30,8 +30,8 @@ from rich.markup import escape
 from rich.table import Table
 from ros_processes import executable
 
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
 

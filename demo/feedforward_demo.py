@@ -21,7 +21,7 @@ from rich.table import Table
 from ros_processes import executable, node_process, reserve_domain
 
 from pprs_dynamics.app.report.figures import draw_forces
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.drives import DRIVES
 
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')
 RATE = 200.0

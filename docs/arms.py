@@ -27,8 +27,8 @@ import numpy as np
 
 from pprs_dynamics import ArmModel
 from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -185,13 +185,13 @@ def pictures(bench: Bench) -> None:
     described, base, found = (load_model(bench.folder / f'{name}.yaml')
                               for name in ('arm', 'base', 'loaded'))
     curves = {}
-    run = read_recording(bench.folder / file(HELD_OUT), base.drives, gain=base.gain)
+    run = read_recording(bench.folder / file(HELD_OUT), base.recorded)
     for label, model, colour in (('URDF', described, '#bbbbbb'), ('base model', base, '#0072B2')):
         residuals, _ = measure_residuals(model, [run])
         curves[label] = residuals.time - residuals.time[0], residuals.error, colour
     draw(DOCS / 'images/arms_base.png', base.drives, curves,
          'measured minus model [N m], free run that was not fitted')
-    run = read_recording(bench.folder / file(LOADED), base.drives, gain=base.gain)
+    run = read_recording(bench.folder / file(LOADED), base.recorded)
     curves = {}
     for label, model, colour in (('base model', base, '#D55E00'),
                                  ('with the payload that was found', found, '#009E73')):

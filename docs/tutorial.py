@@ -29,9 +29,9 @@ from ros_processes import executable  # noqa: E402
 
 from pprs_dynamics import DriveModel  # noqa: E402
 from pprs_dynamics.app.report.figures import BLUE, GREY, RED, pyplot_module, save  # noqa: E402
+from pprs_dynamics.inference.residuals.measuring import measure_residuals  # noqa: E402
+from pprs_dynamics.inference.residuals.residuals import Residuals  # noqa: E402
 from pprs_dynamics.measurement.files.recording import read_recording  # noqa: E402
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals  # noqa: E402
-from pprs_dynamics.measurement.residuals.residuals import Residuals  # noqa: E402
 
 HIDDEN, ON = 'stribeck_friction', 'slide_1'
 BINS = 40  # of equal numbers of samples

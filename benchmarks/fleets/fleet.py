@@ -33,9 +33,9 @@ from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.survey import Job
 from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_bodies import PayloadMass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect

@@ -32,10 +32,10 @@ from benchmarks.hidden.recordings import LEAD, Case, Scene, noise_settings
 from benchmarks.hidden.strength import Whitening
 from benchmarks.scores.cases import outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.motion.reconstruction import reconstruct
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect

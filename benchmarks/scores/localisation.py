@@ -27,10 +27,10 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.scores.cases import Outcome, outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.localisation import localise
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 DURATION, RATE = 40.0, 100.0  # [s, Hz]
 NOISE, ERROR = 0.08, 0.3  # [N]

@@ -28,8 +28,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
+from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.rejection import Rejection

@@ -14,15 +14,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import EffectError, PprsError
-from pprs_dynamics.measurement.residuals.live import (
+from pprs_dynamics.inference.residuals.live import (
     ARM_WINDOW,
     ERROR_SPAN,
     WINDOW,
     Compared,
     LiveComparison,
 )
-from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.feedforward_settings import FRAME

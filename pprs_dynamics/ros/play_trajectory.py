@@ -13,8 +13,8 @@ from rclpy.node import Node
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.measurement.files.pose_files import read_poses
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer

@@ -22,10 +22,10 @@ from rich.console import Console
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.measurement.residuals.residuals import Residuals
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 DEMO = Path(diagnosis_demo.__file__)
 SEED, DURATION = 20, 8.0  # [s]

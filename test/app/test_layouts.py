@@ -11,7 +11,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.drives import DRIVES
 
 CONFIG = Path(__file__).parents[2] / 'config'
 

@@ -19,10 +19,10 @@ from made_up_pages import made_up_pages
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.app.report.robot_view import robot_page
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 PAGES = ('diagnosis', 'comparison', 'adoption', 'history', 'experiment', 'fleet', 'robot')
 MOST_BYTES = 4_000_000

@@ -23,9 +23,9 @@ from ros_processes import executable
 from pprs_dynamics.app.report.comparison_figures import thinned, worst_spans
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.progress import staged_bar
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
-from pprs_dynamics.measurement.residuals.residuals import Residuals
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 
 def pprs(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

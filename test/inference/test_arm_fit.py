@@ -20,9 +20,9 @@ from pprs_dynamics.inference.fit.arm_columns import columns_of
 from pprs_dynamics.inference.fit.arm_fit import fit_arm
 from pprs_dynamics.inference.fit.base_fit import fit_base
 from pprs_dynamics.inference.fit.bodies import Bodies, pseudo_inertia
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.measurement.motion.rests import find_rests
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.model_file import build_model
 
 NOISE = 0.2
@@ -130,7 +130,7 @@ def test_currents_times_gains_are_efforts(tmp_path: Path, name: str) -> None:
     gain = (10.0, 4.0, 30.0)
     model = arm.real_arm(tmp_path, **{'arm.gain': gain})
     path = write_currents(tmp_path, model, gain, name)
-    run = read_recording(path, model.drives, gain=model.gain)
+    run = read_recording(path, model.recorded)
     assert run.effort == pytest.approx(arm.record(model, arm.motion(20.0), NOISE).effort)
     error = measure_residuals(model, [run])[0].error
     assert np.sqrt(np.nanmean(error ** 2)) < 1.1 * NOISE
@@ -146,7 +146,7 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
     path = write_currents(tmp_path, real, gain, 'run.csv')
     given = build_model({**real.values, 'arm.gain': wrong, 'tolerances.arm.gain': 0.1},
                         real.source)
-    run = read_recording(path, given.drives, gain=given.gain)
+    run = read_recording(path, given.recorded)
     found = diagnose(given, [run])
     assert found.verdict == 'adequate'
     after = {one.label: one.after for one in found.calibrated}
@@ -157,8 +157,7 @@ def test_a_bag_in_amperes_is_multiplied_where_the_model_says_so(tmp_path: Path) 
     model = arm.real_arm(tmp_path, **{'arm.gain': (2.0, 2.0, 2.0), 'arm.effort_unit': 'A'})
     run = arm.record(model, arm.motion(5.0), 0.0)
     write_recording(tmp_path / 'bag.mcap', run)
-    read = read_recording(tmp_path / 'bag.mcap', model.drives, gain=model.gain,
-                          in_amperes=model.efforts_in_amperes)
+    read = read_recording(tmp_path / 'bag.mcap', model.recorded)
     assert read.effort == pytest.approx(2 * run.effort)
 
 

@@ -20,9 +20,9 @@ from pprs_dynamics.app.report.tables import comparison_view
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.localisation import DriveFindings, Localisation, localise
 from pprs_dynamics.inference.regression.joint_fit import Regression
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.profiles import error_profile, error_spectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.profiles import error_profile, error_spectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 PERIOD = 0.01
 NOWHERE = Localisation((), {})

@@ -10,22 +10,22 @@ import pytest
 
 from benchmarks.hidden.recordings import Case, make_case
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.fourier_path import FourierFamily, FourierPath
 from pprs_dynamics.inference.regression.base_columns import KnownNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 MODEL = DriveModel.load()
 TIME = np.arange(6000) * 0.002

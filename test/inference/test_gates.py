@@ -21,24 +21,24 @@ from made_up_diagnosis import (
 )
 
 from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.allowance import share_of_allowance
-from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
-from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.estimates import Estimate
-from pprs_dynamics.measurement.residuals.paired_errors import (
+from pprs_dynamics.inference.residuals.paired_errors import (
     BLOCKS,
     block_gains,
     certainty,
     rms,
     rms_by_drive,
 )
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.allowance import share_of_allowance
+from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 PLAIN = DriveModel.load()
 WITH_EFFECT = build_model({**PLAIN.values, 'effects.active': ['payload_mass'],

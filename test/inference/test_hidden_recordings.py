@@ -16,7 +16,7 @@ from short_recordings import short_recordings
 from benchmarks.hidden import motions, recordings, strength
 from benchmarks.scores import diagnosis, diagnosis_table
 from benchmarks.scores.cases import here, read_outcomes
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.sensors import EffortNoise
 

@@ -22,12 +22,12 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search import candidates as candidates_module
 from pprs_dynamics.inference.search import library as library_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.search import Search
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect

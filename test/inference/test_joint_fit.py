@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 SAMPLES, DRIVES, PERIOD = 240, 2, 0.01
 

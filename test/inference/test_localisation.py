@@ -15,7 +15,7 @@ import pytest
 
 from benchmarks.scores import localisation as benchmark
 from pprs_dynamics.inference.diagnosis.localisation import localise
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 FIRST_SEED = 40_000  # none of the benchmark's
 FAST_ENOUGH = 3.0  # [s] of processor time for 40 s of six drives at 100 Hz

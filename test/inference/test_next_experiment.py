@@ -15,6 +15,7 @@ import pytest
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
 from pprs_dynamics.inference.experiments.commissioning import commissioning
 from pprs_dynamics.inference.experiments.criteria import Contest, Explanation, Precision
@@ -40,6 +41,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     Component,
@@ -48,13 +50,11 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.ranking import Ranking, Rival
 from pprs_dynamics.inference.search.search import Search
-from pprs_dynamics.measurement.files.pose_files import read_poses
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 DURATION = 8.0
 HARMONICS = np.array([[1, 2, 4], [1, 3, 5], [2, 3, 4], [1, 2, 3], [1, 4, 5], [2, 4, 5]])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, Regression
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.scan import Entry, Scan
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 SAMPLES, DRIVES, PERIOD = 600, 3, 0.01

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search import search as search_module
@@ -31,7 +32,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import AXIS, DRIVES
+from pprs_dynamics.physics.three_pprs.robot import AXIS
 
 AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
                'friction.reversal_velocity': 0.001}

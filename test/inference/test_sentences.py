@@ -30,6 +30,7 @@ from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.error_steps import error_steps
 from pprs_dynamics.inference.diagnosis.found_effects import RankedSet
@@ -49,7 +50,6 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 VARIABLES = (*OWN, *PLATFORM, 'velocity', 'direction', 'time', 'frequency', 'position of lift_1',
              'velocity of slide_3')

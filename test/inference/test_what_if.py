@@ -17,16 +17,16 @@ from browser import Seen, chromium, needs_browser
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.diagnosis.what_if import what_if
 from pprs_dynamics.inference.regression.joint_fit import JointFit
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 HIDDEN = {'stribeck_friction', 'payload_mass'}
 MOST_BYTES = 4_000_000

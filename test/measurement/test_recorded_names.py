@@ -17,12 +17,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.io import savemat
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, JOINT_STATE
-from pprs_dynamics.measurement.files.recording import Recording, read_for
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 RATE, EPOCH = 100, 1_700_000_000
 POINT = """float64[] positions
@@ -134,7 +134,7 @@ def test_states_of_other_messages_are_read(
     for k, moment in enumerate(time):
         write(bag, float(moment), position[k], effort[k])
     bag.writer.close()
-    recording = read_for(DriveModel.load(), bag.path)
+    recording = read_recording(bag.path, DriveModel.load().recorded)
     np.testing.assert_allclose(recording.position, position, atol=1e-12)
     np.testing.assert_allclose(recording.effort, effort, atol=1e-12)
     np.testing.assert_allclose(recording.time - recording.time[0], time, atol=1e-9)
@@ -151,7 +151,7 @@ def test_a_slower_message_lies_between_its_neighbours(run: Any, tmp_path: Path) 
         if k % 2 == 0:
             bag.state('/joint_states', float(moment), DRIVES[3:], position[k, 3:], effort[k, 3:])
     bag.writer.close()
-    recording = read_for(DriveModel.load(), bag.path)
+    recording = read_recording(bag.path, DriveModel.load().recorded)
     between = (position[:-2:2, 3:] + position[2::2, 3:]) / 2
     np.testing.assert_allclose(recording.position[1:len(between) * 2:2, 3:], between, atol=1e-9)
 
@@ -166,11 +166,11 @@ def test_joints_have_the_names_of_the_machine(run: Any, tmp_path: Path) -> None:
     for k, moment in enumerate(time):
         bag.state('/joint_states', float(moment), names, position[k], effort[k])
     bag.writer.close()
-    recording = read_for(model, bag.path)
+    recording = read_recording(bag.path, model.recorded)
     assert recording.drives == DRIVES
     np.testing.assert_array_equal(recording.effort, effort)
     with pytest.raises(UnreadableFileError, match='slide_1'):
-        read_for(DriveModel.load(), bag.path)
+        read_recording(bag.path, DriveModel.load().recorded)
 
 
 COLUMNS = {'columns.time': 't', **{
@@ -192,7 +192,7 @@ def written(path: Path, time: np.ndarray, position: np.ndarray, effort: np.ndarr
 
 
 def read_with(model: DriveModel, path: Path) -> Recording:
-    return read_for(model, path)
+    return read_recording(path, model.recorded)
 
 
 @pytest.mark.parametrize('suffix', ['.csv', '.parquet', '.mat', '.log'])
@@ -217,7 +217,7 @@ def test_what_is_no_such_table_is_one_sentence(
         path.write_bytes(b'\x00\xff' * 400)
         model = with_keys(**COLUMNS)
     with pytest.raises(PprsError) as caught:
-        read_for(model, path)
+        read_recording(path, model.recorded)
     assert '\n' not in str(caught.value)
     assert damage == 'bytes' or 'missing' in str(caught.value)
 

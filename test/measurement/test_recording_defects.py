@@ -28,11 +28,11 @@ from made_up_recordings import (
     write_plain_bag,
 )
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
 from pprs_dynamics.measurement.files.samples import POLICY, Samples
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 
 @pytest.mark.parametrize('seed', range(5))

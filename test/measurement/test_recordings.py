@@ -44,6 +44,7 @@ from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin
 from sensor_msgs.msg import JointState
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError, MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.joint_state_cdr import Layout, serialised
 from pprs_dynamics.measurement.files.message_blocks import MOST_LAYOUTS, JointStateBlocks
@@ -54,7 +55,6 @@ from pprs_dynamics.measurement.files.recording import (
     write_recording,
 )
 from pprs_dynamics.measurement.files.samples import POLICY
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 # ---------------------------------------------------------------------------------- formats
 

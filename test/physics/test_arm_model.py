@@ -18,16 +18,16 @@ import yaml
 
 from pprs_dynamics import ArmModel, DriveModel, JointMotion, PprsError, load_model
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.measurement.files.recording import Recording, read_for, write_recording
-from pprs_dynamics.measurement.residuals.conventions import find_mistakes
-from pprs_dynamics.measurement.residuals.readings import readings
+from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.readings import readings
+from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.physics.effects.drive_effect import DriveRange
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
-from pprs_dynamics.physics.mechanism.units import DriveUnits
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.physics.model.model_writer import write_model
@@ -240,7 +240,7 @@ def defects_of(tmp_path: Path, change: Callable[[Array, Array], None]) -> str:
     path = tmp_path / 'run.csv'
     write_recording(path, Recording.from_arrays('run', run.time, position, None, effort,
                                                 model.drives))
-    found = read_for(model, path)
+    found = read_recording(path, model.recorded)
     return ' '.join(one.text for one in (*find_mistakes(model, found), *found.findings))
 
 

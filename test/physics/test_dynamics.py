@@ -31,9 +31,10 @@ from random_states import (
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.three_pprs.robot import DRIVES, Masses, Robot
+from pprs_dynamics.physics.three_pprs.robot import Masses, Robot
 
 # Forces of some 40 N and powers of some 100 W, with the rounding errors of a few hundred
 # operations; a wrong term shows at 1e-3 or more.

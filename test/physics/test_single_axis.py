@@ -20,10 +20,10 @@ from pprs_dynamics.inference.adoption.request import EffectRequest, EffectReques
 from pprs_dynamics.inference.regression.base_columns import KnownNumber
 from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.motion.reconstruction import reconstruct
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import read_parameters

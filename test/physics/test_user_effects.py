@@ -197,7 +197,7 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.model.model_file import build_model
 given = DriveModel.load(sys.argv[1])
 true = build_model({**given.values, 'effects.active': ['effort_filter'],

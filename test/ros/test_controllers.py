@@ -17,8 +17,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.command_cdr import CommandBytes

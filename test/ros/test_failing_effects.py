@@ -24,10 +24,10 @@ from test_monitor_node import MonitorBench
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 MOTION = random_motion(np.random.default_rng(11), 3)

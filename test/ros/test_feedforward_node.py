@@ -23,8 +23,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.rejection import CODES
 

@@ -27,12 +27,12 @@ from short_recordings import short_recordings
 from std_msgs.msg import Float64MultiArray
 
 from benchmarks.scores import adoption
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import read_parameters
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes

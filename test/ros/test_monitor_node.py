@@ -17,8 +17,8 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
 

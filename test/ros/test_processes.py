@@ -17,7 +17,8 @@ from node_bench import Bench, bench
 from ros_processes import environment, executable, node_process
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from pprs_dynamics.measurement.files.pose_files import read_poses, write_poses
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.mechanism.motion_files import read_poses, write_motion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 
@@ -43,7 +44,7 @@ def test_a_csv_of_poses_is_played_as_the_motion_that_it_is(
     running: Bench, ros_domain: int, tmp_path: Path,
 ) -> None:
     motion = Excitation(duration=2.0, seed=3).motion(np.arange(0, 2.0, 0.02))
-    write_poses(tmp_path / 'poses.csv', motion)
+    write_motion(tmp_path / 'poses.csv', DRIVES, motion)
     received = running.listen(MultiDOFJointTrajectory, '/feedforward/trajectory', 1000)
     done = play(ros_domain, 'source:=csv', f'file:={tmp_path / "poses.csv"}', 'rate:=50.0',
                 'points:=2')

@@ -20,7 +20,7 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 

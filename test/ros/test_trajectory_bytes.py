@@ -18,7 +18,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros import feedforward
 from pprs_dynamics.ros.messages import conversions, serialisation
 from pprs_dynamics.ros.messages.cdr_validation import is_whole, message_in

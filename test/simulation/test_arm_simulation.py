@@ -127,7 +127,7 @@ def test_statements_have_the_units_of_joints(model: ArmModel, tmp_path: Path,
                                              capsys: pytest.CaptureFixture[str]) -> None:
     without = build_model({**model.values, 'friction.coulomb': (0.0, 4.0, 0.0)}, model.source)
     from pprs_dynamics.inference.diagnosis.localisation import localise
-    from pprs_dynamics.measurement.residuals.measuring import measure_residuals
+    from pprs_dynamics.inference.residuals.measuring import measure_residuals
     run = simulate_arm(model, (), 0)
     assert run.motion.time is not None
     recording = Recording.from_arrays('run', run.motion.time, run.position, None, run.effort,

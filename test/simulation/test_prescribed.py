@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_bodies import PayloadPickUp

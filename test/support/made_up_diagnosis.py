@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
@@ -19,11 +20,10 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 SAMPLES, PERIOD = 1500, 0.01
 NOISE = 0.05  # [N]

@@ -28,6 +28,7 @@ from pprs_dynamics.app.report.experiment_page import experiment_page
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.history_page import history_page
 from pprs_dynamics.app.report.page import Page
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.comparison import compare
@@ -38,12 +39,11 @@ from pprs_dynamics.inference.experiments.next_experiment import (
     ExpectedEvidence,
     Experiment,
 )
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import Step
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 DAY = 86400 * 10 ** 6  # [us]
 

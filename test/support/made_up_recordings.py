@@ -14,9 +14,9 @@ import pandas as pd
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.measurement.files.samples import Finding
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 STORE = get_typestore(Stores.ROS2_KILTED)
 STATE = 'sensor_msgs/msg/JointState'

@@ -15,8 +15,8 @@ from pprs_dynamics.app.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.report.history_tables import history_view
 from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model

@@ -18,11 +18,11 @@ from pprs_dynamics.app.commands.output import make_folder, write_json
 from pprs_dynamics.app.report.figures import draw_figure_8, draw_figure_9
 from pprs_dynamics.app.report.tables import claims_table
 from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.measurement.files.csv_tables import write_table
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.reproduction import Reproduction, reproduce
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
+from pprs_dynamics.system.csv_tables import write_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

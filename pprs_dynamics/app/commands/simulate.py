@@ -17,8 +17,8 @@ from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.measurement.files.pose_files import read_poses
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.model_file import load_model

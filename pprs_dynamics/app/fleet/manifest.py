@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
-from pprs_dynamics.measurement.files.csv_tables import read_rows
+from pprs_dynamics.system.csv_tables import read_rows
 from pprs_dynamics.system.numbers import parse_number
 
 ENDINGS = ('.csv', '.mcap', '.db3')

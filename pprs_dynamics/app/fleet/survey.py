@@ -29,10 +29,10 @@ from pprs_dynamics.app.fleet.store import key_of
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
-from pprs_dynamics.measurement.files.recording import Recording, describe, read_for
-from pprs_dynamics.measurement.residuals.conventions import find_mistakes
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.plain_text import displayed
@@ -196,7 +196,7 @@ def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
 
 def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
     model = _model(job.model, tuple(job.values.items()))
-    recording = read_for(model, path, job.topic)
+    recording = read_recording(path, model.recorded, job.topic)
     summary = describe(recording)
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}

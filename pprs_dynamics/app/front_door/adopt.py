@@ -20,7 +20,7 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.request import requested
-from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -160,7 +160,7 @@ class AdoptionRunResult(Result):
     def page(self) -> Page:
         """Return the page of `pprs history --report` of the model."""
         from pprs_dynamics.app.report.history_page import history_page
-        from pprs_dynamics.physics.mechanism.units import common_effort
+        from pprs_dynamics.drives import common_effort
         from pprs_dynamics.physics.model.ledger import read_steps
 
         return history_page('the adopted model', read_steps(self.model.values),

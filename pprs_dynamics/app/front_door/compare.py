@@ -17,11 +17,11 @@ from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.localisation import localise
 from pprs_dynamics.inference.diagnosis.statements import Statement
-from pprs_dynamics.measurement.files.recording import read_for
-from pprs_dynamics.measurement.residuals.comparison_bag import write_comparison
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.measurement.residuals.paired_errors import rms, rms_by_drive
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -202,5 +202,6 @@ def _beside(inputs: Inputs, path: Path, topic: str | None) -> Beside:
                              f'{", ".join(inputs.model.drives)}')
         residuals, _ = measure_residuals(other, inputs.fitted)
     else:
-        residuals, _ = measure_residuals(inputs.model, [read_for(inputs.model, path, topic)])
+        residuals, _ = measure_residuals(inputs.model, [
+            read_recording(path, inputs.model.recorded, topic)])
     return Beside(displayed(path.name), rms_by_drive(residuals), rms(residuals), residuals.unit)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
 from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
-from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 

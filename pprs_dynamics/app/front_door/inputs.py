@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
-from pprs_dynamics.measurement.files.recording import Recording, read_for
+from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.readings import POSITION_UNIT
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.measurement.residuals.conventions import find_mistakes
-from pprs_dynamics.measurement.residuals.readings import POSITION_UNIT
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
@@ -135,8 +135,9 @@ def read_checked(model: ForceModel, path: File, topic: str | None = None,
                  progress: Progress | None = None) -> Recording:
     """Read a recording of a model's drives; what its numbers rather mean is in its findings."""
     report, stage = progress or (lambda what, share: None), f'reading {displayed(path)}'
-    return with_mistakes(model, read_for(model, path, topic, lambda done, total: report(
-        stage, done / total if total else 0.0)))
+    return with_mistakes(model, read_recording(
+        path, model.recorded, topic,
+        lambda done, total: report(stage, done / total if total else 0.0)))
 
 
 def with_mistakes(model: ForceModel, recording: Recording) -> Recording:

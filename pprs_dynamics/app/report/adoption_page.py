@@ -15,9 +15,9 @@ from pprs_dynamics.app.report.diagnosis_figures import before_and_after, contrib
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
+from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 

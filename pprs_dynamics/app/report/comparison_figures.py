@@ -13,12 +13,12 @@ import numpy as np
 
 from pprs_dynamics.app.report.page import plotly_objects
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.diagnosis.comparison import Comparison
 from pprs_dynamics.inference.diagnosis.statements import WORDS, Statement, read_in
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.profiles import Profile, error_profile, error_spectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
-from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.profiles import Profile, error_profile, error_spectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 MEASURED, MODEL, ERROR, MARK = '#666666', '#0072B2', '#D55E00', '#E69F00'
 LINES = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')

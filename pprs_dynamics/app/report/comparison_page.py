@@ -13,8 +13,8 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.tables import comparison_headings, comparison_rows
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import sentence
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 FIRST = 3  # statements on the first screen

@@ -29,7 +29,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.partial import partial_residual, remaining_residuals
 from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
 from pprs_dynamics.inference.diagnosis.statements import Statement
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 AFTER, FLOOR, RIVAL, OTHER = '#009E73', '#1a1a1a', '#E69F00', '#bbbbbb'
 

@@ -24,7 +24,7 @@ from pprs_dynamics.inference.diagnosis.sentences import (
 )
 from pprs_dynamics.inference.diagnosis.set_words import set_rows
 from pprs_dynamics.inference.diagnosis.what_if import WhatIf
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 METHOD = (
     'Model and measured effort get the same treatment; every effect of the catalogue, in every '

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.reproduction import Reproduction
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.system.output_files import new_file
 
 # Colours that stay apart in grey print and for colour-blind readers (Okabe and Ito).

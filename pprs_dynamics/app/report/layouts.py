@@ -16,7 +16,7 @@ from itertools import count
 from typing import Any
 from xml.etree import ElementTree
 
-from pprs_dynamics.measurement.residuals.comparison_bag import MEASURED, MODEL, RESIDUAL
+from pprs_dynamics.inference.residuals.comparison_bag import MEASURED, MODEL, RESIDUAL
 
 COLOURS = {MEASURED: '#1f77b4', MODEL: '#ff7f0e', RESIDUAL: '#d62728'}
 FORCES = 'measured and model'

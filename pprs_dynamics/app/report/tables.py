@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain
 
 if TYPE_CHECKING:
+    from pprs_dynamics.drives import DriveUnits
     from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
     from pprs_dynamics.measurement.files.recording import Summary
-    from pprs_dynamics.physics.mechanism.units import DriveUnits
     from pprs_dynamics.physics.model.reproduction import Claim
     from pprs_dynamics.simulation.drive_control import Note
 

@@ -17,7 +17,7 @@ from pprs_dynamics.app.report.page import Page, one_script
 from pprs_dynamics.inference.diagnosis.what_if import OptionalForces, WhatIf
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 POINTS = 400  # pairs of extremes that are shown of a drive: a third of a screen is no wider
 LARGEST = 32767  # of 16 bits; the least stands for a sample that was not measured

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 Mask = NDArray[np.bool_]
 """Samples and drives that are meant, (M, D)."""

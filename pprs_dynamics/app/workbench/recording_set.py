@@ -13,10 +13,10 @@ from pathlib import Path
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
-from pprs_dynamics.measurement.files.recording import Recording, read_for
+from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.readings import POSITION_UNIT
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.measurement.residuals.conventions import find_mistakes
-from pprs_dynamics.measurement.residuals.readings import POSITION_UNIT
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
@@ -52,8 +52,8 @@ class RecordingSet:
         """
         paths = [str(path) for path in (*recordings, *validation)]
         _refuse_repeated(paths)
-        fitted, held_out = ({str(path): read_for(model, path, topic) for path in listed}
-                            for listed in (recordings, validation))
+        fitted, held_out = ({str(path): read_recording(path, model.recorded, topic)
+                             for path in listed} for listed in (recordings, validation))
         return cls(fitted, held_out, frozenset(paths)).once()
 
     def once(self) -> RecordingSet:
@@ -73,7 +73,7 @@ class RecordingSet:
             As `read`.
         """
         _refuse_repeated([*self.fitted, *self.held_out, path])
-        more = {path: with_mistakes(model, read_for(model, path, None))}
+        more = {path: with_mistakes(model, read_recording(path, model.recorded, None))}
         return RecordingSet(self.fitted if is_held_out else {**self.fitted, **more},
                             {**self.held_out, **more} if is_held_out else self.held_out,
                             self.files | {path}).once()

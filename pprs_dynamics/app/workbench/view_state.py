@@ -13,12 +13,12 @@ import numpy as np
 
 from pprs_dynamics.app.workbench.tick_fits import Exact, Offer, Tick, TickFits
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.mechanism.units import DriveUnits, common_effort
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the

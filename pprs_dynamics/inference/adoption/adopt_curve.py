@@ -21,11 +21,11 @@ from pprs_dynamics.inference.adoption.fit_curve import (
     price,
 )
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.measurement.residuals.paired_errors import block_gains, rms
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model

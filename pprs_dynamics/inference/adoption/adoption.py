@@ -10,8 +10,8 @@ from typing import Any
 
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
 from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 BLOCKS, VALIDATION = 'blocks', 'validation'

@@ -20,9 +20,9 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, UnknownNameError
-from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.laws.measured_curve import (
     DEGREE,
     OF,

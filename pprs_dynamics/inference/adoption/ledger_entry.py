@@ -13,9 +13,9 @@ from os import PathLike
 
 from pprs_dynamics import __version__
 from pprs_dynamics.inference.adoption.adoption import Adoption
+from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step, with_step
 from pprs_dynamics.physics.model.model_file import build_model

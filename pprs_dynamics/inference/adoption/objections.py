@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.adoption.fit_effect import EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.residuals.paired_errors import certainty
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
-from pprs_dynamics.measurement.residuals.paired_errors import certainty
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
-from pprs_dynamics.physics.mechanism.units import common_effort
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 SURE = 2.0  # standard deviations

@@ -9,6 +9,7 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
 from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
@@ -16,7 +17,6 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 
 class EffectRequestError(PprsError, ValueError):

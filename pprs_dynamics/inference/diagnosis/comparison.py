@@ -15,8 +15,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent
 from pprs_dynamics.inference.diagnosis.statements import Statement
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 
 # Of the effort's size, below which a changing effort is rounding.
 CONSTANT = 1e-9

@@ -22,6 +22,10 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.paired_errors import rms
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, calibrations, estimate
@@ -37,10 +41,6 @@ from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import STANDSTILL, share_in_motion
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.paired_errors import rms
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_SETS = 8  # that are told with their costs

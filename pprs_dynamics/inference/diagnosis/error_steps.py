@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 # The model's own numbers that move without changing the error by this share are no step.
 LEAST_STEP = 1e-3

@@ -24,16 +24,16 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import with_drives, with_uncertainty
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.rests import share_in_motion
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.paired_errors import (
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.paired_errors import (
     block_gains,
     certainty,
     sample_gains,
 )
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 

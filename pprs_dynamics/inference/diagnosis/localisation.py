@@ -20,14 +20,14 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.residuals.bins import MOST_SHARE
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary
-from pprs_dynamics.measurement.residuals.bins import MOST_SHARE
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.system.parallel import each
 
 MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged

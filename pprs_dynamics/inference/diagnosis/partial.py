@@ -14,9 +14,9 @@ from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS
-from pprs_dynamics.measurement.residuals.bins import bin_edges
-from pprs_dynamics.measurement.residuals.profiles import Profile, error_profile
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.bins import bin_edges
+from pprs_dynamics.inference.residuals.profiles import Profile, error_profile
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 FINE_BINS = 24
 # Of the variance of an effect, what means over bins of a variable must tell to draw it along it.

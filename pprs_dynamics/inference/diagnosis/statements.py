@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import PatternLibrary
-from pprs_dynamics.physics.mechanism.units import DriveUnits
 
 # How a variable is called, and the unit it is read in: factor from SI, and name. Those of drives
 # that push, and of those that turn.

@@ -35,8 +35,8 @@ from pprs_dynamics.inference.regression.sensitivities import (
     PRESENT,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect

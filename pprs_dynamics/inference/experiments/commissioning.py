@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm, reversal_shapes
 from pprs_dynamics.inference.experiments.criteria import Precision, free_of
 from pprs_dynamics.inference.experiments.information import Information
@@ -24,16 +25,15 @@ from pprs_dynamics.inference.regression.design import FREE, Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.platform_sensitivities import PASSIVE_WIDTHS
 from pprs_dynamics.inference.regression.sensitivities import known_numbers
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import BLOCK_DURATION
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 # Effects that most machines have, or that are most often entered wrongly.
 ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_offset',

@@ -19,7 +19,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, Columns
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 
 
 @dataclass(frozen=True)

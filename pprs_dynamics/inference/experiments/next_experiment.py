@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.arm_search import ArmSearch
@@ -26,7 +27,6 @@ from pprs_dynamics.inference.experiments.trajectory_search import Found, Traject
 from pprs_dynamics.inference.regression.base_columns import KnownNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.units import DriveUnits
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces

@@ -25,12 +25,12 @@ from pprs_dynamics.inference.experiments.criteria import (
 )
 from pprs_dynamics.inference.experiments.information import Information
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.reconstruction import (
+from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
     reconstruct,
     treated_forces,
 )
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.arm_model import ArmModel
 

@@ -16,8 +16,8 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.arm_columns import columns_of
 from pprs_dynamics.inference.fit.arm_fit import ArmFit, fit_arm
 from pprs_dynamics.inference.fit.open_numbers import fit_open_numbers
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 

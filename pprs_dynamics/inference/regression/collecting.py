@@ -15,7 +15,7 @@ from pprs_dynamics.inference.regression.axis_sensitivities import AxisSensitivit
 from pprs_dynamics.inference.regression.platform_sensitivities import PlatformSensitivities
 from pprs_dynamics.inference.regression.sensitivities import NUMBERS, Sensitivities
 from pprs_dynamics.inference.regression.terms import FullRate
-from pprs_dynamics.measurement.motion.reconstruction import Reconstruction
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel

@@ -43,10 +43,10 @@ from pprs_dynamics.inference.regression.sensitivities import (
     PRESENT,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, Point, Term
+from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct, with_zeros
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.reconstruction import Reconstruction, reconstruct, with_zeros
-from pprs_dynamics.measurement.residuals.measuring import join_tables, treated_table
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,

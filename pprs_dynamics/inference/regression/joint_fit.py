@@ -31,9 +31,9 @@ from pprs_dynamics.inference.regression.normal_equations import (
     term_gains,
 )
 from pprs_dynamics.inference.regression.terms import Term
-from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.measurement.residuals.noise import NoiseShapes, NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals, ResidualsError
+from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14

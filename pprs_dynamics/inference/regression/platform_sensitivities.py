@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
     HOMING,
@@ -38,7 +39,6 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solve_forward_motion
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 HOMING_STEP = 3e-5  # of a rod's length

@@ -11,7 +11,7 @@ from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
-from pprs_dynamics.measurement.residuals.noise import CONTINUED_OCTAVES, SLOPE_OCTAVES
+from pprs_dynamics.inference.residuals.noise import CONTINUED_OCTAVES, SLOPE_OCTAVES
 
 
 def _number(value: float, unit: str, decides: str, reason: str) -> float:

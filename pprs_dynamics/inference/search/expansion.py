@@ -27,11 +27,11 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import PlacedEffect, Point
+from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.inference.search.candidates import CandidateSet, bends
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form import beyond_lack_of_fit
 from pprs_dynamics.inference.search.search import Search
-from pprs_dynamics.measurement.motion.reconstruction import treated_forces
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.residuals.bins import BINS, bin_edges, populated_edges
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.bins import BINS, bin_edges, populated_edges
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 TIME_BINS = 16
 # Shares of the samples that lie below the speeds where bins of the velocity end.

@@ -18,6 +18,8 @@ from scipy import fft
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
+from pprs_dynamics.inference.residuals.bins import LEAST_SHARE, MOST_SHARE
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.patterns import (
     Family,
@@ -25,8 +27,6 @@ from pprs_dynamics.inference.search.patterns import (
     build_families,
     trial_limits,
 )
-from pprs_dynamics.measurement.residuals.bins import LEAST_SHARE, MOST_SHARE
-from pprs_dynamics.measurement.residuals.residuals import Residuals
 from pprs_dynamics.system.parallel import each
 
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for

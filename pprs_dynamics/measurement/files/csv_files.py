@@ -24,19 +24,19 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.csv_tables import (
-    LONGEST_LINE,
-    cells_of,
-    check_length,
-    read_lines,
-    write_table,
-)
 from pprs_dynamics.measurement.files.samples import (
     Finding,
     Progress,
     Samples,
     counted,
     whole_epoch,
+)
+from pprs_dynamics.system.csv_tables import (
+    LONGEST_LINE,
+    cells_of,
+    check_length,
+    read_lines,
+    write_table,
 )
 from pprs_dynamics.system.numbers import parse_number
 

@@ -14,20 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
 from pprs_dynamics.measurement.files.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.samples import Finding, Progress, Samples, counted
 from pprs_dynamics.measurement.files.table_files import read_table
-from pprs_dynamics.physics.mechanism.units import DriveUnits
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.recorded_names import (
-    RecordedColumns,
-    joint_names,
-    recorded_columns,
-)
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.system.plain_text import displayed
 
 
@@ -192,32 +185,21 @@ class Summary:
 
 
 def read_recording(
-    path: str | PathLike[str], drives: tuple[str, ...] = DRIVES, topic: str | None = None,
-    progress: Progress | None = None, gain: Sequence[float] | None = None,
-    in_amperes: bool = False, units: tuple[DriveUnits, ...] = (),
-    effort_limits: Sequence[float] = (), columns: RecordedColumns | None = None,
+    path: str | PathLike[str], drives: Sequence[str] | RecordedDrives = DRIVES,
+    topic: str | None = None, progress: Progress | None = None,
 ) -> Recording:
     """Read a rosbag2 directory, a bare .mcap or .db3 file, or a CSV: the content decides.
 
     Parameters
     ----------
     path : path
-    drives : tuple of str
-        Taken by name, in any order, among any others; ('axis',) for a single axis.
+    drives : RecordedDrives or sequence of str
+        Taken by name, in any order, among any others; `model.recorded` of a model, ('axis',) for
+        a single axis.
     topic : str, optional
         Of sensor_msgs/JointState, or prefix of CSV columns; needed where there are several.
     progress : callable, optional
         Called with (done, total) now and then.
-    gain : (D,) sequence, optional
-        Effort per ampere, for what was recorded as a current.
-    in_amperes : bool
-        Whether efforts are currents, too; columns named `current` always are.
-    units : tuple of DriveUnits, optional
-        For what is found wrong; of drives that push by default.
-    effort_limits : (D,) sequence, optional
-        Largest absolute efforts that the drives can apply: what is there is left out.
-    columns : RecordedColumns, optional
-        Of tables that are no recordings by their header.
 
     Raises
     ------
@@ -230,23 +212,27 @@ def read_recording(
     if not os.fspath(path):  # which would be the present folder
         raise UnreadableFileError("''", 'the name of a recording must not be empty')
     path = Path(path)
+    if not isinstance(drives, RecordedDrives):
+        drives = RecordedDrives(tuple(drives))
     try:
         # A name that promises a bag is read as one, for the reason why it is none.
         is_bag = path.is_dir() or storage_suffix(path) or path.suffix in ('.mcap', '.db3')
         if not path.is_dir() and not path.stat().st_size:
             raise UnreadableFileError(path, 'the file is empty')
-        if columns is not None and not is_bag:
-            samples = read_table(path, tuple(drives), columns)
+        if drives.columns is not None and not is_bag:
+            samples = read_table(path, drives.names, drives.columns)
         else:
             reader = read_bag if is_bag else read_csv
-            samples = reader(path, tuple(drives), topic, progress)
+            names = drives.names if drives.columns is not None else drives.joints or drives.names
+            samples = reader(path, names, topic, progress)
     except OSError as error:
         if isinstance(error, UnreadableFileError):
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
-    samples, applied = _as_efforts(path, samples, gain, in_amperes)
+    samples, applied = _as_efforts(path, samples, drives)
     recording = replace(_judged(displayed(path.name), replace(
-        samples, units=units, effort_limits=tuple(effort_limits))), gain=applied)
+        samples, units=drives.units, effort_limits=drives.effort_limits)),
+        gain=applied, drives=drives.names)
     if not len(recording.time):
         raise UnreadableFileError(
             path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '
@@ -254,24 +240,11 @@ def read_recording(
     return recording
 
 
-def read_for(model: ForceModel, path: str | PathLike[str], topic: str | None = None,
-             progress: Progress | None = None) -> Recording:
-    """Read a recording of a model's drives, efforts by its gains; see `read_recording`.
-
-    The drives are looked for by the names that the model file says, and have the model's then.
-    """
-    columns = recorded_columns(model.values, model.drives)
-    names = model.drives if columns is not None else joint_names(model.values, model.drives)
-    recording = read_recording(path, names, topic, progress, model.gain,
-                               model.efforts_in_amperes, model.units,
-                               model.effort_limits.tolist(), columns)
-    return replace(recording, drives=model.drives)
-
-
-def _as_efforts(path: Path, samples: Samples, gain: Sequence[float] | None, in_amperes: bool,
+def _as_efforts(path: Path, samples: Samples, drives: RecordedDrives,
                 ) -> tuple[Samples, Array | None]:
     """Return samples with currents times the gain, and the gain where it was applied."""
-    currents = np.array(samples.in_amperes or [False] * len(samples.drives)) | in_amperes
+    gain = drives.gain
+    currents = np.array(samples.in_amperes or [False] * len(samples.drives)) | drives.in_amperes
     if not np.any(currents):
         return samples, None
     if gain is None:

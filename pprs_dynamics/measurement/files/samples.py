@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.units import DriveUnits
+from pprs_dynamics.drives import DriveUnits
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]

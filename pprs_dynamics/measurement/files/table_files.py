@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import RecordedColumns
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.samples import Samples
-from pprs_dynamics.physics.model.recorded_names import RecordedColumns
 
 PARQUET, MAT = ('.parquet', '.pq'), ('.mat',)
 

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""From measured positions to a motion: differentiation and reconstruction."""
+"""Smoothed motion of the drives: differentiation, blocks, and the treatment of efforts."""

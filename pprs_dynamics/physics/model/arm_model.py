@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.physics.effects.effect import ARM, CatalogueEffect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
@@ -28,7 +29,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.units import DriveUnits
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import (
     RIGID_BODY,

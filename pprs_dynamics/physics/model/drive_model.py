@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
@@ -40,7 +41,7 @@ from pprs_dynamics.physics.model.one_pass import OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
-from pprs_dynamics.physics.three_pprs.robot import DRIVES, Geometry, Masses, Robot
+from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismState, solve_mechanism
 
 __all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']

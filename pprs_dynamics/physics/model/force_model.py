@@ -13,17 +13,19 @@ import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits, RecordedDrives
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.units import DriveUnits
 from pprs_dynamics.physics.model.keys import Key
+from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 RIGID_BODY = 'rigid_body'
@@ -144,6 +146,20 @@ class ForceModel(ABC):
     def units(self) -> tuple[DriveUnits, ...]:
         """Units of the drives' quantities."""
         return (DriveUnits(),) * len(self.drives)
+
+    @cached_property
+    def recorded(self) -> RecordedDrives:
+        """How recordings hold the drives, by what the model file says.
+
+        Raises
+        ------
+        ModelError
+            For names and columns that cannot be.
+        """
+        return RecordedDrives(
+            self.drives, joint_names(self.values, self.drives),
+            recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
+            self.units, tuple(self.effort_limits.tolist()))
 
     @property
     def content(self) -> str:

@@ -26,6 +26,7 @@ from typing import Any
 
 import yaml
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.model.keys import (
@@ -44,7 +45,6 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
 from pprs_dynamics.system.output_files import write_text
 

@@ -11,29 +11,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from pprs_dynamics.drives import DriveColumns, RecordedColumns
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME = 'columns.time'
 QUANTITIES = ('position', 'velocity', 'effort')
 SCALES = {'scale': 'effort', 'position_scale': 'position'}
-
-
-class DriveColumns(NamedTuple):
-    """Columns of one drive, by quantity, and what their numbers are multiplied by."""
-
-    names: Mapping[str, str]
-    effort_scale: float = 1.0
-    position_scale: float = 1.0
-
-
-class RecordedColumns(NamedTuple):
-    """Columns of a table that is no recording by its header: of time, and of each drive."""
-
-    time: str
-    drives: Mapping[str, DriveColumns]
 
 
 def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, ...]:

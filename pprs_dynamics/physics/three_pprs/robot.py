@@ -23,7 +23,6 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     RobotParameters,
 )
 
-DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 AXIS = 'axis'  # the drive of a single axis
 ELBOWS = ('up', 'down')
 

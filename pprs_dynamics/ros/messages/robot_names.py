@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.recorded_names import joint_names
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 BASE = 'base'
 
@@ -32,7 +31,7 @@ class RobotNames(NamedTuple):
     @classmethod
     def of(cls, model: ForceModel, frame: str = '') -> RobotNames:
         """Return the names of a model's drives; `frame` '' for that of its kind."""
-        return cls(joint_names(model.values, model.drives), frame or frame_of(model.drives))
+        return cls(model.recorded.joints, frame or frame_of(model.drives))
 
 
 def frame_of(drives: Sequence[str]) -> str:

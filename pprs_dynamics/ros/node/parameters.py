@@ -15,6 +15,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -35,7 +36,6 @@ from pprs_dynamics.physics.model.keys import (
 )
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.ros.node.provenance import folder_of, names_given
 from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError, SingularityError
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import (
@@ -39,7 +40,7 @@ from pprs_dynamics.physics.mechanism.structure import build_structure
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.robot import AXIS, DRIVES, Robot
+from pprs_dynamics.physics.three_pprs.robot import AXIS, Robot
 from pprs_dynamics.simulation.export.expressed import (
     STANDARD_GRAVITY,
     URDF,

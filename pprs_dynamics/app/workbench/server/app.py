@@ -42,7 +42,7 @@ from pprs_dynamics.app.workbench.server.request_fields import (
 )
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.measurement.files.motion_files import write_motion
+from pprs_dynamics.physics.mechanism.motion_files import write_motion
 
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV

@@ -19,10 +19,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
+from pprs_dynamics.inference.residuals.followed_motion import CHUNK, Motion, kinematics_of
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, Measured, smooth_drives
-from pprs_dynamics.measurement.motion.followed_motion import CHUNK, Motion, kinematics_of
 from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.model.force_model import ForceModel

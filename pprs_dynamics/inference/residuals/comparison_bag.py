@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.bag_files import write_bag
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Samples
-from pprs_dynamics.measurement.motion.reconstruction import (
+from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
     reconstruct,
     sensed_forces,
 )
+from pprs_dynamics.measurement.files.bag_files import write_bag
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.files.samples import Samples
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MEASURED, MODEL, RESIDUAL, PARTS = '/measured', '/model', '/residual', '/parts'

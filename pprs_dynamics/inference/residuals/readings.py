@@ -12,9 +12,8 @@ from itertools import permutations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES, DriveUnits
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
-from pprs_dynamics.physics.mechanism.units import DriveUnits
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 POSITION_UNIT = 'position_unit'  # kind of mistake
 LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}

@@ -22,7 +22,7 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.residuals.residuals import Residuals, bridged, find_stretches
+from pprs_dynamics.inference.residuals.residuals import Residuals, bridged, find_stretches
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
 SINGLE_BANDS, BAND_RATIO = 12, 1.25

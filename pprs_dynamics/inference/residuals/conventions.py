@@ -16,16 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.defects import SLOW_STEP
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Finding
-from pprs_dynamics.measurement.residuals.excerpt import (
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.residuals.excerpt import (
     Excerpt,
     excerpt_of,
     forces_in_pieces,
     forces_on,
 )
-from pprs_dynamics.measurement.residuals.readings import (
+from pprs_dynamics.inference.residuals.readings import (
     LENGTHS,
     POSITION_UNIT,
     Reading,
@@ -33,9 +31,11 @@ from pprs_dynamics.measurement.residuals.readings import (
     named,
     readings,
 )
+from pprs_dynamics.measurement.files.defects import SLOW_STEP
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.files.samples import Finding
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 # What efforts may be, as multiples of what they are taken for.
 EFFORT_FACTORS = (1.0, -1.0, 1e-3, -1e-3, 1e3, -1e3)

@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ConvergenceError
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
@@ -21,7 +22,7 @@ from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
-from pprs_dynamics.physics.three_pprs.robot import DRIVES, Geometry
+from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
 Motion = PlatformMotion | JointMotion

@@ -16,8 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.inference.residuals import followed_motion
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces, with_zeros
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion import followed_motion
 from pprs_dynamics.measurement.motion.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
@@ -28,7 +29,6 @@ from pprs_dynamics.measurement.motion.differentiation import (
 )
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
-from pprs_dynamics.measurement.motion.reconstruction import reconstruct, treated_forces, with_zeros
 from pprs_dynamics.measurement.motion.sampling_grid import find_grid
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.paths import Excitation

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 BLOCKS = 10
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.residuals.bands import SINGLE_BANDS, FrequencyBands
+from pprs_dynamics.inference.residuals.bands import SINGLE_BANDS, FrequencyBands
 
 # Scoring ends once a full step promises to lower -2 ln of the likelihood by less on every drive;
 # steps in the logarithms of the amplitudes are bounded, and damped by a share of the information.

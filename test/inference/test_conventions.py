@@ -20,12 +20,12 @@ from short_recordings import short_recordings
 from benchmarks.hidden import recordings
 from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.residuals.conventions import find_mistakes
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.residuals.conventions import find_mistakes
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
 
 ROOT = Path(__file__).parents[2]

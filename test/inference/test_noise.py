@@ -12,9 +12,9 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
-from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.measurement.residuals.noise import NoiseShapes, NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 PERIOD = 0.01

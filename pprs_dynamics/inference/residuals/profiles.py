@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.measurement.residuals.bins import BINS, bin_edges
-from pprs_dynamics.measurement.residuals.noise import NoiseSpectrum
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.inference.residuals.bins import BINS, bin_edges
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 
 @dataclass(frozen=True)

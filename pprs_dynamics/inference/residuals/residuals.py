@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.mechanism.units import DriveUnits, common_effort
 
 # A gap of a few samples is bridged by a straight line; over more, noise is a new stretch.
 LONGEST_BRIDGE = 10

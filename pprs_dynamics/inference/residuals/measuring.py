@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.reconstruction import (
+from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
     reconstruct,
     treated_forces,
 )
-from pprs_dynamics.measurement.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOTION = ('position', 'velocity', 'acceleration')

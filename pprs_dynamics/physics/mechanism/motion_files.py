@@ -1,10 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""CSV files of platform poses: `time,x,y,z,qx,qy,qz,qw` and, optionally, twists.
+"""CSV files of designed motions: poses of a platform, or positions of joints.
 
-Twists are `vx,vy,vz,wx,wy,wz,ax,ay,az,alx,aly,alz`: velocity, angular velocity, acceleration
-and angular acceleration of o in `base`. Without them a spline through the poses gives them.
+Platform: `time,x,y,z,qx,qy,qz,qw` and, optionally, the twists
+`vx,vy,vz,wx,wy,wz,ax,ay,az,alx,aly,alz`: velocity, angular velocity, acceleration and angular
+acceleration of o in `base`. Without them a spline through the poses gives them.
+
+Joints: `time` and `<joint>/position`, `<joint>/velocity`, `<joint>/acceleration` of each.
 """
 
 from __future__ import annotations
@@ -14,12 +17,14 @@ from os import PathLike
 import numpy as np
 
 from pprs_dynamics.errors import MotionError, UnreadableFileError
-from pprs_dynamics.measurement.files.csv_tables import read_rows, write_table
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.system.csv_tables import read_rows, write_table
 from pprs_dynamics.system.numbers import parse_number
 
 POSE_COLUMNS = ('time', 'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 TWIST_COLUMNS = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz', 'ax', 'ay', 'az', 'alx', 'aly', 'alz')
+QUANTITIES = ('position', 'velocity', 'acceleration')  # of a joint
 
 
 def read_poses(path: str | PathLike[str], rate: float | None = None) -> PlatformMotion:
@@ -74,14 +79,29 @@ def read_poses(path: str | PathLike[str], rate: float | None = None) -> Platform
     return motion
 
 
-def write_poses(path: str | PathLike[str], motion: PlatformMotion) -> None:
-    """Write a motion with times as CSV, exact to the last digit."""
+def write_motion(path: str | PathLike[str], drives: tuple[str, ...],
+                 motion: PlatformMotion | JointMotion) -> None:
+    """Write a motion with times, exact to the last digit; `drives` are the joints' names.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it cannot be written.
+    MotionError
+        For a motion without times.
+    """
     if motion.time is None:
         raise MotionError('time', 'it is absent', 'be known to be written', 'time')
-    table = np.column_stack((
-        motion.time, motion.position, motion.orientation, motion.linear_velocity,
-        motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
-    write_table(path, POSE_COLUMNS + TWIST_COLUMNS, [table])
+    if isinstance(motion, JointMotion):
+        names = [f'{joint}/{name}' for joint in drives for name in QUANTITIES]
+        table = np.stack([getattr(motion, name) for name in QUANTITIES], axis=-1)
+        columns = [table.reshape(len(motion), -1)]
+    else:
+        names = [*POSE_COLUMNS[1:], *TWIST_COLUMNS]
+        columns = [motion.position, motion.orientation, motion.linear_velocity,
+                   motion.angular_velocity, motion.linear_acceleration,
+                   motion.angular_acceleration]
+    write_table(path, ['time', *names], [motion.time, *columns])
 
 
 def _columns(path: object, header: list[str]) -> tuple[str, ...]:
