@@ -4,12 +4,14 @@
 """How often live diagnosis is right: streams in which an effect sets in, and streams without.
 
     python -m benchmarks.scores.live_diagnosis changes SEEDS [EFFECT ...]
-    python -m benchmarks.scores.live_diagnosis nothing WINDOWS
+    python -m benchmarks.scores.live_diagnosis nothing WINDOWS [NOISE ...]
+    python -m benchmarks.scores.live_diagnosis table
 
-A stream is a row of windows of 40 s of one robot, each along a random motion of its own. In
-`changes` an effect of SNR 1 to 3 sets in at a random moment of the second window and ends with
-the fourth; six windows are diagnosed. In `nothing` there is only noise: AR(1) and 1/f in turns.
-Lines of JSON go to output/live_MODE.jsonl; what is there already is not computed again.
+A stream is a row of windows of 40 s of one robot, each along a random motion of its own, with
+noise that goes on from one to the next. In `changes` an effect of SNR 1 to 3 sets in at a random
+moment of the second window and ends with the fourth; six windows are diagnosed. In `nothing`
+there is only noise: white, AR(1) and 1/f in turns, or those named. Lines of JSON go to
+output/live_MODE.jsonl; what is there already is not computed again. `table` sums them up.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
+from resource import RUSAGE_SELF, getrusage
 from typing import Any
 
 import numpy as np
@@ -37,16 +40,30 @@ from benchmarks.hidden.recordings import (
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS
+from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.prescribed import PrescribedPlant
-from pprs_dynamics.simulation.sensors import EffortNoise
+from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 STEPS = ('plain', 'change', 'hidden', 'hidden', 'plain', 'plain')
-NOISES: tuple[float | str, ...] = (0.9, 0.98, 0.997, PINK)
+WHITE = 'white'
+NOISES: tuple[float | str, ...] = (WHITE, 0.9, 0.98, 0.997, PINK)
+WINDOWS = 10  # of a stream in which nothing changes
+
+
+class Stream:
+    """What the sensors of one robot add, from the first window to the last.
+
+    Slow noise that began anew with each window would never be the same offset in two of them.
+    """
+
+    def __init__(self, seed: int, noise: float | str, deviation: float) -> None:
+        self.settings = (SensorSettings(white_noise=deviation, coloured_noise=0.0)
+                         if noise == WHITE else noise_settings(noise, deviation))
+        self.noise = EffortNoise(self.settings, np.random.default_rng((seed, 77)))
 
 
 def window(place: Scene, seed: int, effects: tuple[Any, ...], moment: float | None,
-           deviation: float, noise: float | str) -> Recording:
+           stream: Stream) -> Recording:
     """Return one window along a motion of its own; the effects from a moment on [s], or always."""
     _, motion = _motion(seed)
     plant = PrescribedPlant({**place.model.values, **place.robot}, motion, place.settings)
@@ -58,11 +75,8 @@ def window(place: Scene, seed: int, effects: tuple[Any, ...], moment: float | No
         early = (clock < moment)[:, None]
         position = np.where(early, plain.position[LEAD:], position)
         effort = np.where(early, plain.effort[LEAD:], effort)
-    settings = noise_settings(noise, deviation)
-    rng = np.random.default_rng((seed, 77))
-    added = EffortNoise(settings, rng).samples(len(clock))
-    return Recording.from_arrays(f'window {seed}', clock, settings.quantised(position), None,
-                                 effort + added)
+    return Recording.from_arrays(f'window {seed}', clock, stream.settings.quantised(position),
+                                 None, effort + stream.noise.samples(len(clock)))
 
 
 def changes(name: str, seed: int) -> dict[str, Any]:
@@ -73,12 +87,12 @@ def changes(name: str, seed: int) -> dict[str, Any]:
     rng = np.random.default_rng((seed, 5))
     length = len(place.motion.time[LEAD:]) / RATE
     moment = float(rng.uniform(0.2, 0.8)) * length
-    truth = drawn.effect.truth()
+    truth, stream = drawn.effect.truth(), Stream(seed, 0.9, drawn.noise)
     live, said, start, used = LiveDiagnosis(place.model), [], 0.0, time.process_time()
     for number, what in enumerate(STEPS):
         effects = () if what == 'plain' else (drawn.effect,)
         recording = window(place, 1000 * seed + number, effects,
-                           moment if what == 'change' else None, drawn.noise, 0.9)
+                           moment if what == 'change' else None, stream)
         live = live.with_window(recording, start)
         said.append({'claimed': [[*map(str, sorted(one.names)), one.found.drives, one.since]
                                  for one in live.claimed],
@@ -97,30 +111,34 @@ def changes(name: str, seed: int) -> dict[str, Any]:
             'seconds': time.process_time() - used}
 
 
-def nothing(first: int, count: int = 10) -> dict[str, Any]:
+def nothing(first: int, noise: float | str) -> dict[str, Any]:
     """Return what was said of a stream of windows without any change."""
-    place = Scene(first, 0.0)
-    noise = NOISES[first % len(NOISES)]
+    place, stream, used = Scene(first, 0.0), Stream(first, noise, NOISE), time.process_time()
     live, claimed, named, start = LiveDiagnosis(place.model), [], [], 0.0
-    for number in range(count):
-        recording = window(place, 1000 * first + number, (), None, NOISE, noise)
+    for number in range(WINDOWS):
+        recording = window(place, 1000 * first + number, (), None, stream)
         live = live.with_window(recording, start)
         start += recording.time[-1] - recording.time[0]
         claimed.append([one.found.name for one in live.claimed])
         named.append([one.found.name for one in live.effects])
-    return {'seed': first, 'noise': noise, 'windows': count, 'claimed': claimed, 'named': named}
+    return {'seed': first, 'noise': noise, 'windows': WINDOWS, 'claimed': claimed,
+            'named': named, 'seconds': time.process_time() - used,
+            'memory': getrusage(RUSAGE_SELF).ru_maxrss / 1024}
 
 
 def run(mode: str, arguments: list[str]) -> Iterator[dict[str, Any]]:
     """Yield results one after the other."""
     if mode == 'changes':
-        names = arguments[1:] or sorted(HIDDEN_EFFECTS)
+        names = arguments[1:] or sorted(IN_CATALOGUE)
         for seed in range(int(arguments[0])):
             for name in names:
                 yield {'key': f'{name} {seed}', 'of': lambda n=name, s=seed: changes(n, 300 + s)}
     else:
-        for first in range(int(arguments[0]) // 10):
-            yield {'key': f'nothing {first}', 'of': lambda f=first: nothing(500 + f)}
+        noises = [noise for noise in NOISES if str(noise) in (arguments[1:] or map(str, NOISES))]
+        for first in range(int(arguments[0]) // WINDOWS):
+            noise = noises[first % len(noises)]
+            yield {'key': f'nothing {noise} {first}',
+                   'of': lambda f=first, n=noise: nothing(500 + f, n)}
 
 
 def main() -> int:

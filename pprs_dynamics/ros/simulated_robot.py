@@ -5,18 +5,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.ros.hidden_parameters import Hidden, HiddenParameters
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
+from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,
@@ -28,7 +30,7 @@ from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
-from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -45,7 +47,8 @@ PARAMETERS = (
     NodeParameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
                   lower=0),
     NodeParameter('hidden_effects', [], 'names of effects that the model does not know of, '
-                  'or random for one drawn at random'),
+                  'or random for one drawn at random; drives may follow: '
+                  'coulomb_friction:lift_1,lift_2'),
     NodeParameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
     NodeParameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
@@ -56,7 +59,7 @@ CYCLES_AT_ONCE = 2
 LATE_SHARE = 0.001
 
 
-class SimulatedRobotNode(Node):
+class SimulatedRobotNode(ExplainsRefusals):
     """Publishes joint_states, and follows setpoints with efforts, or efforts alone.
 
     Setpoints are executed at their stamps, interpolated between them; a stamp that has passed is
@@ -70,12 +73,12 @@ class SimulatedRobotNode(Node):
         values = {name: value for name, value in current_values(self).items() if name not in own}
         self._model = DriveModel.from_parameters(values)
         self._use_effort = own['use_effort']
-        self._robot = _robot(self._model.values, own)
+        hidden = Hidden.of(own)
+        self._robot = _robot(self._model.values, own, hidden.effects)
         self._queue = SetpointQueue(self._robot.control)
         self._period = round(conversions.NANOSECONDS / own['rate'])
         self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
         self._late_before, self._cycles_before = 0, 0
-        hidden = [effect.name for effect in self._robot.effects]
         # What is hidden is told to nobody who only listens: the log is the robot's own.
         self._status = StatusReporter(
             self, {}, self._counters, f'simulated {hardware_of(self._model)}')
@@ -85,7 +88,7 @@ class SimulatedRobotNode(Node):
             subscription(self, kind, topic, callback, raw=True)
         self.get_logger().info(
             f'{own["rate"]:g} Hz, PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m, '
-            f'hidden effects: {", ".join(hidden) or "none"}; holding at home')
+            f'hidden effects: {hidden}; holding at home')
         self._robot.tick()
         self._start = self.get_clock().now().nanoseconds
         # How far the simulation has fallen behind the clock for good, where it could not keep up.
@@ -93,6 +96,12 @@ class SimulatedRobotNode(Node):
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
         steady_timer(self, 1.0, self._judge_timing)
+        self._settings = HiddenParameters(self, PARAMETERS, own, hidden, self._hide)
+
+    def _hide(self, hidden: Hidden) -> None:
+        self._robot.use_effects(hidden.effects)
+        self.get_logger().info(f'from {self._robot.time + self._lag:.3f} s after the start on, '
+                               f'hidden effects: {hidden}')
 
     def _on_timer(self) -> None:
         behind = self._now() - self._lag - self._robot.time
@@ -170,11 +179,9 @@ class SimulatedRobotNode(Node):
         return (self.get_clock().now().nanoseconds - self._start) / conversions.NANOSECONDS
 
 
-def _robot(values: Any, own: dict[str, Any]) -> SimulatedRobot:
+def _robot(values: Any, own: dict[str, Any], effects: Sequence[HiddenEffect]) -> SimulatedRobot:
     if 2000 % own['rate']:
         raise ModelError('rate', own['rate'], PARAMETERS[0].rule)
-    rng = np.random.default_rng(own['seed'])
-    effects = draw_effects(own['hidden_effects'], rng, own['hidden_scale'])
     return SimulatedRobot(
         values, effects, seed=own['seed'], rate=own['rate'],
         control=ControlSettings(

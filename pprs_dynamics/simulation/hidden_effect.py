@@ -11,7 +11,7 @@ what the drives must apply more.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -180,8 +180,13 @@ class DriveBound(HiddenEffect):
         """Return the effect on one drive (half of the time), on two or three, or on all."""
         count = int(rng.choice([1, 2, 3, 6], p=[0.5, 0.125, 0.125, 0.25]))
         chosen = sorted(rng.choice(6, count, replace=False))
+        return cls.draw_on([DRIVES[i] for i in chosen], rng, scale)
+
+    @classmethod
+    def draw_on(cls, drives: Sequence[str], rng: np.random.Generator, scale: float = 1.0) -> Self:
+        """Return the effect on given drives."""
         return cls({drive: {name: r.draw(rng, scale, drive) for name, r in cls.ranges.items()}
-                    for drive in (DRIVES[i] for i in chosen)})
+                    for drive in drives})
 
     @property
     def drives(self) -> tuple[str, ...]:

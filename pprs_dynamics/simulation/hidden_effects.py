@@ -16,7 +16,7 @@ from pprs_dynamics.simulation import (
     hidden_friction,
     hidden_sensors,
 )
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect, HiddenEffectError
+from pprs_dynamics.simulation.hidden_effect import DriveBound, HiddenEffect, HiddenEffectError
 
 IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
     hidden_friction.ViscousFriction, hidden_friction.CoulombFriction,
@@ -44,12 +44,15 @@ RANDOM = 'random'
 def draw_effects(
     names: Sequence[str], rng: np.random.Generator, scale: float = 1.0,
 ) -> list[HiddenEffect]:
-    """Return a hidden effect per name; the name `random` stands for one drawn at random.
+    """Return a hidden effect per name.
+
+    The name `random` stands for one drawn at random; drives may follow, as in
+    `coulomb_friction:lift_1,lift_2`.
 
     Raises
     ------
     HiddenEffectError
-        For a name that no effect has.
+        For a name that no effect has, and for drives that are none or that it does not act in.
     """
     drawn = [str(rng.choice(sorted(HIDDEN_EFFECTS))) if name == RANDOM else name
              for name in names]
@@ -62,7 +65,7 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
     Parameters
     ----------
     name : str
-        One of `HIDDEN_EFFECTS`.
+        One of `HIDDEN_EFFECTS`, drives may follow after a colon.
     rng : numpy.random.Generator
     scale : float
         Multiplies its strength.
@@ -72,9 +75,16 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
     HiddenEffectError
         For another name.
     """
+    name, _, drives = name.partition(':')
     if name not in HIDDEN_EFFECTS:
         close = difflib.get_close_matches(name, HIDDEN_EFFECTS, 1)
         hint = f' (did you mean {close[0]}?)' if close else ''
         raise HiddenEffectError(f'no hidden effect is called {name!r}{hint}; there are '
                                 f'{", ".join(HIDDEN_EFFECTS)}')
-    return HIDDEN_EFFECTS[name].draw(rng, scale)
+    effect = HIDDEN_EFFECTS[name]
+    if not drives:
+        return effect.draw(rng, scale)
+    if not issubclass(effect, DriveBound):
+        raise HiddenEffectError(f'{name} acts in no drive of its own, so that {drives!r} must '
+                                'not follow')
+    return effect.draw_on(drives.split(','), rng, scale)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, Self
 
 import numpy as np
@@ -119,10 +120,18 @@ class DriveCoupling(DriveForce):
     @classmethod
     def draw(cls, rng: np.random.Generator, scale: float = 1.0) -> Self:
         """Return it on one drive, with another as its source."""
-        drive = int(rng.integers(6))
-        source = float((drive + rng.integers(1, 6)) % 6)
-        coefficient = cls.ranges['coefficient'].draw(rng, scale)
-        return cls({DRIVES[drive]: {'coefficient': coefficient, 'source': source}})
+        return cls.draw_on([DRIVES[int(rng.integers(6))]], rng, scale)
+
+    @classmethod
+    def draw_on(cls, drives: Sequence[str], rng: np.random.Generator, scale: float = 1.0) -> Self:
+        """Return it on given drives, each with another as its source."""
+        found = {}
+        for drive in drives:
+            place = DRIVES.index(drive) if drive in DRIVES else 0  # refused below
+            source = float((place + rng.integers(1, 6)) % 6)
+            found[drive] = {'coefficient': cls.ranges['coefficient'].draw(rng, scale),
+                            'source': source}
+        return cls(found)
 
     def force(self, moment: DriveMoment) -> Array:
         """Return c times the velocity of the source."""

@@ -147,20 +147,16 @@ class Plant:
 
     def __init__(self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (),
                  settings: PlantSettings | None = None) -> None:
-        self.settings = settings or PlantSettings()
-        self.chains = ClosedChains(values)
+        self.settings, self._values = settings or PlantSettings(), values
         self.lower = np.repeat([values['limits.slide_stroke'][0],
                                 values['limits.lift_stroke'][0]], 3)
         self.upper = np.repeat([values['limits.slide_stroke'][1],
                                 values['limits.lift_stroke'][1]], 3)
-        friction = EngineFriction(
+        self._friction = EngineFriction(
             values, np.asarray(self.settings.drive_width), self.settings.passive_width,
             self.settings.friction)
-        self.resistance = Resistance(friction, effects)
-        self._structure_forces = [e for e in effects if isinstance(e, StructureForce)]
-        self._body_changes = [e for e in effects if isinstance(e, BodyChange)]
-        for change in self._body_changes:
-            change.apply(self.chains, values)
+        self._effects: tuple[HiddenEffect, ...] = ()
+        self.chains = self._with(effects)
         self.time = 0.0
         self.velocity = np.zeros(6)
         self._all_velocities = np.zeros(15)
@@ -170,6 +166,23 @@ class Plant:
         self._fastest = LONGEST_MOVE * float(strokes.min()) / self.settings.step
         self._widest = 3 * float(strokes.max())  # a whole stroke beyond the end
         self.place(self.position)
+
+    def _with(self, effects: Sequence[HiddenEffect]) -> ClosedChains:
+        """Take effects, and return the bodies with them."""
+        chains = ClosedChains(self._values)
+        self.resistance = Resistance(self._friction, effects, self._effects)
+        self._structure_forces = [e for e in effects if isinstance(e, StructureForce)]
+        self._body_changes = [e for e in effects if isinstance(e, BodyChange)]
+        for change in self._body_changes:
+            change.apply(chains, self._values)
+        self._effects = tuple(effects)
+        return chains
+
+    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+        """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
+        before = self.chains.qpos.copy()
+        self.chains = self._with(effects)
+        self.chains.qpos[:] = before
 
     @property
     def position(self) -> Array:

@@ -43,14 +43,18 @@ class Resistance:
         By the model file.
     effects : sequence of HiddenEffect
         Those of other kinds are left to others.
+    running : sequence of HiddenEffect
+        Those that act already: they keep their memory.
     """
 
-    def __init__(self, friction: EngineFriction, effects: Sequence[HiddenEffect]) -> None:
+    def __init__(self, friction: EngineFriction, effects: Sequence[HiddenEffect],
+                 running: Sequence[HiddenEffect] = ()) -> None:
         self.friction = friction
         self.drive_forces = [e for e in effects if isinstance(e, DriveForce)]
         self._passive_friction = [e for e in effects if isinstance(e, HiddenJointFriction)]
         for force in self.drive_forces:
-            force.prepare(friction)
+            if force not in running:
+                force.prepare(friction)
         self._resolved = RESOLVED_SHARE * float(friction.width[:6].min())
 
     def in_drives(self, equations: Equations, moment: DriveMoment, loads: Array) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -182,14 +183,20 @@ class Sensors:
                  effects: Sequence[HiddenEffect] = ()) -> None:
         self.settings, self._step = settings, step
         self._noise = EffortNoise(settings, rng)
+        self._past: deque[tuple[Array, Array, Array]] = deque()
+        self.position, self.velocity, self.zero = np.zeros(6), np.zeros(6), np.zeros(6)
+        self.use_effects(effects)
         self.smoothing = 1.0 if settings.true_velocity else 1 - float(
             np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
+
+    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+        """Have the faults of other effects from now on; a moved zero is no velocity."""
         self._faults = SensorFaults.of(effects)
+        self.position = self.position + self._faults.zero - self.zero
         self.zero = self._faults.zero
         delays = (self._faults.effort_delay, self._faults.position_delay)
-        length = int(np.ceil(np.max(delays) / step)) + 2
-        self._past: deque[tuple[Array, Array, Array]] = deque(maxlen=length)
-        self.position, self.velocity = np.zeros(6), np.zeros(6)
+        length = int(np.ceil(np.max(delays) / self._step)) + 2
+        self._past = deque(islice(self._past, length), maxlen=length)
 
     def start(self, position: Array, velocity: Array) -> None:
         """Forget the past: the robot is at (6,) [m] and moves with (6,) [m/s]."""

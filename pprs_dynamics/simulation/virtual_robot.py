@@ -91,6 +91,12 @@ class SimulatedRobot:
         self._effort: Array | None = None
         self._stopped = False
 
+    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+        """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
+        self.plant.use_effects(effects)
+        self.sensors.use_effects(effects)
+        self.effects = tuple(effects)
+
     def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
         """Take a command for now, and the next tick's where it is known; False if refused."""
         return self.control.command(

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from closed_loop import CASES, RATE, Case, Tracking, execute, run_case
 from node_bench import Bench, bench
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_processes import executable, node_process
@@ -184,6 +186,52 @@ def test_a_hidden_effect_acts() -> None:
         for k, drive in enumerate(DRIVES):
             expected = truth['parameters'].get(drive, {}).get('force', 0.0)
             assert change[k] == pytest.approx(expected, abs=0.05), drive
+
+
+def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
+    """Switched on, changed and off over the service of parameters; what acts stays what it is."""
+    call = robot.bench.probe.create_client(SetParameters, '/simulated_robot/set_parameters')
+    assert robot.bench.spin_until(call.service_is_ready)
+
+    def change(name: str, value: object) -> SetParametersResult:
+        answer = call.call_async(SetParameters.Request(
+            parameters=[Parameter(name, value=value).to_parameter_msg()]))
+        assert robot.bench.spin_until(answer.done)
+        return answer.result().results[0]
+
+    assert robot.bench.spin_until(lambda: len(robot.states) > 100)
+    place, stamp = robot.position, robot.states[-1].header.stamp
+    assert change('hidden_effects', ['effort_offset:lift_2']).successful
+    assert change('hidden_effects', ['effort_offset:lift_2', 'homing_error:slide_1']).successful
+    offset, zero = robot.node._robot.effects
+    expected = WEIGHT + [offset.parameters.get(drive, {}).get('force', 0.0) for drive in DRIVES]
+    robot.states.clear()
+    # Friction creeps until the loop carries all; then the mean of half a second.
+    assert robot.bench.spin_until(lambda: len(robot.states) > 1250, 60)
+    effort = np.mean([state.effort for state in robot.states[-250:]], axis=0)
+    np.testing.assert_allclose(effort[4:], expected[4:], atol=0.1)
+    assert np.abs(robot.states[0].velocity).max() < 1.0  # a moved zero is no jump of the drive
+    assert change('hidden_effects', ['homing_error:slide_1']).successful
+    assert robot.node._robot.effects == (zero,)
+    assert conversions.nanoseconds(robot.states[-1].header.stamp) > conversions.nanoseconds(stamp)
+    np.testing.assert_allclose(robot.position, place, atol=1e-3)
+    for name, value, words in (
+        ('hidden_effects', ['friction'], 'no hidden effect is called'),
+        ('hidden_effects', ['payload_mass:lift_1'], 'acts in no drive'),
+        ('hidden_effects', ['effort_offset:lift_9'], 'lift_9'),
+        ('hidden_effects', 'effort_offset', 'a list of words'),
+        ('hidden_scale', -1.0, 'at least 0'),
+        ('stiffness', 100.0, 'stay as it was at the start'),
+        ('masses.payload', 2.0, 'stay as it was at the start'),
+    ):
+        answer = change(name, value)
+        assert not answer.successful
+        assert words in answer.reason
+        assert len(answer.reason.splitlines()) == 1
+    assert robot.node._robot.effects == (zero,)
+    assert change('stiffness', 4000.0).successful  # a dump of the parameters loads
+    assert change('hidden_effects', []).successful
+    assert robot.node._robot.effects == ()
 
 
 def test_it_restarts_where_it_was_killed(ros_domain: int, tmp_path: Path) -> None:

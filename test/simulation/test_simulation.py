@@ -458,12 +458,58 @@ def test_a_payload_picked_up_weighs_from_then_on() -> None:
     assert lifts[-1] == pytest.approx(0.3 * 9.81, rel=0.02)
 
 
+def moved(robot: SimulatedRobot, first: int, last: int) -> np.ndarray:
+    """Return positions, velocities and efforts of some ticks along a wave, (N, 3, 6)."""
+    path, rows = wave(0.3), []
+    for tick in range(first, last):
+        robot.command(path.setpoint(tick))
+        row = robot.tick()
+        rows.append((row.position, row.velocity, row.effort))
+    return np.array(rows)
+
+
+def test_effects_that_come_and_go_at_once_leave_the_motion() -> None:
+    plain, other = (SimulatedRobot(MODEL.values, seed=1, control=WEIGHT_HELD) for _ in range(2))
+    assert np.array_equal(moved(plain, 0, 60), moved(other, 0, 60))
+    other.use_effects([drawn(name) for name in HIDDEN_EFFECTS])
+    other.use_effects([])
+    np.testing.assert_allclose(moved(other, 60, 120), moved(plain, 60, 120), rtol=0, atol=1e-9)
+
+
+def test_effects_switched_on_in_a_running_robot_are_those_it_could_have_started_with() -> None:
+    born, other = (SimulatedRobot(MODEL.values, effects, seed=1, control=WEIGHT_HELD,
+                                  sensors=QUIET)
+                   for effects in ([drawn(name) for name in IN_CATALOGUE], []))
+    other.use_effects([drawn(name) for name in IN_CATALOGUE])
+    other.place(HOME)  # one that started with a moved zero stood there
+    np.testing.assert_allclose(moved(other, 0, 100), moved(born, 0, 100), rtol=0, atol=1e-9)
+
+
+def test_what_stays_on_keeps_its_memory() -> None:
+    """Cold friction that has faded is not cold again because a payload came."""
+    effect = HIDDEN_EFFECTS['friction_drift']({'slide_1': {
+        'force': 1.0, 'path': 0.02, 'cooling_time': 100.0, 'width': 0.001}})
+    robot = SimulatedRobot(MODEL.values, [effect], control=WEIGHT_HELD, sensors=QUIET)
+    moved(robot, 0, 100)
+    warm = effect._heat.copy()
+    assert warm[0] > 0.005
+    robot.use_effects([effect, drawn('payload_mass')])
+    assert np.array_equal(effect._heat, warm)
+
+
 @pytest.mark.parametrize('name', HIDDEN_EFFECTS)
 def test_draws_repeat_by_seed_and_can_be_told(name: str) -> None:
     one, same, other = (drawn(name, seed) for seed in (1, 1, 2))
     assert one.truth() == same.truth() != other.truth()
     assert json.loads(json.dumps(one.truth()))['name'] == name
     assert one.form
+
+
+def test_drives_may_be_named() -> None:
+    effect = draw_effect('coulomb_friction:lift_1,slide_2', np.random.default_rng(0))
+    assert effect.drives == ('slide_2', 'lift_1')
+    coupled = draw_effect('drive_coupling:lift_1', np.random.default_rng(0))
+    assert coupled.parameters['lift_1']['source'] != DRIVES.index('lift_1')
 
 
 def test_scale_multiplies_the_strength() -> None:
@@ -473,6 +519,8 @@ def test_scale_multiplies_the_strength() -> None:
 
 @pytest.mark.parametrize(('make', 'text'), [
     (lambda: draw_effect('viscous', np.random.default_rng(0)), 'did you mean'),
+    (lambda: draw_effect('base_tilt:lift_1', np.random.default_rng(0)), 'acts in no drive'),
+    (lambda: draw_effect('drive_coupling:x', np.random.default_rng(0)), 'acts in a drive'),
     (lambda: HIDDEN_EFFECTS['payload_mass'](weight=1.0), 'has the parameters mass'),
     (lambda: HIDDEN_EFFECTS['payload_mass'](mass=np.nan), 'finite'),
     (lambda: HIDDEN_EFFECTS['effort_offset']({'lift_9': {'force': 1.0}}), 'lift_9')])

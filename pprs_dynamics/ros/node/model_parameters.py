@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Protocol
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -37,13 +37,18 @@ from pprs_dynamics.ros.node.parameters import (
 NodeModel = DriveModel | ArmModel
 
 
+class Checks(Protocol):
+    """What says whether parameters may change."""
+
+    def check(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return whether they may, and why not."""
+
+
 class ExplainsRefusals(Node):
     """A node that refuses parameters in the words of the model's files.
 
-    rclpy compares with the range in a descriptor first, and says less.
+    rclpy compares with the range in a descriptor first, and says less. `_settings` is what checks.
     """
-
-    _settings: ModelParameters
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """Set parameters one after the other; each is taken or refused by itself."""
@@ -51,7 +56,7 @@ class ExplainsRefusals(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all parameters or none."""
-        settings = getattr(self, '_settings', None)
+        settings: Checks | None = getattr(self, '_settings', None)
         if settings is not None:  # else they are being declared
             parameter_list = [in_declared_type(self, each) for each in parameter_list]
             result = settings.check(parameter_list)
@@ -123,7 +128,7 @@ class ModelParameters:
 
     def check(self, changes: list[Parameter]) -> SetParametersResult:
         """Return whether the parameters would be valid with some of them changed, and why not."""
-        if _of_topics(changes):
+        if are_of_topics(changes):
             return SetParametersResult(successful=True)
         try:
             self._checked = self._validated(changes)
@@ -132,7 +137,7 @@ class ModelParameters:
         return SetParametersResult(successful=True)
 
     def _apply(self, changes: list[Parameter]) -> None:
-        if _of_topics(changes):
+        if are_of_topics(changes):
             return
         # What was checked, and nothing else, comes into force.
         self.model, self.own = self._checked
@@ -147,6 +152,6 @@ class ModelParameters:
             self._node.set_descriptor(name, added_descriptor(name))
 
 
-def _of_topics(changes: list[Parameter]) -> bool:
+def are_of_topics(changes: list[Parameter]) -> bool:
     """Return whether these are the QoS of topics, which rclpy declares as topics appear."""
     return all(change.name.startswith(NODE_PREFIXES) for change in changes)

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is hidden in the simulated robot, kept in step with its parameters while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.ros.node.model_parameters import are_of_topics
+from pprs_dynamics.ros.node.parameters import NodeParameter, current_values, with_hint
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effects import draw_effects
+
+CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')
+OF_ROS = ('use_sim_time', 'start_type_description_service')
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Hidden effects, and the words, scale and seed that they were drawn from."""
+
+    words: tuple[str, ...]
+    drawn_with: tuple[float, int]
+    effects: tuple[HiddenEffect, ...]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], running: Hidden | None = None) -> Hidden:
+        """Return those that parameters say; what acts already stays what it is.
+
+        Raises
+        ------
+        HiddenEffectError
+            For words that name no effect.
+        """
+        words = tuple(values['hidden_effects'])
+        drawn_with = values['hidden_scale'], values['seed']
+        effects = draw_effects(words, np.random.default_rng(values['seed']),
+                               values['hidden_scale'])
+        kept = (dict(zip(running.words, running.effects, strict=True))
+                if running is not None and running.drawn_with == drawn_with else {})
+        return cls(words, drawn_with, tuple(
+            kept.pop(word, effect) for word, effect in zip(words, effects, strict=True)))
+
+    def __str__(self) -> str:
+        truths = [effect.truth() for effect in self.effects]
+        return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
+
+
+class HiddenParameters:
+    """Follows the parameters of what is hidden; all others stay as they were at the start.
+
+    Parameters
+    ----------
+    node : Node
+    declared : iterable of NodeParameter
+        The node's own.
+    own : mapping
+        Their values now.
+    hidden : Hidden
+        What is hidden now.
+    use : callable
+        Called with what is hidden from now on.
+    """
+
+    def __init__(self, node: Node, declared: Iterable[NodeParameter], own: Mapping[str, Any],
+                 hidden: Hidden, use: Callable[[Hidden], None]) -> None:
+        self._node, self._use = node, use
+        self._declared = {one.name: one for one in declared if one.name in CHANGEABLE}
+        self._own = {name: own[name] for name in CHANGEABLE}
+        self._hidden = hidden
+        self._checked = self._own, hidden
+        node.add_on_set_parameters_callback(self.check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def check(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return whether the robot can be so from now on, and why not."""
+        if are_of_topics(changes):
+            return SetParametersResult(successful=True)
+        before, after = current_values(self._node), current_values(self._node, changes)
+        try:
+            for name in (change.name for change in changes):
+                if name not in (*CHANGEABLE, *OF_ROS) and before.get(name) != after.get(name):
+                    raise ModelError(name, after.get(name), 'stay as it was at the start: of a '
+                                     f'running robot only {", ".join(CHANGEABLE)} change')
+            own = {name: one.check(after.get(name)) for name, one in self._declared.items()}
+            self._checked = own, Hidden.of(own, self._hidden)
+        except PprsError as error:
+            return SetParametersResult(successful=False, reason=with_hint(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, changes: list[Parameter]) -> None:
+        # What was checked, and nothing else, comes into force.
+        if self._own != self._checked[0] and not are_of_topics(changes):
+            self._own, self._hidden = self._checked
+            self._use(self._hidden)
