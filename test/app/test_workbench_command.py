@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import http.client
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -69,6 +71,21 @@ def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder:
         screen = bench.wait(lambda screen: not screen['is_beginning'])
         assert 'must hold at least 100 of a drive' in screen['failure']
         assert 'Error' not in (folder / 'workbench.log').read_text()
+
+
+def test_it_ends_at_once_and_in_a_line_while_a_browser_listens(folder: Path) -> None:
+    with workbench(folder / 'data', folder=folder) as bench:
+        bench.enter()
+        bench.wait(lambda screen: not screen['is_beginning'])
+        connection = http.client.HTTPConnection('127.0.0.1', bench.port, timeout=60)
+        connection.request('GET', '/api/events', headers={'Cookie': bench.cookie})
+        events = connection.getresponse()
+        assert events.readline() == b'data: 0\n'
+        bench.process.send_signal(signal.SIGINT)
+        assert b'Error' not in events.read()  # to its end
+        assert bench.process.wait(60) == 128 + signal.SIGINT
+        connection.close()
+    assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
 
 
 def test_mistakes_of_usage_are_one_line_before_anything_is_served(tmp_path: Path) -> None:

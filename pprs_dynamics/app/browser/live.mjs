@@ -76,9 +76,9 @@ export class Live {
       root.append(box);
       const unit = unitOf(this.server.state, drive);
       return {reading, plot: new uPlot({
-        width: Math.max(root.clientWidth, 100), height: 84, legend: {show: false},
+        width: Math.max(root.clientWidth, 100), height: 94, legend: {show: false},
         padding: [8, 6, 0, 0], cursor: {show: false}, scales: {x: {time: false}},
-        axes: [{...axis, size: 20, values: (u, ticks) => ticks.map((t) => `${t} s`)},
+        axes: [{...axis, size: 30, values: (u, ticks) => ticks.map((t) => `${t} s`)},
                {...axis, size: 62, space: 22,
                 values: (u, ticks) => ticks.map((t) => `${+t.toPrecision(3)} ${unit}`)}],
         series: [{}, {stroke: css('--now'), width: 1, points: {show: false}}],

@@ -318,7 +318,7 @@ class Api:
             queue = self.hub.subscribe()
             try:
                 yield b'data: 0\n\n'
-                while True:
+                while not self.hub.is_over:
                     with suppress(TimeoutError):
                         await asyncio.wait_for(queue.get(), HEARTBEAT)
                     yield b'data: %d\n\n' % self.hub.count

@@ -77,7 +77,7 @@ class Hub:
         self.log = ChangeLog()
         self._count, self._lock, self._opening, self._steady = 0, Lock(), Lock(), Lock()
         self._work = Event()
-        self._ends = False
+        self._ends = self.is_over = False
         self._waiting: set[asyncio.Queue[None]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._fits: object = None
@@ -88,6 +88,11 @@ class Hub:
         """Begin to work; changes are told in this loop."""
         self._loop = loop
         self._worker.start()
+
+    def end(self) -> None:
+        """End what browsers listen to; to be called in the loop, before connections are closed."""
+        self.is_over = True
+        self._put()
 
     def stop(self) -> None:
         """Call all work off."""

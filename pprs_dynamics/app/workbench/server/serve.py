@@ -66,10 +66,17 @@ def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
         print(f'for one more browser: {keys.address}', flush=True)
     if opens_browser:
         webbrowser.open(keys.address)
+
+    class Server(uvicorn.Server):
+        """One whose browsers are told of the end: else their listening is waited for."""
+
+        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+            hub.end()
+            await super().shutdown(sockets)
     config = uvicorn.Config(
         application(hub, keys, used), log_level='warning', access_log=False, server_header=False,
         date_header=False, limit_concurrency=MOST_CONNECTIONS, proxy_headers=False,
         timeout_graceful_shutdown=LAST_WORDS,
         ws='none')  # an upgrade is a request like others
     with bound:
-        uvicorn.Server(config).run(sockets=[bound])
+        Server(config).run(sockets=[bound])
