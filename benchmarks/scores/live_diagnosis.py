@@ -131,8 +131,9 @@ def run(mode: str, arguments: list[str]) -> Iterator[dict[str, Any]]:
     if mode == 'changes':
         names = arguments[1:] or sorted(IN_CATALOGUE)
         for seed in range(int(arguments[0])):
-            for name in names:
-                yield {'key': f'{name} {seed}', 'of': lambda n=name, s=seed: changes(n, 300 + s)}
+            for name in names:  # each with a robot, motions and a moment of its own
+                own = 300 + len(IN_CATALOGUE) * seed + sorted(IN_CATALOGUE).index(name)
+                yield {'key': f'{name} {seed}', 'of': lambda n=name, s=own: changes(n, s)}
     else:
         noises = [noise for noise in NOISES if str(noise) in (arguments[1:] or map(str, NOISES))]
         for first in range(int(arguments[0]) // WINDOWS):

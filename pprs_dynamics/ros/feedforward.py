@@ -53,6 +53,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self, 'feedforward', allow_undeclared_parameters=True, **options)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
+        self._current: Any = None
         self._subscription: Any = None
         self._watchdog: CommandWatchdog | None = None
         self._failure: Exception | None = None
@@ -148,6 +149,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return self._publishers_made[-1]
 
     def _create_parts(self) -> None:
+        known = self._settings.model.knows_currents
+        if self._current is not None and not known:
+            self.destroy_publisher(self._current)
+            self._current = None
+        elif self._current is None and known:
+            self._current = publisher(self, Float64MultiArray, '~/current')
         names = self._feedforward.parts
         for name in self._parts.keys() - set(names):
             self.destroy_publisher(self._parts.pop(name))
@@ -160,9 +167,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self.destroy_subscription(self._subscription)
         if self._watchdog is not None:
             self._watchdog.destroy()
-        for each in (*self._publishers_made, *self._parts.values()):
-            self.destroy_publisher(each)
-        self._subscription = self._watchdog = None
+        for each in (*self._publishers_made, *self._parts.values(), self._current):
+            if each is not None:
+                self.destroy_publisher(each)
+        self._subscription = self._watchdog = self._current = None
         self._publishers_made, self._parts = [], {}
 
     def _use_settings(self) -> None:
@@ -185,7 +193,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         except PprsError as error:
             self._reject(Rejection.of(error))
             return
-        self._commands.publish(self._written.commands(answer.effort[0]))
+        self._command(answer)
         # What is left may take its time: the drives have their command.
         self._compute_time.add(time.perf_counter() - began)
         self._counters['accepted'] += 1
@@ -197,6 +205,13 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._lag.add(max(0.0, (time.time_ns() - info['received_timestamp']) / NANOSECONDS
                               - (time.perf_counter() - began)))
         self._judge(answer)
+
+    def _command(self, command: ForceCommand) -> None:
+        """Send efforts to the drives, and the currents that give them where they are known."""
+        effort = command.effort[0]
+        self._commands.publish(self._written.commands(effort))
+        if self._current is not None:
+            self._current.publish(self._written.commands(self._settings.model.currents(effort)))
 
     def _publish_rest(self, answer: ForceCommand) -> None:
         request, forces = answer.request, answer.forces
@@ -264,8 +279,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             return
         self._watchdog.stop()
         self.get_logger().info(f'ends: {self._do_timeout_action()}')
-        for each in (self._commands, self._joint_command):
-            each.wait_for_all_acked(LAST_WORD)
+        for each in (self._commands, self._joint_command, self._current):
+            if each is not None:
+                each.wait_for_all_acked(LAST_WORD)
 
     def _do_timeout_action(self) -> str:
         """Send what the action says, once, and return it in words."""
@@ -276,7 +292,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             held = self._feedforward.hold(gravity=action == HOLD_GRAVITY)
         except PprsError as error:
             return f'the last command stays in force, as none can be given: {error}'
-        self._commands.publish(self._written.commands(held.effort[0]))
+        self._command(held)
         if self._joint_command.get_subscription_count():
             self._joint_command.publish(self._written.joint_state(
                 self.get_clock().now().nanoseconds, held.effort[0],

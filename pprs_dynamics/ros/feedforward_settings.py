@@ -26,8 +26,7 @@ _PARAMETERS = (
     NodeParameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
                   'than 1 while a robot is commissioned', lower=0, upper=1),
     NodeParameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
-                  'N m; A where commands are currents]; the smaller one of this and the model\'s '
-                  'counts', size=6),
+                  'N m]; the smaller one of this and the model\'s counts', size=6),
     NodeParameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
                   'the effort to the limit', choices=(REJECT, CLAMP)),
     NodeParameter('command_timeout', 0.1, 'how long after the end of the last accepted '

@@ -33,7 +33,7 @@ class ForceCommand(NamedTuple):
     forces : Forces
         As the model gave them.
     effort : (N, D) array
-        What goes out [N, N m; A where commands are currents]: scaled and within the limits.
+        What goes out [N, N m]: scaled and within the limits.
     clamp_reason : str
         Which effort was clamped; empty where none was.
     """
@@ -75,8 +75,8 @@ class Feedforward:
             self._before = self._model, self._memory
         # Made with the next answer, which is refused where an effect fails at it.
         self._memory = None
-        self._model, self._scale = model, own['feedforward_scale'] * model.amperes
-        self._scales = bool((self._scale != 1).any())
+        self._model, self._scale = model, own['feedforward_scale']
+        self._scales = self._scale != 1
         if own['missing_derivatives'] == SPLINE:
             load_splines()
         self._clamps = own['limit_policy'] == CLAMP

@@ -208,21 +208,32 @@ def test_a_stale_command_holds_the_last_position(file: Path, model: ArmModel) ->
         assert np.abs(held.total).max() > 1
 
 
-def test_efforts_in_amperes_go_out_as_currents_and_so_do_limits(
+def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
     file: Path, model: ArmModel,
 ) -> None:
     gain, moved = np.array([10.0, 5.0, 40.0]), motion(2, 4)
-    currents = model.drive_forces(moved).total / gain
+    effort = model.drive_forces(moved).total
     with feedforward_bench(JointTrajectory, **parameters(
-            file, arm__gain=gain.tolist(), arm__effort_unit='A')) as node:
-        np.testing.assert_allclose(node.answer(message_of(moved)), currents[0], rtol=0, atol=EQUAL)
+            file, arm__gain=gain.tolist(), arm__effort_unit='A', command_timeout=TIMEOUT,
+            timeout_action='zero')) as node:
+        currents = node.bench.listen(Float64MultiArray, '/feedforward/current', 1000)
+        assert node.bench.connected()
+        np.testing.assert_allclose(node.answer(message_of(moved)), effort[0], rtol=0, atol=EQUAL)
+        assert node.bench.spin_until(lambda: len(currents) == 2)
+        np.testing.assert_allclose(currents[0].data, effort[0] / gain, rtol=0, atol=EQUAL)
+        assert list(currents[1].data) == [0.0] * 3  # the timeout's action reaches it, too
         tight = np.full(3, LIMIT)
-        tight[1] = np.abs(currents[:, 1]).max() * 0.9
+        tight[1] = np.abs(effort[:, 1]).max() * 0.9
         result, = node.node.set_parameters([Parameter('effort_limits', value=tight.tolist())])
         assert result.successful
         node.send(message_of(moved))
         assert 'swing needs' in (said := node.wait_for_status(code='LIMIT')['message'])
-        assert ' A, ' in said
+        assert ' N m, ' in said or ' N, ' in said
+        assert len(currents) == 2
+    with feedforward_bench(JointTrajectory, **parameters(file)) as node:
+        topics = [each.topic_name for each in node.node.publishers]
+        assert '/feedforward/commands' in topics
+        assert '/feedforward/current' not in topics
 
 
 def test_missing_derivatives_come_from_a_spline(file: Path, model: ArmModel) -> None:

@@ -97,7 +97,7 @@ class LiveComparison:
         if self._live is None:
             self._learn(time)
         if self._live is not None:
-            sample = self._live.push(time, position, np.asarray(effort) / self._model.amperes)
+            sample = self._live.push(time, position, np.asarray(effort) * self._model.recorded_gain)
             if sample is not None:
                 self._waiting.append(sample)
 

@@ -145,12 +145,12 @@ class ArmModel(ForceModel):
 
     @cached_property
     def limits(self) -> JointLimits:
-        """Ranges and efforts of the description, the latter in the unit of recordings."""
+        """Ranges and efforts of the description."""
         structure, units = self.robot.structure, self.units
         return JointLimits(
             structure.drives, tuple(one.position for one in units),
-            tuple('A' if self.efforts_in_amperes else one.effort for one in units),
-            structure.lower, structure.upper, structure.effort * self.amperes)
+            tuple(one.effort for one in units),
+            structure.lower, structure.upper, structure.effort)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> ArmModel:

@@ -187,11 +187,21 @@ class ForceModel(ABC):
         return False
 
     @property
-    def amperes(self) -> Array:
-        """What efforts are multiplied by to give those of recordings and commands, (D,)."""
+    def recorded_gain(self) -> Array:
+        """What efforts of recordings are multiplied by to give efforts in N and N m, (D,)."""
         if self.gain is not None and self.efforts_in_amperes:
-            return 1 / np.asarray(self.gain)
+            return np.asarray(self.gain)
         return np.ones(len(self.drives))
+
+    @property
+    def knows_currents(self) -> bool:
+        """Whether a gain was given; 1 for every drive is what stands where none was."""
+        return self.gain is not None and any(gain != 1 for gain in self.gain)
+
+    def currents(self, effort: Array) -> Array:
+        """Return the currents [A] that give efforts, (..., D), where `knows_currents`."""
+        current: Array = effort / np.asarray(self.gain)
+        return current
 
     @property
     def rest_speed(self) -> float:
