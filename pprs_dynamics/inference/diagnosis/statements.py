@@ -130,6 +130,10 @@ def word_statement(
         # Its coefficient belongs to a standstill, which hardly any sample is as near as.
         amplitude = float(np.abs(shape).max())
         signed = float(np.copysign(amplitude, signed))
+    elif pattern.limits is not None:
+        # The mean error there, which the table and a plot show; the coefficient is what this
+        # pattern has beside the others that overlap it.
+        signed = float(error @ columns[0] / (columns[0] @ columns[0]))
     sentence = _sentence(variable, pattern, library, signed, amplitude, share, time, shape)
     if rivals:
         sentence += f'; {_listed([_words(name) for name in rivals])} would explain it about as well'
