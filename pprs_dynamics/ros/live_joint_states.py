@@ -9,10 +9,12 @@ what the node has noted, and changes of running nodes go out as parameters.
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +27,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
@@ -34,7 +36,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.ros.node.qos import UNANSWERED
+from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
 
 NAME = 'workbench'
 JUDGED = 0.05  # [s] between looks at what came in
@@ -71,9 +73,11 @@ class LiveJointStates(Node):
         self._counters = {'received': 0, 'rejected': 0}
         self._trouble = ''
         self._monitor: list[float] | None = None
+        self._diagnosis: dict[str, Any] | None = None
         self._heard = 0.0
         self.create_subscription(JointState, topic, self._on_state, UNANSWERED, raw=True)
         self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, UNANSWERED)
+        self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED)
         self.create_timer(JUDGED, self._judge)
         self.clients_of = {name: AsyncParameterClient(self, name)
                            for name in (monitor, feedforward)}
@@ -103,6 +107,10 @@ class LiveJointStates(Node):
 
     def _on_error(self, message: Float64MultiArray) -> None:
         self._monitor, self._heard = list(message.data), time.monotonic()
+
+    def _on_diagnosis(self, message: String) -> None:
+        with suppress(ValueError):  # no JSON: not of our monitor
+            self._diagnosis = json.loads(message.data)
 
     def _judge(self) -> None:
         with self._lock:
@@ -150,7 +158,8 @@ class LiveJointStates(Node):
             age = now - self._arrived if self._arrived else None
         step = max(1, len(late) // 1000)
         return {**self._counters, 'drives': list(self.model.drives), 'age': age, 'kept': span,
-                'trouble': self._trouble, 'effects': list(self.model.values.get(ACTIVE, ())),
+                'trouble': self._trouble, 'diagnosis': self._diagnosis,
+                'effects': list(self.model.values.get(ACTIVE, ())),
                 'error': [_plain(value) for value in running],
                 'monitor_error': [_plain(value) for value in self._monitor]
                 if self._monitor is not None and now - self._heard < ERROR_SPAN else None,

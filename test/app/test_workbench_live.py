@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,12 @@ import numpy as np
 import pytest
 import rclpy
 from browser import chromium, needs_browser
+from node_bench import LATCHED
 from rclpy.context import Context
 from rclpy.node import Node
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from test_workbench_page import Page
 from workbench_bench import NOISE, write_hidden
 from workbench_server import Workbench, workbench
@@ -132,6 +135,19 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
             found['error'][0], found['monitor_error'][0]) < 0.5)
 
 
+@contextmanager
+def diagnosis(content: dict[str, Any]) -> Iterator[None]:
+    """Say something on the topic of the monitor's live diagnosis."""
+    context = Context()
+    rclpy.init(context=context)
+    node = Node('diagnosing', context=context)
+    node.create_publisher(String, '/monitor/diagnosis', LATCHED).publish(
+        String(data=json.dumps(content)))
+    yield
+    node.destroy_node()
+    context.try_shutdown()
+
+
 def rms(page: Page, key: str) -> float:
     values: list[Any] = page.tab.evaluate(f'bench.live.{key}')
     return float(np.sqrt(np.mean(np.square(np.array(values, dtype=float)))))
@@ -155,6 +171,13 @@ def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench
             page.tab.wait_for_function(
                 f'bench.live.{key} && Math.max(...bench.live.{key}) < {3 * NOISE}')
         assert 'payload mass' in page.tab.locator('#live-state').inner_text()
+        # What the monitor's live diagnosis says of the robot is told, from before as well.
+        assert page.tab.locator('#live-changes').inner_text() == ''
+        with diagnosis({'text': 'payload mass: mass 0.210 ± 0.004 kg, since 14:02:31',
+                        'confirmed': True, 'withdrawn': [{'name': 'base_tilt'}], 'note': ''}):
+            page.tab.wait_for_function(
+                "document.getElementById('live-changes').textContent === 'What changed: payload "
+                "mass: mass 0.210 ± 0.004 kg, since 14:02:31 Gone: base tilt.'")
         # What came in is data for the session, too.
         page.tab.locator('#live-take').click()
         page.tab.wait_for_function('bench.state.recordings.length === 2')

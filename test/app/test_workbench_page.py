@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -193,6 +194,29 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
     page.settled()
     page.tab.keyboard.press('Escape')
     page.tab.wait_for_function("!document.querySelector('#share-list li')")
+
+
+def test_what_is_seen_is_saved_for_slides_and_as_numbers(page: Page, tmp_path: Path) -> None:
+    page.tab.evaluate('bench.curves.zoom([3, 5])')
+    saved = {}
+    for kind in ('svg', 'csv'):
+        with page.tab.expect_download() as download:
+            page.tab.locator(f'#save-{kind}').click()
+        assert download.value.suggested_filename == f'error.{kind}'
+        download.value.save_as(path := tmp_path / f'error.{kind}')
+        saved[kind] = path
+    table = np.genfromtxt(saved['csv'], delimiter=',', skip_header=1)
+    assert table.shape[1] == 13
+    assert table[0, 0] >= 3.0
+    assert table[-1, 0] <= 5.0
+    assert len(table) > 100
+    shown = np.array(page.tab.evaluate('Array.from(bench.curves.before[3])'), dtype=float)
+    time = np.array(page.tab.evaluate('Array.from(bench.curves.times[3])'))
+    seen = (time >= 3.0) & (time <= 5.0)
+    np.testing.assert_allclose(table[:, 7], shown[seen], rtol=1e-6)
+    drawing = ElementTree.parse(saved['svg']).getroot()
+    texts = [each.text for each in drawing.iter('{http://www.w3.org/2000/svg}text')]
+    assert {'time [s]', 'lift 1 [N]', 'slide 1 [N]', '3', '5'} <= set(texts)
 
 
 def test_an_answer_that_comes_after_the_mark_was_forgotten_is_not_shown(page: Page) -> None:

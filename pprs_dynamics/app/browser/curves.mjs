@@ -123,6 +123,13 @@ export class Curves {
                            Math.max(...this.times.map((time) => time[time.length - 1]))];
   }
 
+  /* What is drawn of each drive, whole; `range` says how much of it is seen. */
+  seen() {
+    return this.drives.map((drive, d) => ({
+      drive, unit: this.unitOf(drive), time: this.times[d], before: this.before[d],
+      now: this.now[d]}));
+  }
+
   zoom(range) {
     if (!this.plots.length || (range && !(range[1] > range[0]))) return;
     this.window = range;

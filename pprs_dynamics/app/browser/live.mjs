@@ -22,6 +22,14 @@ export const sentence = (found, unit) => {
     `${found.kept.toFixed(0)} s kept`, found.trouble].filter(Boolean).join(' · ');
 };
 
+/* What the monitor's live diagnosis says of the robot, `null` where it is not asked for one. */
+export const changesSaid = (diagnosis) => {
+  if (!diagnosis) return '';
+  const gone = (diagnosis.withdrawn ?? []).map((one) => titleOf(one.name)).join(', ');
+  return [diagnosis.text ? `What changed: ${diagnosis.text}` : 'Nothing has changed.',
+          gone && `Gone: ${gone}.`, diagnosis.note].filter(Boolean).join(' ');
+};
+
 export class Live {
   constructor(server, isSeen) {
     Object.assign(this, {server, isSeen, plots: []});
@@ -54,6 +62,8 @@ export class Live {
     }
     this.found = found;
     $('live-state').textContent = sentence(found, unitOf(state));
+    $('live-changes').textContent = changesSaid(found.diagnosis);
+    $('live-changes').classList.toggle('changed', Boolean(found.diagnosis?.confirmed));
     $('live-take').disabled = !found.kept;
     if (!found.residual.length) return;
     const time = found.time.map((t) => t - found.time[found.time.length - 1]);

@@ -1,5 +1,6 @@
 /* The workbench's page: asks, shows what is answered, and says when it has been painted. */
 
+import {csvOf, save, svgOf} from './curve_files.mjs';
 import {Curves} from './curves.mjs';
 import {$, afterPaint, make, whenDark} from './dom.mjs';
 import {EffectList} from './effects.mjs';
@@ -234,6 +235,10 @@ on('brush', 'submit', (event) => {
 });
 on('zoom', 'click', () => curves.zoom(span()));
 on('all', 'click', () => curves.all());
+for (const [kind, type, of] of [['svg', 'image/svg+xml', svgOf], ['csv', 'text/csv', csvOf]]) {
+  on(`save-${kind}`, 'click', () => curves.before
+    && save(`error.${kind}`, type, of(curves.seen(), curves.range())));
+}
 for (const id of ['scatter-x', 'scatter-y', 'scatter-drive']) {
   on(id, 'change', () => {
     setMark(null);
