@@ -66,8 +66,8 @@ setup(
         'bags': ['rosbags>=0.11'],
         'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
                   'fsspec>=2024.6'],
-        # Tables by columns of the model file: pandas finds separators, pyarrow reads Parquet.
-        'tables': ['pandas>=2', 'pyarrow>=17'],
+        # Tables by columns of the model file: pyarrow reads Parquet.
+        'tables': ['pyarrow>=17'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
         # Results in a notebook: tables of pandas, pictures, and what the terminal shows.
         'notebook': ['rich>=13', 'matplotlib>=3.8', 'pandas>=2'],

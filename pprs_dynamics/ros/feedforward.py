@@ -21,10 +21,11 @@ from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
 from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
-from pprs_dynamics.ros.messages.rejection import CODES, Rejection
+from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.request_reader import reader_for
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import declare_own, drive_count
@@ -67,7 +68,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._written = command_writer(names)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
-                          **dict.fromkeys(CODES, 0)}
+                          **dict.fromkeys(REJECTIONS, 0)}
         self._margins_due, self._margins = 0.0, Margins(None, 1.0, '')
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, time.monotonic())

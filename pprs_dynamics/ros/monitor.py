@@ -27,8 +27,9 @@ from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.feedforward_settings import FRAME
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.rejection import CODES, Rejection
+from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides
@@ -71,7 +72,7 @@ class MonitorNode(ExplainsRefusals):
             self._settings.model, own['window'], own['error_span'])
         self._names = RobotNames.of(self._settings.model, own['frame_id'])
         self._begins_anew = self._cannot_begin = False
-        self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(CODES, 0)}
+        self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(REJECTIONS, 0)}
         self._origin: int | None = None
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model))

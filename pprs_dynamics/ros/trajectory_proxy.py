@@ -30,6 +30,7 @@ from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.request_reader import reader_for
 from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.status_codes import Code
 from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
@@ -101,7 +102,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
             theirs.cancel_goal_async()
         return CancelResponse.ACCEPT
 
-    def _refused(self, handle: Any, code: int, status: str, text: str) -> Any:
+    def _refused(self, handle: Any, code: int, status: Code, text: str) -> Any:
         self._counters['refused'] += 1
         self._status.report('ERROR', status, text)
         self.get_logger().warning(f'refused, {status}: {text}', throttle_duration_sec=1.0)

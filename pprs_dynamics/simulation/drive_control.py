@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.simulation.closed_chains import ClosedChains
 from pprs_dynamics.simulation.hidden_effect import DRIVES
+
+NoteCode = Literal['HOLD', 'REFUSED', 'SATURATED', 'STOPPED']
 
 
 @dataclass(frozen=True)
@@ -62,10 +64,10 @@ class Setpoint:
 
 @dataclass(frozen=True)
 class Note:
-    """A message of the robot: `code` is one of SATURATED, HOLD, REFUSED, STOPPED."""
+    """A message of the robot."""
 
     time: float
-    code: str
+    code: NoteCode
     message: str
 
 
@@ -259,7 +261,7 @@ class DriveControl:
                         f'[{self._lower[i]:g}, {self._upper[i]:g}] m')
         return ''
 
-    def _note(self, now: float, code: str, message: str) -> None:
+    def _note(self, now: float, code: NoteCode, message: str) -> None:
         # A message that repeats the last one is not given again.
         if not self.notes or (self.notes[-1].code, self.notes[-1].message) != (code, message):
             self.notes.append(Note(now, code, message))

@@ -24,7 +24,7 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.app.workbench.worker_process import EndedError, run_in_process
-from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import load_model
 
@@ -228,7 +228,7 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(
 
 def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:
     (tmp_path / 'again.csv').write_bytes(recording.read_bytes())
-    with pytest.raises(SessionError, match='may be given once'):
+    with pytest.raises(UnreadableFileError, match='may be given once'):
         Session.open([recording, tmp_path / 'again.csv'])
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import json
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -19,6 +20,7 @@ from documents import FENCE, PROJECT, code, pages, text_of
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import NAMES
+from pprs_dynamics.ros.messages.status_codes import CODES, LEVELS
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
 
 # Options of other programs that pages show.
@@ -194,3 +196,11 @@ def test_every_command_has_its_row() -> None:
     text = (PROJECT / 'docs' / 'commands.md').read_text(encoding='utf-8')
     table = '\n'.join(line for line in text.splitlines() if line.startswith('| `pprs '))
     assert set(re.findall(r'`pprs ([a-z-]+)`', table)) == set(COMMANDS)
+
+
+def test_codes_of_the_status_are_those_of_its_schema_and_of_the_page() -> None:
+    schema = json.loads((PROJECT / 'config/schemas/status.schema.json').read_text())['properties']
+    assert schema['level']['enum'] == list(LEVELS)
+    assert schema['code']['enum'] == list(CODES)
+    page = (PROJECT / 'docs/nodes.md').read_text(encoding='utf-8')
+    assert [code for code in CODES if not re.search(rf'^\|[^|]*`{code}`', page, re.M)] == []

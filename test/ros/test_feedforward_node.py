@@ -26,7 +26,7 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.rejection import CODES
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS
 
 pytestmark = pytest.mark.nodes
 
@@ -184,7 +184,7 @@ DAMAGES: list[tuple[str, Callable[[MultiDOFJointTrajectory], None]]] = [
 
 def test_every_code_of_the_interface_is_provoked_here() -> None:
     # EFFECT is no message's fault: test_failing_effects.py
-    assert {code for code, _ in DAMAGES} == set(CODES) - {'EFFECT'}
+    assert {code for code, _ in DAMAGES} == set(REJECTIONS) - {'EFFECT'}
 
 
 def test_damaged_messages_are_counted_explained_silent_and_survived(

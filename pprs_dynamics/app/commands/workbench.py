@@ -12,7 +12,7 @@ import argparse
 import re
 
 from pprs_dynamics.app.commands.arguments import whole
-from pprs_dynamics.app.workbench.recording_set import Files
+from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.serve import serve
@@ -55,12 +55,12 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     given = [path for path in options.recordings if not is_folder(path)]
     # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
-    files = Files.read(given, options.model, options.validate, options.topic)
+    inputs = Inputs.read(options.model, given, options.validate, options.topic)
 
     def begin() -> Session | None:
-        return Session.of(files) if files.recordings.fitted else None
-    live = _live(options, files.model) if options.live else None
-    hub = Hub(begin, files.model, options.model, Folders.of(options.recordings),
+        return Session.of(inputs) if inputs.recordings else None
+    live = _live(options, inputs.model) if options.live else None
+    hub = Hub(begin, inputs.model, options.model, Folders.of(options.recordings),
               Surveys.of(options.recordings), live)
     serve(hub, options.host, options.port, not options.no_browser)
     return 0

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 File = str | PathLike[str]
 Model = ForceModel | File
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
+# Every recording is evidence once.
+ONCE = 'every recording may be given once'
 
 
 class InputError(PprsError, ValueError):
@@ -65,7 +67,7 @@ class Inputs:
     @classmethod
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
            topic: str | None = None, progress: Progress | None = None) -> Inputs:
-        """Read what is given as a path, and take what is in memory as it is.
+        """Read what is given as a path and check it, and take what is in memory as it is.
 
         Raises
         ------
@@ -77,18 +79,49 @@ class Inputs:
         """
         if isinstance(recordings, Inputs):
             return recordings
+        held_out = () if isinstance(validate, Inputs) else validate
+        return cls.read(model, recordings, held_out, topic, progress).checked()
+
+    @classmethod
+    def read(cls, model: Model, recordings: Given, validate: Given = (),
+             topic: str | None = None, progress: Progress | None = None) -> Inputs:
+        """Read as `of`, but units and signs are not looked at yet."""
         found = model if isinstance(model, ForceModel) else load_model(find_file(model))
         base = Path(found.source) if found.source and Path(found.source).is_file() else None
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
         given = base or '' if isinstance(model, ForceModel) else model
         name = '' if shipped else str(given)
-        fitted = _read_all(found, recordings, topic, progress)
-        held_out = [] if isinstance(validate, Inputs) else _read_all(
-            found, validate, topic, progress)
-        _refuse_repeats(fitted, [], 'every recording may be given once')
+        fitted, held_out = (_read_all(found, listed, topic, progress)
+                            for listed in (recordings, validate))
+        _refuse_repeats(fitted, [], ONCE)
         _refuse_repeats(held_out, fitted, 'what is held out must be another recording')
         paths = frozenset(one.name for one in (*fitted, *held_out) if one.is_path)
         return cls(found, _named(fitted), _named(held_out), paths, base, name, topic or '')
+
+    def checked(self) -> Inputs:
+        """Return this with what the numbers of files rather mean among the findings.
+
+        Raises
+        ------
+        UnreadableFileError
+            For positions of the 3-PPRS that are no metres.
+        """
+        def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
+            return {name: with_mistakes(self.model, one, refuse=True) if name in self.paths
+                    else one for name, one in recordings.items()}
+        return replace(self, recordings=each(self.recordings), validation=each(self.validation))
+
+    def with_more(self, path: File, is_held_out: bool = False) -> Inputs:
+        """Return this with one more file; errors as `of`."""
+        more = Inputs.of(self.model, path)
+        _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
+                        [_Read(name, one, True) for name, one in
+                         {**self.recordings, **self.validation}.items()], ONCE)
+        if is_held_out:
+            return replace(self, validation={**self.validation, **more.recordings},
+                           paths=self.paths | more.paths)
+        return replace(self, recordings={**self.recordings, **more.recordings},
+                       paths=self.paths | more.paths)
 
     def require_recordings(self) -> Inputs:
         """Return this, or raise InputError where there is no recording to fit to."""
@@ -128,28 +161,36 @@ class Inputs:
         return LedgerBook(entries(self.recordings), entries(self.validation))
 
 
-Recordings = File | Recording | Sequence[File | Recording] | Inputs
+Given = File | Recording | Sequence[File | Recording]
+Recordings = Given | Inputs
 
 
 def read_checked(model: ForceModel, path: File, topic: str | None = None,
                  progress: Progress | None = None) -> Recording:
     """Read a recording of a model's drives; what its numbers rather mean is in its findings."""
+    return with_mistakes(model, _read(model, path, topic, progress))
+
+
+def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
+    """Return a recording with what its numbers rather mean among its findings.
+
+    Raises
+    ------
+    UnreadableFileError
+        With `refuse`, for positions of the 3-PPRS that are no metres.
+    """
+    mistakes = find_mistakes(model, recording)
+    for finding in mistakes:
+        if refuse and finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
+            raise UnreadableFileError(recording.name, f'{finding.what}, must be metres')
+    return replace(recording, findings=(*mistakes, *recording.findings))
+
+
+def _read(model: ForceModel, path: File, topic: str | None, progress: Progress | None,
+          ) -> Recording:
     report, stage = progress or (lambda what, share: None), f'reading {displayed(path)}'
-    return with_mistakes(model, read_recording(
-        path, model.recorded, topic,
-        lambda done, total: report(stage, done / total if total else 0.0)))
-
-
-def with_mistakes(model: ForceModel, recording: Recording) -> Recording:
-    """Return a recording with what its numbers rather mean among its findings."""
-    return replace(recording, findings=(*find_mistakes(model, recording), *recording.findings))
-
-
-def refuse_other_units(model: ForceModel, path: File, recording: Recording) -> None:
-    """Raise UnreadableFileError for positions of the 3-PPRS that are no metres."""
-    for finding in recording.findings:
-        if finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
-            raise UnreadableFileError(path, f'{finding.what}, must be metres')
+    return read_recording(path, model.recorded, topic,
+                          lambda done, total: report(stage, done / total if total else 0.0))
 
 
 class _Read(NamedTuple):
@@ -158,17 +199,11 @@ class _Read(NamedTuple):
     is_path: bool
 
 
-def _read_all(model: ForceModel, given: File | Recording | Sequence[File | Recording],
-              topic: str | None, progress: Progress | None) -> list[_Read]:
-    found = []
-    for one in [given] if isinstance(given, (str, PathLike, Recording)) else given:
-        if isinstance(one, Recording):
-            found.append(_Read(one.name, one, False))
-            continue
-        recording = read_checked(model, one, topic, progress)
-        refuse_other_units(model, one, recording)
-        found.append(_Read(str(one), recording, True))
-    return found
+def _read_all(model: ForceModel, given: Given, topic: str | None, progress: Progress | None,
+              ) -> list[_Read]:
+    return [_Read(one.name, one, False) if isinstance(one, Recording)
+            else _Read(str(one), _read(model, one, topic, progress), True)
+            for one in ([given] if isinstance(given, (str, PathLike, Recording)) else given)]
 
 
 def _named(found: Sequence[_Read]) -> dict[str, Recording]:

@@ -9,16 +9,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from threading import RLock
 from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
 from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed, judged
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
-from pprs_dynamics.app.workbench.recording_set import Files, RecordingSet
 from pprs_dynamics.app.workbench.tick_fits import Tick, TickFits
 from pprs_dynamics.app.workbench.view_stages import following, linear, without_ticks
 from pprs_dynamics.app.workbench.view_state import (
@@ -72,7 +73,8 @@ class Session:
 
     Attributes
     ----------
-    recordings : RecordingSet
+    inputs : Inputs
+        Recordings, and the model as it was given.
     fits : TickFits
         Design, regression and library of the model.
     view_state : ViewState
@@ -93,8 +95,8 @@ class Session:
                  base: str | PathLike[str] | None = None) -> None:
         if not recordings:
             raise SessionError('no recording is given, must be at least one')
-        self.recordings = RecordingSet(recordings, validation or {})
-        self.base = base
+        self.inputs = Inputs(model, recordings, validation or {},
+                             base=None if base is None else Path(base))
         self.diagnosis: Diagnosis | None = None
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
@@ -115,27 +117,26 @@ class Session:
         PprsError
             Where one cannot be read, or holds the samples of another.
         """
-        session = cls.of(Files.read(recordings, model, validation, topic))
+        session = cls.of(Inputs.read(model, recordings, validation, topic))
         session.find_mistakes()
         return session
 
     @classmethod
-    def of(cls, files: Files) -> Session:
-        """Begin with files that were read; what their numbers rather mean is not looked for yet.
+    def of(cls, inputs: Inputs) -> Session:
+        """Begin with what was read; what their numbers rather mean is not looked for yet.
 
         Raises
         ------
         PprsError
             As `measure_residuals`.
         """
-        read = files.recordings
         try:
-            session = cls(files.model, read.fitted, read.held_out, files.base)
+            session = cls(inputs.model, inputs.recordings, inputs.validation)
         except PprsError:
             # Positions in millimetres are told as that, not as a pose out of reach.
-            read.with_mistakes(files.model)
+            inputs.checked()
             raise
-        session.recordings = read
+        session.inputs = inputs
         return session
 
     def _use(self, fits: TickFits, ticks: Mapping[str, Tick] | None = None) -> None:
@@ -158,10 +159,10 @@ class Session:
         PprsError
             Where it cannot be read, holds the samples of another, or the model cannot follow it.
         """
-        more = self.recordings.with_more(self.model, str(path), is_held_out)
-        fits = self.fits if is_held_out else TickFits(self.model, list(more.fitted.values()))
+        more = self.inputs.with_more(path, is_held_out)
+        fits = self.fits if is_held_out else TickFits(self.model, more.fitted)
         with self._lock:
-            self.recordings = more
+            self.inputs = more
             if fits is not self.fits:
                 self.diagnosis = None
                 self._use(fits, self.view_state.ticks)
@@ -175,7 +176,7 @@ class Session:
         UnreadableFileError
             For positions that are no metres.
         """
-        self.recordings = self.recordings.with_mistakes(self.model)
+        self.inputs = self.inputs.checked()
         self.notify()
 
     # Those who look on
@@ -441,10 +442,10 @@ class Session:
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
         answer: Adoption = run_in_process(
-            judged, fits.model, request, fits.recordings, list(self.recordings.held_out.values()),
+            judged, fits.model, request, fits.recordings, self.inputs.held_out,
             force, self.diagnosis, report=lambda share: report(0.9 * share))
         if answer.adopted:
-            after = TickFits(self.recordings.book().entered(answer), fits.recordings)
+            after = TickFits(self.inputs.ledger.entered(answer), fits.recordings)
             report(0.95)
             with self._lock:
                 if fits is not self.fits:
@@ -539,7 +540,7 @@ class Session:
             As `ticked_model`; where the file cannot be written, or is the model that was given.
         """
         model = self.ticked_model() if with_ticked else self.model
-        write_model(path, model.values, self.base)
+        write_model(path, model.values, self.inputs.base)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all that one screen shows, but for the curves."""
@@ -560,6 +561,5 @@ class Session:
                 'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
                 'adoption': adoption.to_dict() if adoption else None,
                 'experiment': self.experiment.promise if self.experiment else None,
-                'recordings': recordings_to_dict(
-                    list(self.recordings.fitted.values()), self.fits, self.now),
-                'held_out': [one.name for one in self.recordings.held_out.values()]}
+                'recordings': recordings_to_dict(self.inputs.fitted, self.fits, self.now),
+                'held_out': [one.name for one in self.inputs.held_out]}

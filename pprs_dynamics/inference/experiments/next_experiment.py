@@ -195,25 +195,9 @@ def next_experiment(
     limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
 ) -> Experiment:
-    """Return the motion that tells most about what is open.
+    """Return the motion that tells most about what is open; see `pprs_dynamics.next_experiment`.
 
-    Parameters
-    ----------
-    model : DriveModel or ArmModel
-        Of an arm for 'separate' only; `arm_excitation` designs its first motion.
-    recordings : sequence of Recording
-    purpose : {'separate', 'commission'}
-        'separate': what recordings leave open. 'commission': a first motion of a new robot.
-    limits : MotionLimits or ArmLimits, optional
-    duration : float
-        [s]
-    seed : int
-        Of the search.
-    noise : float
-        Standard deviation of means of the effort over 0.01 s [N]; for 'commission' without
-        recordings.
-    progress : callable, optional
-        Called with the share that is done.
+    Of an arm for 'separate' only; `arm_excitation` designs its first motion.
 
     Raises
     ------

@@ -23,6 +23,7 @@ from typing import IO, TextIO, cast
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import RecordedColumns
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.samples import (
     Finding,
@@ -58,12 +59,14 @@ class _Table:
 
 def read_csv(
     path: Path, drives: tuple[str, ...], topic: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress | None = None, names: RecordedColumns | None = None,
 ) -> Samples:
     """Read a CSV with a header; comma, semicolon or tab between columns in any order.
 
     Parameters
     ----------
+    names : RecordedColumns, optional
+        Of columns that have names of their own; blanks and | may be between these, too.
     topic : str, optional
         Where columns have prefixes, as in `/joint_states/lift_1/position`: the one to take, if
         there are several.
@@ -81,7 +84,9 @@ def read_csv(
             if not first:
                 raise UnreadableFileError(path, 'the file is empty')
             check_length(path, 1, first)
-            table, prefix, columns = _columns(path, first, drives, topic)
+            table, prefix, columns = (
+                _columns(path, first, drives, topic) if names is None
+                else _named_columns(path, first, drives, names))
             blocks = []
             for block in _blocks(path, file, table):
                 blocks.append(block)
@@ -121,11 +126,7 @@ def _columns(
     path: Path, first: str, drives: tuple[str, ...], topic: str | None,
 ) -> tuple[_Table, str, dict[tuple[str, str], int]]:
     """Return the table, the prefix, and the column of each (drive, quantity)."""
-    if '\x00' in first:
-        raise UnreadableFileError(path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8')
-    first = first.rstrip('\n')
-    headers = {separator: [cell.strip() for cell in cells_of(path, 1, first, separator)]
-               for separator in SEPARATORS}
+    headers = _headers(path, first, SEPARATORS)
     separator = max(SEPARATORS, key=lambda s: len(headers[s]))
     header = headers[separator]
     time = next((name for name in TIME_COLUMNS if name in header), None)
@@ -150,6 +151,35 @@ def _columns(
         if (drive, 'effort') in columns:
             columns.pop((drive, CURRENT), None)
     return _Table(separator, header, [header.index(time), *columns.values()]), prefix, columns
+
+
+def _named_columns(
+    path: Path, first: str, drives: tuple[str, ...], names: RecordedColumns,
+) -> tuple[_Table, str, dict[tuple[str, str], int]]:
+    """Return what `_columns` does, of columns with names of their own."""
+    headers = _headers(path, first, (*SEPARATORS, ' ', '|'))
+    separator = next((each for each, cells in headers.items() if names.time in cells), ',')
+    header = headers[separator]
+    wanted = {(drive, quantity): name for drive in drives
+              for quantity, name in names.drives[drive].names.items()}
+    require_columns(path, [names.time, *wanted.values()], header)
+    columns = {key: header.index(name) for key, name in wanted.items()}
+    return _Table(separator, header, [header.index(names.time), *columns.values()]), '', columns
+
+
+def require_columns(path: Path, wanted: Sequence[str], known: Sequence[str]) -> None:
+    """Raise UnreadableFileError where a table lacks a column."""
+    missing = [name for name in wanted if name not in known]
+    if missing:
+        raise UnreadableFileError(path, f'no column {missing[0]!r}; it holds '
+                                  + (', '.join(sorted(known)[:12]) or 'none'))
+
+
+def _headers(path: Path, first: str, separators: Sequence[str]) -> dict[str, list[str]]:
+    if '\x00' in first:
+        raise UnreadableFileError(path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8')
+    return {separator: [cell.strip() for cell in cells_of(path, 1, first.rstrip('\n'), separator)]
+            for separator in separators}
 
 
 def _prefix(

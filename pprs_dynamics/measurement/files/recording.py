@@ -220,7 +220,7 @@ def read_recording(
         if not path.is_dir() and not path.stat().st_size:
             raise UnreadableFileError(path, 'the file is empty')
         if drives.columns is not None and not is_bag:
-            samples = read_table(path, drives.names, drives.columns)
+            samples = read_table(path, drives.names, drives.columns, progress)
         else:
             reader = read_bag if is_bag else read_csv
             names = drives.names if drives.columns is not None else drives.joints or drives.names

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,14 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import RecordedColumns
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.samples import Samples
+from pprs_dynamics.measurement.files.csv_files import read_csv, require_columns
+from pprs_dynamics.measurement.files.samples import Progress, Samples
 
 PARQUET, MAT = ('.parquet', '.pq'), ('.mat',)
 
 
-def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns) -> Samples:
+def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns,
+               progress: Progress | None = None) -> Samples:
     """Read a table by its own names.
 
     Parameters
@@ -28,23 +31,32 @@ def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns) ->
         .parquet, .mat (up to version 7.2), or anything else as CSV.
     drives : tuple of D str
     columns : RecordedColumns
+    progress : callable, optional
+        Called with (done, total) now and then.
 
     Raises
     ------
     UnreadableFileError
         Where it is no such table, or lacks a column.
     MissingLibraryError
-        For Parquet without pyarrow, CSV without pandas.
+        For Parquet without pyarrow.
     """
-    reader: Callable[[Path, list[str]], Mapping[str, Any]] = (
-        _parquet if path.suffix in PARQUET else _mat if path.suffix in MAT else _csv)
+    samples = (_of_arrays(path, drives, columns) if path.suffix in (*PARQUET, *MAT)
+               else read_csv(path, drives, progress=progress, names=columns))
+    scale = np.array([columns.drives[drive].position_scale for drive in drives])
+    velocity = samples.velocity
+    return replace(
+        samples, position=samples.position * scale,
+        velocity=None if velocity is None else velocity * scale,
+        effort=samples.effort * [columns.drives[drive].effort_scale for drive in drives],
+        source=f'{path.suffix.lstrip(".") or "table"} by columns of the model file')
+
+
+def _of_arrays(path: Path, drives: tuple[str, ...], columns: RecordedColumns) -> Samples:
     wanted = [columns.time, *(name for drive in drives
                               for name in columns.drives[drive].names.values())]
-    table = reader(path, wanted)
-    missing = [name for name in wanted if name not in table]
-    if missing:
-        known = ', '.join(sorted(map(str, table))[:12])
-        raise UnreadableFileError(path, f'no column {missing[0]!r}; it holds {known or "none"}')
+    table = (_parquet if path.suffix in PARQUET else _mat)(path, wanted)
+    require_columns(path, wanted, list(table))
     arrays = {name: _numbers(path, name, table[name]) for name in wanted}
     lengths = {len(values) for values in arrays.values()}
     if len(lengths) > 1:
@@ -52,23 +64,15 @@ def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns) ->
         raise UnreadableFileError(path, f'column {short!r} has {len(arrays[short])} rows, '
                                   f'must have {max(lengths)}, as others')
     time = arrays[columns.time]
+    none = np.full(len(time), np.nan)
 
-    def of(quantity: str) -> Array | None:
-        if not any(quantity in columns.drives[drive].names for drive in drives):
-            return None
-        return np.stack([
-            arrays[columns.drives[drive].names[quantity]]
-            if quantity in columns.drives[drive].names else np.full(len(time), np.nan)
-            for drive in drives], axis=1)
+    def of(quantity: str) -> Array:
+        return np.stack([arrays.get(columns.drives[drive].names.get(quantity, ''), none)
+                         for drive in drives], axis=1)
 
-    scale = np.array([columns.drives[drive].position_scale for drive in drives])
-    efforts = np.array([columns.drives[drive].effort_scale for drive in drives])
-    position, velocity, effort = (of(name) for name in ('position', 'velocity', 'effort'))
-    assert position is not None
-    none = np.full(position.shape, np.nan)
-    return Samples(drives, time, position * scale, None if velocity is None else velocity * scale,
-                   none if effort is None else effort * efforts,
-                   source=f'{path.suffix.lstrip(".") or "table"} by columns of the model file')
+    has_velocity = any('velocity' in columns.drives[drive].names for drive in drives)
+    return Samples(drives, time, of('position'), of('velocity') if has_velocity else None,
+                   of('effort'))
 
 
 def _numbers(path: Path, name: str, values: Any) -> Array:
@@ -85,7 +89,7 @@ def _parquet(path: Path, wanted: list[str]) -> Mapping[str, Any]:
         from pyarrow import ArrowException
         from pyarrow.parquet import ParquetFile
     except ImportError:
-        raise MissingLibraryError('pyarrow', 'reading Parquet files', 'fleet') from None
+        raise MissingLibraryError('pyarrow', 'reading Parquet files', 'tables') from None
     try:
         file = ParquetFile(path)
         names = file.schema_arrow.names
@@ -111,17 +115,3 @@ def _mat(path: Path, wanted: list[str]) -> Mapping[str, Any]:
         raise UnreadableFileError(path, f'no MAT file ({str(error).splitlines()[0][:120]})'
                                   ) from None
     return {name: value for name, value in content.items() if not name.startswith('__')}
-
-
-def _csv(path: Path, wanted: list[str]) -> Mapping[str, Any]:
-    try:
-        import pandas as pd
-    except ImportError:
-        raise MissingLibraryError('pandas', 'reading a CSV by its own names', 'tables') from None
-    try:
-        table = pd.read_csv(path, sep=None, engine='python', skipinitialspace=True)
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError, ValueError,
-            OSError) as error:
-        raise UnreadableFileError(path, f'no table ({str(error).splitlines()[0][:120]})'
-                                  ) from None
-    return {str(name).strip(): table[name].to_numpy() for name in table.columns}

@@ -91,14 +91,11 @@ class AddedBody(BodyEffect):
         """Return the coefficients that belong to parameters."""
         if not cls.places:
             return super().to_coefficients(values)
-        found = {}
+        found = cls._shared(values)
         for prefix, _, centre, _ in cls.places:
-            mass = values.get(f'{prefix}mass', 0.0)
-            found[f'{prefix}mass'] = mass
             for axis, at in zip(AXES, centre, strict=True):
-                found[f'{prefix}moment_{axis}'] = mass * (values.get(f'{prefix}{axis}', at) - at)
-            for axes in (*MOMENTS, *PRODUCTS):
-                found[f'{prefix}{axes}'] = values.get(f'{prefix}{axes}', 0.0)
+                away = values.get(f'{prefix}{axis}', at) - at
+                found[f'{prefix}moment_{axis}'] = found[f'{prefix}mass'] * away
         return found
 
     @classmethod
@@ -106,16 +103,19 @@ class AddedBody(BodyEffect):
         """Return the linear parameters that belong to coefficients."""
         if not cls.places:
             return super().from_coefficients(coefficients)
-        found = {}
+        found = cls._shared(coefficients)
         for prefix, _, centre, _ in cls.places:
-            mass = coefficients.get(f'{prefix}mass', 0.0)
-            found[f'{prefix}mass'] = mass
+            mass = found[f'{prefix}mass']
             for axis, at in zip(AXES, centre, strict=True):
                 moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
                 found[f'{prefix}{axis}'] = at + (moment / mass if mass else 0.0)
-            for axes in (*MOMENTS, *PRODUCTS):
-                found[f'{prefix}{axes}'] = coefficients.get(f'{prefix}{axes}', 0.0)
         return found
+
+    @classmethod
+    def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return masses and inertias, which are parameters and coefficients alike."""
+        return {name: values.get(name, 0.0) for prefix, *_ in cls.places
+                for name in (f'{prefix}{one}' for one in ('mass', *MOMENTS, *PRODUCTS))}
 
     def changed(self, robot: Mechanism) -> Mechanism:
         """Return the mechanism with the bodies."""

@@ -53,10 +53,9 @@ if TYPE_CHECKING:
 
 GROUP = 'pprs_dynamics.effects'
 # Parts of the drive forces and keys of the block `effects` that have these names already.
-RESERVED = ('active', 'active_friction', 'measured', 'measured_curve', 'offset',
-            'passive_friction', 'rigid_body')
+RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
 
-CATALOGUE: dict[str, type[CatalogueEffect]] = {
+EFFECTS: dict[str, type[CatalogueEffect]] = {
     effect.name: effect
     for effect in (
         AsymmetricFriction,
@@ -74,6 +73,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         JointFrictionEffect,
         LinkMass,
         LoadFriction,
+        MeasuredCurve,
         PayloadMass,
         PayloadOffset,
         PlatformDrag,
@@ -89,13 +89,13 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
     )
 }
 
-# In model files and nodes like any effect, but never searched for: it explains nothing.
-MEASURED: dict[str, type[CatalogueEffect]] = {MeasuredCurve.name: MeasuredCurve}
+# What a diagnosis may name: a measured curve, e.g., is in models like any effect but no cause.
+CATALOGUE = {name: effect for name, effect in EFFECTS.items() if effect.is_cause}
 
 
 def find_effect(name: str) -> type[CatalogueEffect] | None:
     """Return the effect of that name, or None; other packages are asked only where need be."""
-    return MEASURED.get(name) or CATALOGUE.get(name) or catalogue().get(name)
+    return EFFECTS.get(name) or catalogue().get(name)
 
 
 @cache
@@ -147,7 +147,7 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
     if not effect.name.isidentifier():
         raise _UnusableEffectError(
             f'its name {effect.name!r} must be one word of letters, digits and _')
-    if effect.name in known or effect.name in RESERVED:
+    if effect.name in (*known, *EFFECTS, *RESERVED):
         raise _UnusableEffectError(f'the name {effect.name} is taken')
     guard(effect)
     return effect

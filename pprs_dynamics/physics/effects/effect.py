@@ -183,6 +183,8 @@ class CatalogueEffect(Effect):
     is_of_one_place : bool
         True where each variant is at a place of its own, a link or a joint: that a motion does
         not show every one of them is not worth telling.
+    is_cause : bool
+        False where a model may have it, but a diagnosis never names it.
     """
 
     card: ClassVar[Card]
@@ -201,6 +203,7 @@ class CatalogueEffect(Effect):
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
+    is_cause: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):

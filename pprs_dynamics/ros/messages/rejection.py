@@ -14,11 +14,10 @@ from pprs_dynamics.errors import (
     SingularityError,
     WorkspaceError,
 )
+from pprs_dynamics.ros.messages.status_codes import RejectionCode
 
-CODES = ('EMPTY', 'NAMES', 'FRAME', 'SIZE', 'NON_FINITE', 'QUATERNION', 'TIME', 'WORKSPACE',
-         'SINGULAR', 'LIMIT', 'OUTPUT', 'EFFECT')
-
-_KINDS = {'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
+_KINDS: dict[str, RejectionCode] = {
+    'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
 
 
 class Rejection(PprsError):
@@ -26,13 +25,12 @@ class Rejection(PprsError):
 
     Parameters
     ----------
-    code : str
-        One of `CODES`.
+    code : RejectionCode
     text : str
         What, which value, which rule.
     """
 
-    def __init__(self, code: str, text: str) -> None:
+    def __init__(self, code: RejectionCode, text: str) -> None:
         self.code, self.text = code, text
         super().__init__(f'{code}: {text}')
 

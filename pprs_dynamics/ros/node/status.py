@@ -12,6 +12,7 @@ from typing import Any
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from pprs_dynamics.ros.messages.status_codes import LEVELS, Code, Level
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.qos import LATCHED, publisher
 
@@ -19,8 +20,6 @@ try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 except ImportError:
     DiagnosticArray = None
-
-LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 
 class StatusReporter:
@@ -49,7 +48,7 @@ class StatusReporter:
         self._diagnostics = None
         if DiagnosticArray is not None:
             self._diagnostics = publisher(node, DiagnosticArray, '/diagnostics')
-        self._current = ('OK', 'OK', 'waiting for the first message')
+        self._current: tuple[Level, Code, str] = ('OK', 'OK', 'waiting for the first message')
         steady_timer(node, 1.0, self._tick)
         self._publish()
 
@@ -58,7 +57,7 @@ class StatusReporter:
         """Code of the present condition."""
         return self._current[1]
 
-    def report(self, level: str, code: str, message: str) -> None:
+    def report(self, level: Level, code: Code, message: str) -> None:
         """Take over a new condition; it goes out at once where the code changed."""
         changed = (level, code) != self._current[:2]
         self._current = (level, code, message)

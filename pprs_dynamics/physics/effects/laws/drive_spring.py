@@ -8,7 +8,6 @@ It is linear in the stiffness k and the force at q = 0, -k q_0, so that is what 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -17,8 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
-
-FARTHEST = 1000.0  # [m], of the relaxed position: from there a spring is a constant force
+from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 
 
 class DriveSpring(DriveEffect):
@@ -55,12 +53,6 @@ class DriveSpring(DriveEffect):
 
     @classmethod
     def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return k and q_0 = -force / k.
-
-        A force with next to no stiffness becomes the softest spring that reaches it from
-        the farthest position allowed.
-        """
-        k, force = coefficients['stiffness'], coefficients['force']
-        k = math.copysign(max(abs(k), abs(force) / FARTHEST), k)
-        position = 0.0 - force / k if k else 0.0
-        return {'stiffness': k, 'position': max(-FARTHEST, min(FARTHEST, position))}
+        """Return k and q_0; see `relaxed_position`."""
+        k, position = relaxed_position(coefficients['stiffness'], coefficients['force'])
+        return {'stiffness': k, 'position': position}

@@ -10,18 +10,16 @@ L. L. Howell, Compliant Mechanisms, 2001, on flexures as torsional springs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import ClassVar, Self
 
 import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
 from pprs_dynamics.physics.three_pprs.state import MechanismState
-
-FARTHEST = 1000.0  # [rad], of the slack angle: from there a spring is a constant moment
 
 
 class RevoluteStiffness(BodyEffect):
@@ -65,15 +63,9 @@ class RevoluteStiffness(BodyEffect):
 
     @classmethod
     def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return k and u_0 = -M / k.
-
-        A moment with next to no stiffness becomes the softest spring that reaches it from the
-        farthest angle allowed.
-        """
-        k, M = coefficients['stiffness'], coefficients['moment']
-        k = math.copysign(max(abs(k), abs(M) / FARTHEST), k)
-        u_0 = 0.0 - M / k if k else 0.0
-        return {'stiffness': k, 'angle': max(-FARTHEST, min(FARTHEST, u_0))}
+        """Return k and u_0; see `relaxed_position`."""
+        k, angle = relaxed_position(coefficients['stiffness'], coefficients['moment'])
+        return {'stiffness': k, 'angle': angle}
 
     def load(self, state: MechanismState) -> StructureLoad:
         """Return k u_i + M about n_i."""
