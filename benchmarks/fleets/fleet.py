@@ -24,7 +24,9 @@ from time import perf_counter
 
 import numpy as np
 
+from benchmarks.hidden.driven_motion import DrivenMotion
 from benchmarks.hidden.motions import draw_motion
+from benchmarks.hidden.prescribed import PrescribedPlant
 from benchmarks.hidden.recordings import tolerant_model
 from benchmarks.hidden.strength import tolerated_numbers
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
@@ -36,14 +38,12 @@ from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
-from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_bodies import PayloadMass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_forces import DriveSpring
 from pprs_dynamics.simulation.hidden_friction import CoulombFriction
 from pprs_dynamics.simulation.hidden_sensors import HomingError
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 DURATION, RATE = 20.0, 100.0  # [s, Hz]

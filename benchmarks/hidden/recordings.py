@@ -21,7 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.driven_motion import DrivenMotion
 from benchmarks.hidden.motions import draw_motion
+from benchmarks.hidden.prescribed import PrescribedPlant, Readings
 from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.files.recording import Recording
@@ -29,12 +31,10 @@ from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.hidden_forces import Vibration
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.prescribed import PrescribedPlant, Readings
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 DURATION, RATE = 40.0, 500.0  # [s, Hz]

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden import recordings as hidden_recordings
+from benchmarks.hidden.prescribed import PrescribedPlant
 from benchmarks.hidden.recordings import LEAD, Case, Scene, noise_settings
 from benchmarks.hidden.strength import Whitening
 from benchmarks.scores.cases import outcomes_of, scoring_parser
@@ -40,7 +41,6 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 OTHER_MOTION = 1000  # between the seeds of the two motions

@@ -28,6 +28,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.driven_motion import DrivenMotion
+from benchmarks.hidden.prescribed import PrescribedPlant
 from benchmarks.hidden.recordings import noise_settings, tolerant_model
 from benchmarks.hidden.strength import changed_values, tolerated_numbers
 from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
@@ -41,11 +43,9 @@ from pprs_dynamics.inference.experiments.question import Question, question_of
 from pprs_dynamics.inference.experiments.trajectory_search import TrajectorySearch
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
-from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.run import DriveReference, simulate
 from pprs_dynamics.simulation.sensors import EffortNoise
 

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import OUTPUT
+from benchmarks.hidden.prescribed import PrescribedPlant
 from benchmarks.hidden.recordings import (
     LEAD,
     NOISE,
@@ -44,7 +45,6 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import block_gains, certainty
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 STEPS = ('plain', 'change', 'hidden', 'hidden', 'plain', 'plain')

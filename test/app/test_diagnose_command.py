@@ -16,13 +16,13 @@ import pytest
 from browser import Seen, chromium, needs_browser
 from ros_processes import executable
 
+from benchmarks.hidden.driven_motion import DrivenMotion
+from benchmarks.hidden.prescribed import PrescribedPlant
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_effects import draw_effect
-from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0

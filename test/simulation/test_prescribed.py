@@ -8,13 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.hidden.driven_motion import DrivenMotion
+from benchmarks.hidden.prescribed import PrescribedPlant
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.drive_control import ControlSettings
-from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.hidden_bodies import PayloadPickUp
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
@@ -22,7 +23,6 @@ from pprs_dynamics.simulation.hidden_forces import EffortOffset
 from pprs_dynamics.simulation.hidden_friction import CoulombFriction, Hysteresis
 from pprs_dynamics.simulation.hidden_sensors import EffortGain, HomingError, TimeDelay
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.prescribed import PrescribedPlant
 from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 

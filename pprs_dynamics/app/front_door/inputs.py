@@ -31,6 +31,7 @@ Model = ForceModel | File
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
 # Every recording is evidence once.
 ONCE = 'every recording may be given once'
+OTHER = 'what is held out must be another recording'
 
 
 class InputError(PprsError, ValueError):
@@ -91,10 +92,13 @@ class Inputs:
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
         given = base or '' if isinstance(model, ForceModel) else model
         name = '' if shipped else str(given)
+        # Before anything is read, which may take minutes.
+        _refuse_same_paths(_listed(recordings), [], ONCE)
+        _refuse_same_paths(_listed(validate), _listed(recordings), OTHER)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
-        _refuse_repeats(held_out, fitted, 'what is held out must be another recording')
+        _refuse_repeats(held_out, fitted, OTHER)
         paths = frozenset(one.name for one in (*fitted, *held_out) if one.is_path)
         return cls(found, _named(fitted), _named(held_out), paths, base, name, topic or '')
 
@@ -203,7 +207,21 @@ def _read_all(model: ForceModel, given: Given, topic: str | None, progress: Prog
               ) -> list[_Read]:
     return [_Read(one.name, one, False) if isinstance(one, Recording)
             else _Read(str(one), _read(model, one, topic, progress), True)
-            for one in ([given] if isinstance(given, (str, PathLike, Recording)) else given)]
+            for one in _listed(given)]
+
+
+def _listed(given: Given) -> Sequence[File | Recording]:
+    return [given] if isinstance(given, (str, PathLike, Recording)) else given
+
+
+def _refuse_same_paths(given: Sequence[File | Recording], earlier: Sequence[File | Recording],
+                       rule: str) -> None:
+    seen = {str(one) for one in earlier if not isinstance(one, Recording)}
+    for one in given:
+        if not isinstance(one, Recording):
+            if str(one) in seen:
+                raise UnreadableFileError(str(one), f'it is given twice, but {rule}')
+            seen.add(str(one))
 
 
 def _named(found: Sequence[_Read]) -> dict[str, Recording]:

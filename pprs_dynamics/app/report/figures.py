@@ -5,15 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.reproduction import Reproduction
 from pprs_dynamics.system.output_files import new_file
@@ -33,51 +30,6 @@ def pyplot_module() -> Any:
     from matplotlib import pyplot
 
     return pyplot
-
-
-def draw_forces(
-    path: str | PathLike[str], time: Array, total: Array, parts: Mapping[str, Array],
-    title: str,
-) -> Path:
-    """Draw the six drive forces over time, with and without friction, and the friction below.
-
-    Parameters
-    ----------
-    path : path
-        PNG file to write.
-    time : (N,) array
-        [s].
-    total : (N, 6) array
-        Drive forces [N].
-    parts : mapping of (N, 6) arrays
-        `rigid_body`, `active_friction`, `passive_friction` [N].
-    title : str
-    """
-    pyplot = pyplot_module()
-    figure, axes = pyplot.subplots(4, 3, figsize=(12, 8.5), sharex=True, layout='constrained',
-                                   height_ratios=(2, 1, 2, 1))
-    for drive, name in enumerate(DRIVES):
-        row, column = 2 * (drive // 3), drive % 3
-        upper, lower = axes[row, column], axes[row + 1, column]
-        upper.plot(time, parts['rigid_body'][:, drive], color=SKY, lw=1.5, label='rigid body alone')
-        upper.plot(time, total[:, drive], color=BLUE, lw=1.5, label='with friction: the command')
-        lower.plot(time, parts['active_friction'][:, drive], color=ORANGE, lw=1.2,
-                   label='friction of the drives')
-        lower.plot(time, parts['passive_friction'][:, drive], color=GREEN, lw=1.2,
-                   label='friction of the passive joints')
-        upper.set_title(name, loc='left', fontsize=10, fontweight='bold')
-        for axis in (upper, lower):
-            axis.grid(alpha=0.25)
-            axis.spines[['top', 'right']].set_visible(False)
-        if column == 0:
-            upper.set_ylabel('force [N]')
-            lower.set_ylabel('friction [N]')
-    for axis in axes[3]:
-        axis.set_xlabel('time [s]')
-    handles = [*axes[0, 0].get_lines(), *axes[1, 0].get_lines()]
-    figure.suptitle(title)
-    figure.legend(handles=handles, loc='outside lower center', ncols=4, frameon=False)
-    return save(pyplot, figure, path)
 
 
 def draw_figure_8(path: str | PathLike[str], result: Reproduction) -> Path:

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from benchmarks.hidden.driven_motion import DrivenMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import (
     DOFS,
@@ -32,7 +33,6 @@ from pprs_dynamics.simulation.closed_chains import (
     PASSIVE_DOFS,
     ClosedChains,
 )
-from pprs_dynamics.simulation.driven_motion import DrivenMotion
 from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
