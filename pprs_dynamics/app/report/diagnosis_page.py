@@ -187,7 +187,7 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
         page.table(_effect_headings(unit), [
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
              f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
-             sites(one.drives, diagnosis)) for one in diagnosis.effects],
+             sites(one.drives, diagnosis, one.places)) for one in diagnosis.effects],
             caption='Those without which the error would be largest first, parameters fitted anew '
             f'at every step. Held out: {where}.')
         drives = diagnosis.residuals.drives

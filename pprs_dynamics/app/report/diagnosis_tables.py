@@ -18,7 +18,7 @@ from rich.table import Table
 
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RankedEffect
-from pprs_dynamics.inference.diagnosis.quantities import name_drives, plain
+from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     FittedValue,
@@ -107,7 +107,8 @@ def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    return [(one.name, sites(one.drives, diagnosis), _fall(one.error_before, one.error_after),
+    return [(one.name, sites(one.drives, diagnosis, one.places),
+             _fall(one.error_before, one.error_after),
              _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
             for one in diagnosis.effects]
 
@@ -136,8 +137,11 @@ def finding_lines(finding: Finding) -> list[tuple[str, str]]:
             ('confirm', finding.confirm), *(('note', remark) for remark in finding.remarks)]
 
 
-def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis) -> str:
+def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
+          places: Sequence[Sequence[str]] = ()) -> str:
     """Return where an effect sits, for a table."""
+    if places:
+        return listed([listed(names, 'or') for names in places])
     return EVERYWHERE if drives is None else name_drives(drives, diagnosis.residuals.drives)
 
 

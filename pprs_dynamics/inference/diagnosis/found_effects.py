@@ -52,6 +52,11 @@ class FoundEffect:
         return self.effect.name
 
     @property
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """Links or joints that it is on, each with those that no motion tells it from."""
+        return self.effect.places_of(self.parameters)
+
+    @property
     def is_confirmed(self) -> bool:
         """Return whether the error on held-out data falls with it."""
         return self.held_out_after < self.held_out_before
@@ -59,6 +64,7 @@ class FoundEffect:
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
+                'alike': [list(names) for names in self.places if len(names) > 1],
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
                 'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,

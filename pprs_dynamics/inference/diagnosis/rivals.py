@@ -58,6 +58,11 @@ class RivalEffect:
         """Name in the catalogue."""
         return self.effect.name
 
+    @property
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """See `FoundEffect`."""
+        return self.effect.places_of(self.parameters)
+
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
                   ) -> tuple[RivalEffect, ...]:
@@ -73,14 +78,16 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     if selection is None:
         return ()
     found = []
+    adopted = {c.name: c.claim for c in selection.kept.effects}
     for of, name in ((names[0], name) for names in diagnosis.indistinguishable
                      for name in names[1:]):
-        best = next((one for one in selection.sets if name in {c.name for c in one.effects}
-                     and of not in {c.name for c in one.effects}), None)
+        best = next((one for one in selection.sets
+                     if any(name in (c.name, c.claim) for c in one.effects)
+                     and adopted[of] not in {c.claim for c in one.effects}), None)
         if best is None:
             continue
         search = selection.search_of(best)
-        candidate = next(c for c in best.effects if c.name == name)
+        candidate = next(c for c in best.effects if name in (c.name, c.claim))
         remaining = linear_residual(search, best)
         drives = candidate.drives
         found.append(RivalEffect(

@@ -188,8 +188,14 @@ def _doubt(diagnosis: Diagnosis) -> str:
 
 
 def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
-    own = with_drives(effect.name, effect.drives, diagnosis.residuals.drives)
-    return listed([own, *_rivals(diagnosis, effect)], 'or')
+    return listed([_title(diagnosis, effect), *_rivals(diagnosis, effect)], 'or')
+
+
+def _title(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
+    """Return the effect and where it is, all links and joints that are alike among them."""
+    places = listed([listed(names, 'or') for names in found.places])
+    return (f'{found.name} on {places}' if places else
+            with_drives(found.name, found.drives, diagnosis.residuals.drives))
 
 
 def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
@@ -199,7 +205,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card_in(diagnosis.model.kind)
-    title = with_drives(found.name, found.drives, diagnosis.residuals.drives)
+    title = _title(diagnosis, found)
     lacks = f'The model lacks {title}' if found.is_confirmed else (
         f'Fitted, but not confirmed: {title}')
     what = f'{lacks}: {_parameters(diagnosis, found)}'
@@ -210,12 +216,12 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
         title, f'{what}.', _why(diagnosis, found, is_first), sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like),
         (*_ambiguous(diagnosis, found), *_negative(diagnosis, found),
-         *_two_in_one(diagnosis, found), *_bound(found)))
+         *_alike(diagnosis, found), *_two_in_one(diagnosis, found), *_bound(found)))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
     card = rival.effect.card_in(diagnosis.model.kind)
-    title = with_drives(rival.name, rival.drives, diagnosis.residuals.drives)
+    title = _title(diagnosis, rival)
     held_out = '' if isnan(rival.held_out_after) else (
         f', and {in_unit(rival.held_out_after, diagnosis.residuals.unit)} on held-out data')
     return Finding(
@@ -278,6 +284,12 @@ def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
         return []
     return [f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
             'explain it about as well.']
+
+
+def _alike(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
+    return [f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. The '
+            'numbers are for the one that is named with them.'
+            for names in found.places if len(names) > 1]
 
 
 def _negative(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:

@@ -125,8 +125,13 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     further = {(k, j): terms.on_drives_of(placed[k], placed[j])
                for k, j in permutations(range(len(sets)), 2)}
     plan = ColumnPlan.of_design(search.design, terms.all)
-    explanations = [_explanation([c.name for c in one.effects], own, plan, 0.0)
-                    for one, own in zip(placed, parts, strict=True)]
+    # By name, and two of the same name by link or joint.
+    claims = [{c.claim: c.name for c in one.effects} for one in placed]
+    moved = {name for one in claims[1:] for claim, name in one.items()
+             if name in claims[0].values() and claim not in claims[0]}
+    explanations = [_explanation([claim if name in moved else name
+                                  for claim, name in mine.items()], own, plan, 0.0)
+                    for mine, own in zip(claims, parts, strict=True)]
     contests = []
     for (k, j), more in further.items():
         free = explanations[k].free + tuple(
@@ -134,7 +139,8 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
         contest = Contest(explanations[j], explanations[k], (*range(len(plan.base)), *free),
                           sets[k].cost - sets[j].cost)
         refitted = [*(term for term, _ in parts[k]), *more]
-        own = [term for term, _ in parts[j] if term.effect.name in contest.sides[0]]
+        sides = {name.partition(':')[0] for name in contest.sides[0]}
+        own = [term for term, _ in parts[j] if term.effect.name in sides]
         # An effect that can be all that another one is fits it on any motion.
         if all(contest.sides) and not all(_holds(refitted, one, search.design) for one in own):
             contests.append(contest)

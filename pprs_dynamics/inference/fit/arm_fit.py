@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.fit.arm_columns import (
@@ -29,6 +29,7 @@ from pprs_dynamics.inference.fit.arm_columns import (
 )
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.inference.regression.base_columns import rounded
+from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.model.arm_model import ArmModel, inertial_values
 from pprs_dynamics.physics.model.model_file import build_model
@@ -251,7 +252,11 @@ def independent_share(error: Array) -> float:
 
 def _widths(columns: Sequence[ArmColumns], rest: Array, known: Array, own: Array, width: Array,
             moving: Array) -> Array:
-    """Return the width of reversal of each joint with which its friction fits best."""
+    """Return the width of reversal of each joint with which its friction fits best.
+
+    Friction is not negative, and turns over well below the joint's speeds: what does not would be
+    a curve through all of them.
+    """
     tried = [np.clip(width * factor, 1e-6, None) for factor in WIDTHS]
     turning = [np.concatenate([one.turning(each) for one in columns]) for each in tried]
     found = width.copy()
@@ -259,10 +264,13 @@ def _widths(columns: Sequence[ArmColumns], rest: Array, known: Array, own: Array
     for j in np.flatnonzero(moving):
         at = known[:, j]
         y = rest[at, j] - motion[at, j, 0] * own[j, ARMATURE]
-        left = []
-        for direction in turning:
-            rows = np.column_stack((motion[at, j, 1], direction[at, j], np.ones(at.sum())))
-            solution = np.linalg.lstsq(rows, y, rcond=None)[0]
-            left.append(float(np.sum((y - rows @ solution) ** 2)))
-        found[j] = tried[int(np.argmin(left))][j]
+        speed = motion[at, j, 1]
+        least = np.inf
+        for each, direction in zip(tried, turning, strict=True):
+            if np.mean(np.abs(speed) > TURNED * each[j]) < LEAST_MOVING:
+                continue
+            rows = np.column_stack((speed, direction[at, j], np.ones(at.sum())))
+            left = lsq_linear(rows, y, ([0.0, 0.0, -np.inf], np.inf)).cost
+            if left < least:
+                least, found[j] = left, each[j]
     return found

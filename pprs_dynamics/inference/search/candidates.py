@@ -97,6 +97,12 @@ class EffectCandidate:
         return self.effect.name
 
     @property
+    def claim(self) -> str:
+        """Name, with the link or joint of an effect that is on one: what a rival denies."""
+        places = self.effect.places_of(self.components[0].names)
+        return f'{self.name}:{places[0][0]}' if places else self.name
+
+    @property
     def rank(self) -> tuple[Any, ...]:
         """Place in a set: that of the catalogue, before patterns of no catalogue."""
         return (0, list(catalogue()).index(self.name), self.drives or ())

@@ -141,7 +141,10 @@ def _of_component(search: Search, component: Component, c: Array, covariance: Ar
     size = len(c)
     found, bound = {}, []
     # From coefficients to parameters: the map is smooth but for angles, which it may wrap.
+    here = {name.rpartition('.')[0] for name in component.names}
     for parameter in effect.linear:
+        if effect.is_of_one_place and parameter.name.rpartition('.')[0] not in here:
+            continue  # of the links or joints that it is not on
         slope = np.zeros(size)
         for k in range(size):
             step = 1e-4 * max(float(np.sqrt(covariance[k, k])), 1e-12)

@@ -37,7 +37,8 @@ class Rival:
     ----------
     found : CandidateSet
     missing, instead : tuple of str
-        Adopted effects that it lacks, and what it has instead; neither is empty.
+        Names of adopted effects that it lacks, and what it has instead; neither is empty. An
+        adopted effect on another link or joint is `NAME:PLACE`.
     """
 
     found: CandidateSet
@@ -133,14 +134,17 @@ class Ranking:
 
         To have what is within the model error of others makes no rival.
         """
-        mine = {candidate.name for candidate in self.kept.effects}
+        mine = {candidate.claim: candidate.name for candidate in self.kept.effects}
         ignored = {one.candidate.name for one in self.remainders}
         rivals = []
         for other in self.sets:
             if other.cost > self.best.cost + margin:
                 break
-            theirs = {candidate.name for candidate in other.effects} - ignored
-            missing, instead = sorted(mine - theirs), sorted(theirs - mine)
+            theirs = {candidate.claim: candidate.name for candidate in other.effects
+                      if candidate.name not in ignored}
+            missing = sorted(name for claim, name in mine.items() if claim not in theirs)
+            instead = sorted(claim if name in mine.values() else name
+                             for claim, name in theirs.items() if claim not in mine)
             if missing and instead and not self._is_freer(other, missing, instead):
                 rivals.append(Rival(other, tuple(missing), tuple(instead)))
         return rivals

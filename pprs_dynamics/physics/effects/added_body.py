@@ -60,22 +60,30 @@ class AddedBody(BodyEffect):
         self._linear = self.to_coefficients(self.values)
 
     @classmethod
-    def on(cls, places: tuple[Place, ...]) -> type[Self]:
-        """Return the effect with these places."""
+    def on(cls, places: tuple[Place, ...],
+           alike: tuple[tuple[str, ...], ...] = ()) -> type[Self]:
+        """Return the effect with these places.
+
+        Of links that are alike the first stands for all with a body anywhere; with a mass more
+        at its own centre each of them is a hypothesis of its own.
+        """
+        others = {name: tuple(one for one in group if one != name)
+                  for group in alike for name in group if len(group) > 1}
+        stand_ins = {name for group in alike for name in group[1:]}
         linear = tuple(one for place in places for one in body_parameters(*place))
         coefficients = tuple(one for prefix, link, _, _ in places
                              for one in body_coefficients(prefix, link))
-        names = []
-        for prefix, _, _, _ in places:
+        names: list[tuple[str, ...]] = []
+        for prefix, link, _, _ in places:
             mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
-            names += [(mass,), (mass, *moment)]
+            names += [(mass,)] if link in stand_ins else [(mass,), (mass, *moment)]
             if not prefix:
                 inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
                 names += [(mass, *moment, *inertia),
                           (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
         made: type[Self] = type(cls.__name__, (cls,), {
             'places': places, 'linear': linear, 'coefficients': coefficients,
-            'variants': tuple(names), '__module__': cls.__module__})
+            'variants': tuple(names), 'alike': others, '__module__': cls.__module__})
         return made
 
     @classmethod

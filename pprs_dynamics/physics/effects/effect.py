@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -185,6 +185,8 @@ class CatalogueEffect(Effect):
         not show every one of them is not worth telling.
     is_cause : bool
         False where a model may have it, but a diagnosis never names it.
+    alike : mapping of str to tuple of str
+        By place, other places at which the effect does the same in every motion.
     """
 
     card: ClassVar[Card]
@@ -204,6 +206,7 @@ class CatalogueEffect(Effect):
     shows_at_reversals: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
     is_cause: ClassVar[bool] = True
+    alike: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):
@@ -231,6 +234,20 @@ class CatalogueEffect(Effect):
             return '', key
         drive, _, name = key.rpartition('.')
         return drive, name
+
+    @classmethod
+    def places_of(cls, names: Iterable[str]) -> tuple[tuple[str, ...], ...]:
+        """Return the links or joints that parameters belong to, each with those it is alike to.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Of parameters or coefficients.
+        """
+        if not cls.is_of_one_place:
+            return ()
+        places = dict.fromkeys(name.rpartition('.')[0] for name in names)
+        return tuple(tuple(sorted((one, *cls.alike.get(one, ())))) for one in places)
 
     @classmethod
     def bound(cls, robot: Any) -> type[Self]:

@@ -24,6 +24,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.added_body import flattened, nested
 from pprs_dynamics.physics.effects.effect import ARM, Card, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
+from pprs_dynamics.physics.mechanism.alike import proportional_joints
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.reversal import Reversal
@@ -96,7 +97,9 @@ class JointFrictionEffect(PassiveJointEffect):
             return cls
         joints = [name for name in friction_rows(robot.structure)
                   if name not in robot.structure.drives]
-        return _in_joints(tuple((name, robot.radii.get(name, RADIUS)) for name in joints))
+        groups = tuple(tuple(sorted(group, key=lambda name: name not in robot.structure.drives))
+                       for group in proportional_joints(robot.structure) if len(group) > 1)
+        return _in_joints(tuple((name, robot.radii.get(name, RADIUS)) for name in joints), groups)
 
     @classmethod
     def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
@@ -119,9 +122,17 @@ class JointFrictionEffect(PassiveJointEffect):
 
 
 @cache
-def _in_joints(joints: tuple[tuple[str, float], ...]) -> type[JointFrictionEffect]:
-    """Return the effect in joints with the radii at which the load rubs [m]."""
+def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ...], ...],
+               ) -> type[JointFrictionEffect]:
+    """Return the effect in joints with the radii at which the load rubs [m].
+
+    Of joints that are alike the first stands for all, whatever the load; a drive for friction
+    of its own.
+    """
     linear, variants, bounds = [], [], {}
+    others = {name: tuple(one for one in group if one != name)
+              for group in alike for name in group}
+    stand_ins = {name for group in alike for name in group[1:]}
     for name, _ in joints:
         linear += [
             Parameter(f'{name}.viscous', 'c', 'N m s/rad', f'viscous friction of {name}', -1e4,
@@ -130,12 +141,14 @@ def _in_joints(joints: tuple[tuple[str, float], ...]) -> type[JointFrictionEffec
                       -1e4, 1e4, 0.0, scale=0.1),
             Parameter(f'{name}.coulomb', 'mu', '1', f'dry friction of {name} over its load',
                       -100.0, 100.0, 0.0, scale=0.1)]
-        variants += [(f'{name}.viscous',), (f'{name}.torque',),
-                     (f'{name}.viscous', f'{name}.torque'), (f'{name}.coulomb',)]
+        if name not in stand_ins:
+            variants += [(f'{name}.viscous',), (f'{name}.torque',),
+                         (f'{name}.viscous', f'{name}.torque')]
+        variants.append((f'{name}.coulomb',))
         bounds.update({f'{name}.{last}': 0.0 for last in ('viscous', 'torque', 'coulomb')})
     return type('JointFrictionEffect', (JointFrictionEffect,), {
         'linear': tuple(linear), 'variants': tuple(variants), 'radii': dict(joints),
-        'unphysical_below': bounds, '__module__': __name__})
+        'unphysical_below': bounds, 'alike': others, '__module__': __name__})
 
 
 class LinkageFriction(Effect):

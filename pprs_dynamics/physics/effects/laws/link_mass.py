@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place
 from pprs_dynamics.physics.effects.effect import ARM, Card
+from pprs_dynamics.physics.mechanism.alike import alike_bodies
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 
@@ -53,9 +54,12 @@ class LinkMass(AddedBody):
             centre = frame.inverse.of_point(robot.inertial[k, 1:4] / robot.inertial[k, 0])
             x, y, z = (round(float(each), 6) for each in centre)
             places.append((f'{name}.', name, (x, y, z), float(robot.masses[k])))
-        return _on(tuple(places))
+        # What the link that carries the tool does as well is a payload.
+        groups = tuple(tuple(robot.body_names[k] for k in sorted(
+            group, key=lambda k: k != robot.carrier)) for group in alike_bodies(robot))
+        return _on(tuple(places), groups)
 
 
 @cache
-def _on(places: tuple[Place, ...]) -> type[LinkMass]:
-    return LinkMass.on(places)
+def _on(places: tuple[Place, ...], alike: tuple[tuple[str, ...], ...]) -> type[LinkMass]:
+    return LinkMass.on(places, alike)
