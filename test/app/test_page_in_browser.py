@@ -271,7 +271,8 @@ def click_on(seen: Seen, figure: str, x: str, y: str | float) -> None:
     place = seen.tab.evaluate(PLACE, [figure, x, y])
     seen.tab.mouse.move(place[0] - 3, place[1] - 1)
     seen.tab.mouse.move(*place)
-    seen.tab.wait_for_timeout(300)  # the library looks for what is below the mouse
+    # The library looks for what is below the mouse.
+    seen.tab.wait_for_function('(figure) => document.querySelector(figure)._hoverdata', arg=figure)
     seen.tab.mouse.click(*place)
 
 

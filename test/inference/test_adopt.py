@@ -9,9 +9,7 @@ import json
 import os
 import resource
 import shutil
-import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -286,18 +284,6 @@ def test_a_full_disk_is_one_line_and_leaves_both_files_whole(
     assert output.read_text() == 'what was there'
     assert old.read_bytes() == files.new.read_bytes()
     assert sorted(tmp_path.iterdir()) == [old, output]
-
-
-def test_a_killed_adoption_leaves_no_half_file(files: Files, tmp_path: Path) -> None:
-    old = tmp_path / 'old.yaml'
-    shutil.copy(files.model, old)
-    with subprocess.Popen([executable('pprs'), 'adopt', HIDDEN, str(files.first), '--model',
-                           str(old), '--output', str(tmp_path / 'new.yaml')],
-                          stdout=subprocess.DEVNULL) as running:
-        time.sleep(2.0)
-        running.send_signal(signal.SIGKILL)
-    assert old.read_bytes() == files.model.read_bytes()
-    assert list(tmp_path.iterdir()) == [old]
 
 
 @pytest.mark.nodes

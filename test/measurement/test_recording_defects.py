@@ -75,7 +75,7 @@ def test_late_stamps_are_sorted_in() -> None:
     assert the(recording, 'unordered_stamps').spans == ((0.4, 0.4), (1.0, 1.004))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), reach=st.integers(1, 5))
 def test_any_disorder_within_reach_is_undone(seed: int, reach: int) -> None:
     arrays = measured(200)
@@ -379,7 +379,7 @@ def test_a_short_recording_is_told_and_kept() -> None:
     assert len(recording.time) == 5
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(times=st.lists(st.one_of(st.floats(), st.floats(0, 3).map(lambda t: round(t, 2))),
                       min_size=1, max_size=80), seed=st.integers(0, 99))
 def test_whatever_the_stamps_segments_are_ordered_and_everything_is_finite(

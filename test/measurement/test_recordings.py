@@ -121,7 +121,7 @@ def test_bags_keep_nanoseconds_of_a_clock_that_counts_from_1970(
     np.testing.assert_array_equal(copy.time, recording.time)
 
 
-@settings(max_examples=40, deadline=None,
+@settings(max_examples=40,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=st.lists(st.floats(-1e3, 1e3), min_size=25, max_size=60),
        steps=st.floats(1e-4, 0.3))
@@ -136,7 +136,7 @@ def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float
                  'effort': effort})
 
 
-@settings(max_examples=30, deadline=None,
+@settings(max_examples=30,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(order=st.permutations(range(19)))
 def test_csv_columns_may_stand_in_any_order(tmp_path: Path, order: list[int]) -> None:
@@ -184,7 +184,7 @@ def test_drives_are_found_by_name_among_other_joints_in_any_order(tmp_path: Path
     assert 'door, gripper' in the(recording, 'ignored_joints').text
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), orders=st.integers(1, 40), big_endian=st.booleans())
 def test_reading_bytes_by_layout_agrees_with_rosbags(
     seed: int, orders: int, big_endian: bool,
@@ -275,7 +275,7 @@ def test_a_layout_is_told_from_another_by_every_byte_that_makes_it() -> None:
         assert not layout.matches(np.frombuffer(bytes(changed), np.uint8)[None])[0]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(data=st.binary(max_size=200), start=st.booleans())
 def test_no_bytes_break_the_reader_of_messages(data: bytes, start: bool) -> None:
     blocks = JointStateBlocks(DRIVES)
@@ -531,7 +531,7 @@ def test_foreign_and_damaged_files_are_one_sentence(
     assert len(str(told.value)) < len(str(path)) + 300
 
 
-@settings(max_examples=60, deadline=None,
+@settings(max_examples=60,
           suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(share=st.floats(0, 1), value=st.integers(1, 255), suffix=st.sampled_from(['.mcap', '.db3']))
 @example(share=0.8071297632369854, value=1, suffix='.mcap')  # the seconds of a stamp

@@ -216,7 +216,7 @@ NAMES = st.one_of(
     st.from_regex(r'(effects|tolerances|history|masses)(\.[a-z_1]{0,8}){0,3}', fullmatch=True))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(st.dictionaries(NAMES, JUNK, min_size=1, max_size=4))
 def test_whatever_a_parameter_is_set_to_gives_a_model_or_one_of_our_errors(
     changes: dict[str, object],

@@ -57,7 +57,7 @@ def outcome(read: object, data: object) -> object:
             motion.angular_acceleration.tobytes())
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(POINTS, SEEDS)
 def test_bytes_and_objects_give_the_same_numbers(points: int, seed: int) -> None:
     message = random_message(points, seed)
@@ -88,7 +88,7 @@ def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
         point.velocities, point.accelerations = [], point.accelerations * 2
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(POINTS, SEEDS)
 def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
     points: int, seed: int,
@@ -100,7 +100,7 @@ def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
     assert outcome(read_serialised, data) == outcome(read_trajectory, message)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(POINTS, SEEDS)
 def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(points: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -181,7 +181,7 @@ def test_a_message_cut_off_within_padding_is_noticed() -> None:
             read_serialised(data[:length], 1)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(POINTS, SEEDS)
 def test_every_whole_message_is_taken_for_one(points: int, seed: int) -> None:
     message = random_message(points, seed)
