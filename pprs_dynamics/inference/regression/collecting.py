@@ -30,12 +30,11 @@ class Column(NamedTuple):
     name: str
 
 
-def stacked_columns(tables: list[dict[Any, Array]], count: int) -> dict[str, Array]:
+def stacked_columns(tables: list[dict[Any, Array]]) -> dict[str, Array]:
     """Take the columns out of tables, (k, D, M) each by name."""
     stacked: dict[str, Array] = {}
     for key in [key for key in tables[0] if isinstance(key, Column)]:
-        flat = np.concatenate([table.pop(key) for table in tables])
-        stacked[key.name] = flat.reshape(len(flat), -1, count).transpose(1, 2, 0)
+        stacked[key.name] = np.concatenate([table.pop(key) for table in tables]).transpose(1, 2, 0)
     return stacked
 
 
@@ -70,9 +69,9 @@ class ColumnCollector:
         self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
         columns = self.sensitivities.columns(forces)
         columns[NUMBERS][self.without_gain] = 0.0
-        return {Column(name):
-                (self.share * column).transpose(1, 0, 2).reshape(len(s.velocity), -1)
-                for name, column in columns.items()}
+        # Views: copies of all columns at full rate would take longer than their means.
+        return {Column(name): (column if np.all(self.share == 1) else self.share * column)
+                .transpose(1, 0, 2) for name, column in columns.items()}
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:
         """Return what the drives did, with positions as the mechanism has them."""

@@ -165,7 +165,7 @@ class Design:
             tables.append(treated_table(model, reconstruction, report, collector))
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
-        stacked = stacked_columns(tables, len(model.drives))
+        stacked = stacked_columns(tables)
         residuals = join_tables(model, tables)
         count = len(model.drives)
         structure = tuple(
@@ -250,11 +250,12 @@ class Design:
     def _sensed(self, rows: Array, time: Array, drive: int,
                 without: type[CatalogueEffect] | None = None) -> Array:
         """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
+        name = self.drives[drive]
         for effect in self.model.effects:
-            if (isinstance(effect, MeasurementEffect) and self.drives[drive] in effect.drives
+            if (isinstance(effect, MeasurementEffect) and name in effect.drives
                     and type(effect) is not without):
-                rows = np.stack([effect.sensed(np.repeat(row[:, None], len(self.drives), axis=1),
-                                               time, self.drives)[:, drive] for row in rows])
+                alone = type(effect)({name: effect.drives[name]})
+                rows = np.stack([alone.sensed(row[:, None], time, (name,))[:, 0] for row in rows])
         return rows
 
     def term(self, effect: type[DriveEffect], drive: int, shape: Mapping[str, float]) -> Term:

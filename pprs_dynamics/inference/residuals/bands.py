@@ -113,8 +113,11 @@ class DriveSeries:
         self._ends = np.cumsum(lengths)
         frequency = np.concatenate([np.arange(n) / (2 * n * residuals.period) for n in lengths]
                                    or [np.zeros(0)])
-        self._order = np.argsort(frequency, kind='stable')
-        self.frequency = frequency[self._order]
+        order = np.argsort(frequency, kind='stable')
+        # Copies of hundreds of rows are dear: of one stretch all samples are taken as they are.
+        self._order: Array | slice = order if len(lengths) > 1 else slice(None)
+        self._taken: Array | slice = self.index if len(stretches) != 1 else stretches[0]
+        self.frequency = frequency[order]
         self._cuts = np.searchsorted(self.frequency, bands.edges)
         self._cuts[-1] = len(frequency)
         self.counts = np.diff(self._cuts).astype(float)
@@ -136,10 +139,11 @@ class DriveSeries:
     def transform(self, values: Array) -> Array:
         """Return DCT coefficients (..., n) by ascending frequency, of values (..., M or n)."""
         if values.shape[-1] != len(self.index):
-            values = values[..., self.index]
+            values = values[..., self._taken]
         values = bridged(values, self.known)
         parts = [fft.dct(values[..., part], norm='ortho', axis=-1) for part in self.stretches]
-        coefficients: Array = np.concatenate(parts, axis=-1)[..., self._order]
+        coefficients: Array = parts[0] if len(parts) == 1 else np.concatenate(
+            parts, axis=-1)[..., self._order]
         return coefficients
 
     def inverse(self, coefficients: Array) -> Array:

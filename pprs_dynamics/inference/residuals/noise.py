@@ -13,14 +13,16 @@ which goes on rising, where it is larger than that. The slope is one for all dri
 only a dozen coefficients to tell it from.
 
 The amplitudes maximise Whittle's restricted likelihood: with squares r^2 and leverage h of a
-regression, by Fisher scoring in their logarithms. The constant (k = 0) takes no part: whether it is
-noise is for the criterion to judge.
+regression, by Fisher scoring, each step of which is a least squares problem with amplitudes that
+are not negative. The constant (k = 0) takes no part: whether it is noise is for the criterion to
+judge.
 
 References
 ----------
 P. Whittle, Estimation and information in stationary time series, Ark. Mat. 2 (1953) 423-434.
 D. A. Harville, Maximum likelihood approaches to variance component estimation, J. Am. Stat.
 Assoc. 72 (1977) 320-338 (restricted likelihood, scoring).
+C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, Prentice-Hall (1974) (active set).
 """
 
 from __future__ import annotations
@@ -32,16 +34,17 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.bands import SINGLE_BANDS, FrequencyBands
 
-# Scoring ends once a full step promises to lower -2 ln of the likelihood by less on every drive;
-# steps in the logarithms of the amplitudes are bounded, and damped by a share of the information.
-CONVERGED, MOST_STEPS, LONGEST_STEP, DAMPING = 1e-4, 30, 4.0, 1e-3
+# Scoring ends once a full step promises to lower -2 ln of the likelihood by less; a step is halved
+# until it brings a share of what it promises (Armijo), or is shorter than the least.
+CONVERGED, MOST_STEPS, SUFFICIENT, LEAST_STEP = 1e-4, 30, 1e-4, 1e-4
+MOST_ACTIVE = 1000  # changes of the active set in a step
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Noise of a constant: along the slope of the lowest SLOPE_OCTAVES, CONTINUED_OCTAVES further down.
 # Of 360 drives with nothing but noise the constant was beyond three standard deviations in 4 % with
 # 1/f noise (without, 20 %; each drive's own slope, 14 %), in none with AR(1) noise (before, 0.5 %).
 SLOPE_OCTAVES, CONTINUED_OCTAVES = 3, 2
 SLOW_SHARE = 0.1  # of the highest corner, below which noise counts as slow
-LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: from 0 none would return
+LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: no spectrum is 0
 # [N^2], of a rounding of 1e-12 N, which nothing resolves: squares of it are no zeros yet.
 LEAST_POWER = 1e-24
 
@@ -113,37 +116,43 @@ class NoiseShapes:
         phi = self.at_bands[:, 1:]
         squares, free = squares[:, 1:], np.maximum(
             counts[:, 1:] - leverage[:, 1:], 0.02 * counts[:, 1:])
-        least = LEAST_SHARE * squares.sum(axis=1, keepdims=True) / np.maximum(
-            free.sum(axis=1, keepdims=True), 1) + LEAST_POWER
+        least = LEAST_SHARE * squares.sum(axis=1) / np.maximum(free.sum(axis=1), 1) + LEAST_POWER
+        return np.stack([_scored(*one, phi) for one in zip(
+            amplitudes, squares, free, least, strict=True)])
 
-        def deviance(power: Array) -> Array:
-            found: Array = np.sum(free * np.log(power) + squares / power, axis=1)
-            return found
-        amplitudes = np.maximum(amplitudes, least)
-        power = amplitudes @ phi
-        before, damping = deviance(power), np.full(len(amplitudes), DAMPING)
-        for _ in range(MOST_STEPS):
-            slope = amplitudes * ((free / power - squares / power ** 2) @ phi.T)
-            # An amplitude at its least that would rather fall stands still.
-            moves = (amplitudes > least) | (slope < 0)
-            scaled = amplitudes[:, :, None] * phi
-            information = (scaled * (free / power ** 2)[:, None]) @ scaled.transpose(0, 2, 1)
-            # To unit diagonal: an amplitude far too small has hardly any information as it is.
-            scale = moves / np.sqrt(np.einsum('djj->dj', information))
-            information *= scale[:, :, None] * scale[:, None, :]
-            np.einsum('djj->dj', information)[:] = 1.0 + damping[:, None]
-            along = scale * np.linalg.solve(information, (-scale * slope)[:, :, None])[:, :, 0]
-            decrement = -np.sum(slope * along, axis=1)
-            step = np.clip(along, -LONGEST_STEP, LONGEST_STEP)
-            trial = np.maximum(amplitudes * np.exp(step), least)
-            after = deviance(trial @ phi)
-            better = after <= before
-            amplitudes = np.where(better[:, None], trial, amplitudes)
-            power, before = amplitudes @ phi, np.minimum(before, after)
-            damping = np.where(better, damping / 5, 10 * np.maximum(damping, DAMPING / 10))
-            if np.all(decrement < CONVERGED):
+
+def _scored(amplitudes: Array, squares: Array, free: Array, least: float, phi: Array) -> Array:
+    """Return the amplitudes of one drive that maximise the likelihood, (J + 1,)."""
+    from scipy.optimize import nnls  # here: commands that fit no noise start without it
+
+    amplitudes = np.maximum(amplitudes, least)
+    power = amplitudes @ phi
+    before = free @ np.log(power) + (squares / power).sum()
+    for _ in range(MOST_STEPS):
+        # Scoring is a regression of the bands' mean squares on the shapes, whose weights follow
+        # from the last spectrum; that amplitudes are not negative is exact.
+        root = np.sqrt(free) / power
+        design = root * phi
+        scale = np.sqrt(np.sum(design ** 2, axis=1))
+        above, _ = nnls((design / scale[:, None]).T,
+                        root * (squares / np.maximum(free, 1e-300) - least * phi.sum(axis=0)),
+                        maxiter=MOST_ACTIVE)
+        step = least + above / scale - amplitudes
+        change = step @ phi
+        promised = float(change @ (squares / power ** 2 - free / power))
+        if promised < CONVERGED:
+            break
+        share = 1.0
+        while share > LEAST_STEP:
+            power = (amplitudes + share * step) @ phi
+            after = free @ np.log(power) + (squares / power).sum()
+            if after <= before - SUFFICIENT * share * promised:
                 break
-        return amplitudes
+            share /= 2
+        else:
+            break
+        amplitudes, before = amplitudes + share * step, after
+    return amplitudes
 
 
 @dataclass(frozen=True)

@@ -270,7 +270,7 @@ def treated_forces(
         Called with (samples done, all) now and then.
     more : callable, optional
         Gives further quantities of the same evaluation, from what `drive_forces` of the model
-        returns, to be treated, (N, k) each, by name.
+        returns, to be treated, (N, ...) each, by name.
 
     Raises
     ------
@@ -281,7 +281,7 @@ def treated_forces(
     for chunk, forces, efforts in sensed_forces(model, reconstruction):
         for name, values in {**efforts, **more(forces)}.items():
             if name not in treated:
-                treated[name] = np.empty((len(reconstruction.treat), values.shape[1]))
+                treated[name] = np.empty((len(reconstruction.treat), *values.shape[1:]))
             treated[name][chunk.blocks] = chunk.treat(values)
         if progress is not None:
             progress(chunk.samples.stop, len(reconstruction))

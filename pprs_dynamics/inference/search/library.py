@@ -66,8 +66,8 @@ class DriveLibrary:
                             if names and set(names) <= set(effect.scanned)]
                 first += len(term.rows[self.d])
             # In single precision and in frequency alone: there are hundreds of them.
-            rows = np.concatenate([term.rows[self.d][:, self.series.index] for term in terms])
-            parts.append(self.series.transform(rows.astype(np.float32)))
+            parts.append(self.series.transform(np.concatenate(
+                [term.rows[self.d] for term in terms], dtype=np.float32, casting='same_kind')))
         return Scan(self.regression, {self.d: np.concatenate(parts)}, entries)
 
     def offers(self, fit: JointFit) -> dict[str, tuple[Component, float]]:

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +38,7 @@ PLATFORM = ('platform_x', 'platform_y', 'platform_z', 'platform_tilt', 'platform
 DIRECTED = ('position', 'load', 'time')
 
 
-@dataclass(frozen=True)
-class Pattern:
+class Pattern(NamedTuple):
     """One shape of an error along a variable.
 
     Parameters
@@ -257,6 +258,7 @@ def _indicators(values: Array, edges: Array) -> Array:
     return result
 
 
+@cache
 def _runs(bins: int) -> Array:
     """Return every run of neighbouring bins but that of all, (P, bins)."""
     index = np.arange(bins)

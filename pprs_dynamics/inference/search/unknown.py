@@ -9,7 +9,7 @@ They compete with the effects of the catalogue in the same search and by the sam
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -63,7 +63,7 @@ class _Scanned:
             pairs = np.arange(len(S)).reshape(-1, 2)
             found: Array = S[pairs[:, :, None], pairs[:, None, :]]
             return found
-        own = np.einsum('pc,cd,pd->p', family.weights, S, family.weights)
+        own = np.sum(family.weights @ S * family.weights, axis=1)
         positive: Array = np.maximum(own, 0.0)[:, None, None]
         return positive
 
@@ -269,7 +269,7 @@ class PatternLibrary:
             top = int(np.argmax(gains))
             if gains[top] > best:
                 best, limits[end] = float(gains[top]), float(trials[top])
-        moved = replace(pattern, limits=(limits[0], limits[1]))
+        moved = pattern._replace(limits=(limits[0], limits[1]))
         rows = np.asarray((values >= limits[0]) & (values <= limits[1]), dtype=float) * sign
         return self.candidate(family, moved, rows[None])
 

@@ -93,11 +93,13 @@ class ForceRipple(DriveEffect):
         Returns
         -------
         (S, 2, N) array
-            A wave passed at steady speed keeps sinc(v period / p) of its height in the mean.
+            In single precision. A wave passed at steady speed keeps sinc(v period / p) of its
+            height in the mean.
         """
         waves = 1 / np.array([shape['pitch'] for shape in shapes])[:, None]
-        kept = np.sinc(waves * drive.velocity * period)
-        turn = TURN * waves * drive.position
+        kept = np.sinc((waves * drive.velocity * period).astype(np.float32))
+        passed = waves * drive.position
+        turn = np.float32(TURN) * (passed - np.floor(passed)).astype(np.float32)
         return np.stack((kept * np.sin(turn), kept * np.cos(turn)), axis=1)
 
     @classmethod
