@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import fft
@@ -115,8 +116,8 @@ class DriveSeries:
                                    or [np.zeros(0)])
         order = np.argsort(frequency, kind='stable')
         # Copies of hundreds of rows are dear: of one stretch all samples are taken as they are.
-        self._order: Array | slice = order if len(lengths) > 1 else slice(None)
-        self._taken: Array | slice = self.index if len(stretches) != 1 else stretches[0]
+        self._order: Any = order if len(lengths) > 1 else slice(None)
+        self._taken: Any = self.index if len(stretches) != 1 else stretches[0]
         self.frequency = frequency[order]
         self._cuts = np.searchsorted(self.frequency, bands.edges)
         self._cuts[-1] = len(frequency)

@@ -76,7 +76,8 @@ def _around_fitted(
         starts = [kept] if kept is best else [kept, best]
         search.release()
         search = Search(last.design, decisions, scale, _share_of(
-            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
+            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES),
+            patterns=search.patterns)
         best = search.run(*(one.candidates for one in starts))
         if best.total > rival:
             break

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +57,10 @@ class Pattern(NamedTuple):
     scale: float = 0.0
 
 
-@dataclass(frozen=True)
+Once = Callable[[str, Callable[[], 'list[Family]']], 'list[Family]']
+
+
+@dataclass(frozen=True, eq=False)
 class Family:
     """Columns of one variable and the patterns tried on them.
 
@@ -96,8 +99,18 @@ class Family:
         return self.weights[index:index + 1] @ self.columns
 
 
-def build_families(residuals: Residuals, drive: int) -> list[Family]:
-    """Return the families of one drive, over the variables that are known."""
+def build_families(residuals: Residuals, drive: int,
+                   once: Once = lambda name, make: make()) -> list[Family]:
+    """Return the families of one drive, over the variables that are known.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    drive : int
+    once : callable, optional
+        From a name and what makes families to these: it may keep those that are the same for
+        every drive that has them.
+    """
     families = [_offset(len(residuals))]
     direction = residuals.variable('direction', drive)
     velocity = residuals.variable('velocity', drive)
@@ -106,9 +119,12 @@ def build_families(residuals: Residuals, drive: int) -> list[Family]:
         families.append(_direction(direction, velocity))
     sign = direction if moving else None
     families += _maybe(_velocity, 'velocity', velocity, sign, 1)
-    for name in (*OWN, *PLATFORM, 'time'):
+    for name in (*OWN, 'time'):
         values = residuals.variable(name, drive)
         families += _maybe(_scalar, name, values, sign if name in DIRECTED else None, 1)
+    for name in PLATFORM:
+        families += once(name, partial(
+            _maybe, _scalar, name, residuals.variable(name, drive), None, 1))
     position = residuals.variable('position', drive)
     if position is not None and np.ptp(position) > 0:
         families.append(_ripple(position))
@@ -118,8 +134,9 @@ def build_families(residuals: Residuals, drive: int) -> list[Family]:
             continue
         build = _velocity if name == 'velocity' else _scalar
         for other in others:
-            families += _maybe(build, f'{name} of {residuals.drives[other]}',
-                               residuals.variable(name, other), None, len(others))
+            whose = f'{name} of {residuals.drives[other]}'
+            families += once(whose, partial(
+                _maybe, build, whose, residuals.variable(name, other), None, len(others)))
     return families
 
 

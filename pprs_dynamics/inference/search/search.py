@@ -29,7 +29,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates
 from pprs_dynamics.inference.search.scanned_sets import ScannedSets, with_fast_noise
-from pprs_dynamics.inference.search.unknown import PatternLibrary, best_patterns
+from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
@@ -53,15 +53,19 @@ class Search(ScannedSets):
         Called with the share of the work that is done.
     with_unknown : bool
         Patterns of no catalogue take part.
+    patterns : sequence of PatternLibrary
+        Those of another operating point; by default they are made.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
                  error_scale: Mapping[int, float] | None = None,
                  progress: Callable[[float], None] | None = None,
-                 with_unknown: bool = True) -> None:
+                 with_unknown: bool = True, patterns: Sequence[PatternLibrary] = ()) -> None:
         super().__init__(design, decisions, error_scale)
-        self.patterns = ([PatternLibrary(self.regression, self.prices, d)
-                          for d in self.regression.drives] if with_unknown else [])
+        shared = Shared()
+        self.patterns = [one.around(self.regression) for one in patterns] or (
+            [PatternLibrary(self.regression, self.prices, d, shared=shared)
+             for d in self.regression.drives] if with_unknown else [])
         self._report = progress or (lambda share: None)
 
     def run(self, *starts: Candidates) -> CandidateSet:

@@ -8,9 +8,12 @@ They compete with the effects of the catalogue in the same search and by the sam
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from threading import Lock
+from typing import Any
 
 import numpy as np
 from scipy import fft
@@ -36,9 +39,42 @@ FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
 LIMIT_STEPS = (1.0, 0.2, 0.04, 0.008)
 
 
-@dataclass(frozen=True)
-class _Scanned:
+class Shared:
+    """What is the same for several drives, made once: families of platform and other drives."""
+
+    def __init__(self) -> None:
+        self._made: dict[Any, Any] = {}
+        self._lock = Lock()
+
+    def once(self, key: Any, make: Callable[[], Any]) -> Any:
+        """Return what `make` makes, of the first call with this key."""
+        with self._lock:
+            if key not in self._made:
+                self._made[key] = make()
+            return self._made[key]
+
+
+@dataclass(frozen=True, eq=False)
+class _Transformed:
     """A family with its columns transformed.
+
+    Parameters
+    ----------
+    family : Family
+    rows : (C, n) array
+        In single precision.
+    gram : (B, C, C) array
+        Band sums.
+    """
+
+    family: Family
+    rows: Array
+    gram: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Scanned:
+    """A family for the scans of one drive.
 
     Parameters
     ----------
@@ -90,11 +126,14 @@ class PatternLibrary:
     d : int
     with_plain_forms : bool
         Also what effects of the catalogue are exactly: a constant, friction, a ripple.
+    shared : Shared, optional
+        With libraries of other drives of the same residuals.
     """
 
     def __init__(self, regression: Regression, prices: Prices, d: int,
-                 with_plain_forms: bool = False) -> None:
+                 with_plain_forms: bool = False, shared: Shared | None = None) -> None:
         self.regression, self.prices, self.d = regression, prices, d
+        self._shared = shared or Shared()
         self.series = regression.series[d]
         self.with_plain_forms = with_plain_forms
         residuals = regression.residuals
@@ -105,22 +144,39 @@ class PatternLibrary:
             {name: values[index] for name, values in residuals.variables.items()},
             residuals.period, residuals.units)
 
-    @cached_property
-    def _scanned(self) -> list[_Scanned]:
-        found = []
-        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
-        for family in build_families(self.residuals, self.d):
-            if not self.with_plain_forms and (family.paired or family.is_plain):
-                continue
-            columns = self.series.transform(family.columns.astype(np.float32))
-            gram = self.series.products(columns, columns)
-            found.append(_Scanned(
-                family, Columns(self.regression, {self.d: columns}), gram,
-                _Scanned.of_patterns(family, gram.sum(axis=0)) / scale))
+    def around(self, regression: Regression) -> PatternLibrary:
+        """Return the same patterns for the same samples around another operating point."""
+        series = regression.series[self.d]
+        if not (np.array_equal(series.index, self.series.index)
+                and np.array_equal(series.known, self.series.known)):
+            return PatternLibrary(regression, self.prices, self.d, self.with_plain_forms)
+        found = copy(self)
+        found.regression, found.series = regression, series
+        vars(found).pop('_scanned', None)
         return found
 
+    @cached_property
+    def _transformed(self) -> list[_Transformed]:
+        samples = hash((self.series.index.tobytes(), self.series.known.tobytes()))
+
+        def transformed(family: Family) -> _Transformed:
+            rows = self.series.transform(family.columns.astype(np.float32, copy=False))
+            return _Transformed(family, rows, self.series.products(rows, rows))
+
+        families = build_families(self.residuals, self.d, lambda name, make: self._shared.once(
+            (samples, name), make))
+        return [self._shared.once(family, partial(transformed, family)) for family in families
+                if self.with_plain_forms or not (family.paired or family.is_plain)]
+
+    @cached_property
+    def _scanned(self) -> list[_Scanned]:
+        scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
+        return [_Scanned(one.family, Columns(self.regression, {self.d: one.rows}), one.gram,
+                         _Scanned.of_patterns(one.family, one.gram.sum(axis=0)) / scale)
+                for one in self._transformed]
+
     def release(self) -> None:
-        """Let go of all columns; they are computed again if they are asked for."""
+        """Let go of products that only further scans would need."""
         vars(self).pop('_scanned', None)
 
     @property
