@@ -40,7 +40,7 @@ from pprs_dynamics.inference.search.ranking import Ranking, select
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.rests import STANDSTILL, share_in_motion
+from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_SETS = 8  # that are told with their costs
@@ -152,8 +152,8 @@ def diagnose(
     """
     report = progress or (lambda share: None)
     if not any(share_in_motion(one.time, one.position) for one in recordings):
-        raise MotionError('position', f'no drive moves faster than {STANDSTILL:g} m/s or rad/s in '
-                          f'{", ".join(one.name for one in recordings)}', 'move: a robot that '
+        raise MotionError('position', 'no drive moves by more than its measured position resolves '
+                          f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
     ranking = select(model, recordings, decisions, lambda share: report(0.9 * share))
     diagnosis = _Answer(ranking, validate, decisions).diagnosis()

@@ -70,7 +70,8 @@ def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
     np.einsum('nkk->nk', posterior)[:] = np.maximum(diagonal, floor)
     scale = 1 / np.sqrt(np.einsum('nkk->nk', posterior))
     scaled = posterior * scale[:, :, None] * scale[:, None, :]
-    values, axes = np.linalg.eigh(scaled)
+    values, axes = (np.linalg.eigh(scaled) if b.shape[1] > 1
+                    else (scaled[:, :, 0], np.ones_like(scaled)))
     kept = values > 1e-7
     along = np.einsum('nkj,nk->nj', axes, b * scale)
     quadratic = np.sum(np.where(kept, along ** 2 / np.where(kept, values, 1.0), 0.0), axis=1)

@@ -122,6 +122,7 @@ class DriveSeries:
         self._cuts = np.searchsorted(self.frequency, bands.edges)
         self._cuts[-1] = len(frequency)
         self.counts = np.diff(self._cuts).astype(float)
+        self._single = int(np.argmax(np.append(self.counts, 0) != 1))  # bands of one coefficient
 
     def __len__(self) -> int:
         return len(self.index)
@@ -160,8 +161,9 @@ class DriveSeries:
         if len(a) * len(b) <= FEW_PAIRS:
             return np.moveaxis(self.sums(a[:, None] * b[None]), -1, 0)
         found = np.zeros((len(self.bands), len(a), len(b)))
-        cuts = self._cuts
-        for band in range(len(self.bands)):
+        cuts, single = self._cuts, self._single
+        np.multiply(a[:, :single].T[:, :, None], b[:, :single].T[:, None, :], out=found[:single])
+        for band in range(single, len(self.bands)):
             part = slice(cuts[band], cuts[band + 1])
             if cuts[band] < cuts[band + 1]:
                 np.matmul(a[:, part], b[:, part].T, out=found[band])

@@ -10,9 +10,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 
 SHORTEST_REST = 0.5  # [s]; reversals of a motion are over sooner
-# Slower than any motion that tells of friction [m/s, rad/s]: an encoder's noise looks like it.
-STANDSTILL = 1e-4
 GLANCE = 0.1  # [s] over which speeds are taken to tell motion from rest
+RESOLVED = 4.0  # steps, or deviations of the noise, of a measured position, that are no motion
 
 
 def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[np.bool_]:
@@ -51,7 +50,7 @@ def share_in_motion(time: Array, position: Array, moving: float = 0.0) -> float:
     position : (N, D) array
         [m, rad]
     moving : float, optional
-        Share of its highest speed above which a drive moves; always faster than `STANDSTILL`.
+        Share of its highest speed above which a drive moves; always by more than `resolution`.
     """
     if len(time) < 2:
         return 0.0
@@ -61,5 +60,17 @@ def share_in_motion(time: Array, position: Array, moving: float = 0.0) -> float:
     if not len(step):
         return 0.0
     speed = np.abs(moved) / step[:, None]
+    least = RESOLVED * resolution(position) / step[:, None]
     return float(np.mean(np.any(
-        speed > np.maximum(moving * speed.max(axis=0), STANDSTILL), axis=1)))
+        speed > np.maximum(moving * speed.max(axis=0), least), axis=1)))
+
+
+def resolution(position: Array) -> Array:
+    """Return how finely positions (N, D) are measured, (D,): an encoder's step, or the noise."""
+    steps = np.abs(np.diff(position, axis=0))
+    finest = np.min(np.where(steps > 0, steps, np.inf), axis=0, initial=np.inf)
+    # Third differences of a motion are small, those of white noise have 20 times its variance.
+    noise = np.sqrt(np.mean(np.diff(position, 3, axis=0) ** 2, axis=0) / 20) if (
+        len(position) > 3) else np.zeros_like(finest)
+    found: Array = np.maximum(np.where(np.isfinite(finest), finest, 0.0), noise)
+    return found
