@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
@@ -98,6 +99,31 @@ def test_the_fit_ends_at_the_same_spectrum_from_bad_starts(start: float) -> None
     assert other.deviance == pytest.approx(usual.deviance, abs=0.5)
     again = regression.fit((), usual.amplitudes)
     assert again.deviance == pytest.approx(usual.deviance, abs=0.1)
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_no_other_amplitudes_have_a_higher_likelihood(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    bands = FrequencyBands.of(40.0, PERIOD)
+    shapes = NoiseShapes.of(bands)
+    counts = np.maximum(np.round(np.diff(np.clip(bands.edges, 0, 0.5 / PERIOD)) * 80), 1.0)
+    true = np.zeros(len(shapes.at_bands))
+    true[0] = 1.0
+    true[rng.integers(1, len(true), 2)] = 10 ** rng.uniform(0, (4, 3))
+    squares = true @ shapes.at_bands * rng.chisquare(counts)
+    found = shapes.fitted(shapes.start(squares[None], counts[None]), squares[None], counts[None],
+                          np.zeros((1, len(counts))))[0]
+    phi = shapes.at_bands[:, 1:]
+
+    def deviance(amplitudes: np.ndarray) -> tuple[float, np.ndarray]:
+        power = amplitudes @ phi
+        ratio = squares[1:] / power
+        return (float(np.sum(counts[1:] * np.log(power) + ratio)),
+                phi @ ((counts[1:] - ratio) / power))
+    lowest = min(minimize(deviance, start, jac=True, method='L-BFGS-B',
+                          bounds=[(1e-9, None)] * len(true), options={'maxiter': 3000}).fun
+                 for start in (np.ones(len(true)), found, np.maximum(true, 1e-6)))
+    assert deviance(found)[0] - lowest < 1e-3
 
 
 def test_a_vibration_is_no_noise() -> None:
