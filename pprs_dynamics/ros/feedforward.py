@@ -16,6 +16,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
@@ -245,11 +246,19 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         elif left.workspace < own['warning_margin']:
             report('WARN', 'NEAR_WORKSPACE', f'{left.drive} has {left.workspace:.3f} of half its '
                    f'range left, warning_margin is {own["warning_margin"]:g}')
+        elif (outside := self._beyond_curves(answer)) is not None:
+            report('WARN', 'CURVE', outside)
         elif self._lagging:
             report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median: they '
                    'come faster than they are answered, or the machine is busy')
         else:
             report('OK', 'OK', 'commands follow the trajectory')
+
+    def _beyond_curves(self, answer: ForceCommand) -> str | None:
+        """Return which measured curve the drives are beyond, None for none."""
+        curves = next((effect for effect in self._settings.model.effects
+                       if isinstance(effect, MeasuredCurve)), None)
+        return None if curves is None else curves.left(answer.forces.mechanism)
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1

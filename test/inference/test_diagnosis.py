@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,7 @@ from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.physics.model.model_file import build_model
@@ -107,6 +110,19 @@ def test_columns_of_drives_are_what_the_model_with_the_effect_says(
     expected = weights @ rows
     np.testing.assert_allclose(found[:, 4], expected, atol=1e-3 * np.abs(expected).max())
     assert np.abs(found[:, [0, 1, 2, 3, 5]]).max() < 1e-12
+
+
+@pytest.mark.parametrize('late', [0.0, 0.054, -0.11, 0.2])
+def test_delays_are_tried_around_the_one_that_the_efforts_show(late: float) -> None:
+    run = record(MODEL)
+    step = float(np.median(np.diff(run.time)))
+    effort = np.stack([np.interp(run.time - late, run.time, one) for one in run.effort.T], axis=1)
+    found = Design.of(MODEL, [replace(run, effort=effort)]).covered[2]
+    assert found.delay == pytest.approx(late, abs=2 * step)
+    tried = np.array([one['delay'] for one in TimeDelay.trials(found)])
+    assert np.all(tried)  # none is no delay
+    assert tried.min() < late < tried.max()
+    assert np.abs(tried[tried != 0] - late).min() <= 0.001
 
 
 def test_a_wrong_zero_is_felt_by_all_drives(design: Design) -> None:

@@ -212,6 +212,20 @@ def test_the_end_of_a_stroke_is_announced() -> None:
         assert node.counters['WORKSPACE'] == 1
 
 
+def test_beyond_the_range_of_a_measured_curve_is_announced() -> None:
+    curve = 'effects__measured_curve__lift_1__'
+    height = 0.3 * np.sqrt(1 - 1 / 36)
+    with feedforward_bench(**{
+            'effects__active': ['measured_curve'], f'{curve}variable': 'position',
+            f'{curve}from': 0.1, f'{curve}to': 0.3,
+            f'{curve}values': [0.0, 1.0, 1.0, 0.0]}) as node:
+        node.answer(message_of(at(0.0, 0.2 + height)))
+        assert node.wait_for_status(code='OK')
+        node.answer(message_of(at(0.0, 0.4 + height)))
+        status = node.wait_for_status(code='CURVE', level='WARN')
+        assert 'lift_1: position 0.4 is outside of 0.1 to 0.3' in status['message']
+
+
 def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
     with feedforward_bench(max_age=0.2, command_timeout=TIMEOUT) as node:
         now = node.node.get_clock().now().nanoseconds

@@ -61,7 +61,7 @@ def found_effect(name: str, drives: tuple[str, ...] | None = ('lift_2',), value:
         if drives is None or DRIVES[d] in drives:
             force[:, d] = value * np.sign(velocity[:, d])
     values = {'parameters': parameters, 'evidence': 120.4, 'error_before': 0.25,
-              'error_after': 0.0510, 'held_out_before': 0.26, **changes}
+              'error_after': 0.0510, 'held_out_before': 0.26, 'share': 0.796, **changes}
     return FoundEffect(effect, drives, force=force, held_out_after=held_out_after, **values)
 
 
@@ -81,7 +81,8 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
     given = Residuals(DRIVES, residuals.time, residuals.segment, residuals.measured + missing,
                       residuals.model, {}, residuals.variables, PERIOD)
     fields: dict[str, Any] = {
-        'verdict': verdict, 'effects': (), 'indistinguishable': (), 'candidates': tuple(
+        'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
+        'candidates': tuple(
             RankedEffect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
         'suspects': (), 'depends_on': (), 'within_model_error': (), 'sets': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),

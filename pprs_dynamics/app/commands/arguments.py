@@ -23,7 +23,7 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap')
-INPUTS = ('model', 'recordings', 'validate', 'beside', 'file', 'manifest', 'store', 'path')
+INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
 

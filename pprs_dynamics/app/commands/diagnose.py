@@ -16,6 +16,7 @@ from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.fit.base_fit import require_open_numbers
 
 
 class OptionsError(PprsError, ValueError):
@@ -31,6 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='write a page with all figures')
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
+    parser.add_argument('--refit', metavar='RECORDING', nargs='*',
+                        help='then fit the base model again beside what was added, as pprs fit '
+                        'does: to these recordings, or to those diagnosed')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         help='model file that --adopt-all writes')
 
@@ -40,6 +44,8 @@ def run(options: argparse.Namespace) -> int:
     _check(options)
     screen = console()
     inputs = read_inputs(options, screen)
+    if options.refit is not None:
+        require_open_numbers(inputs.model)
     with staged_bar(screen) as progress:
         result = diagnose(inputs.model, inputs, progress=progress)
     tell(result, options, screen)
@@ -54,13 +60,16 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
     """
     inputs = diagnosis.inputs
     with staged_bar(screen) as progress:
-        result = adopt_all(inputs.model, inputs, diagnosis=diagnosis, progress=progress)
+        result = adopt_all(inputs.model, inputs, refit=options.refit, diagnosis=diagnosis,
+                           topic=options.topic, progress=progress)
     screen.print(result.view(options.details))
     if options.json:
         write_json(options.json, {**diagnosis.to_dict(), 'adoption': result.to_dict()})
     count = len(result.run.adopted)
     if count or not result.refused:
         result.save(options.output)
+        if result.refit is not None:
+            screen.print(result.refit.reason)
         screen.print(f'model, {count} effect{"s" * (count != 1)} added: {shown(options.output)}')
     return int(result.refused)
 
@@ -69,6 +78,9 @@ def _check(options: argparse.Namespace) -> None:
     if options.adopt_all and not options.output:
         raise OptionsError('--adopt-all: no --output FILE is given, must say where the new '
                            'model file goes')
+    if options.refit is not None and not options.adopt_all:
+        raise OptionsError('--refit: it is given without --adopt-all, which adds what the base '
+                           'model is fitted again beside')
     if options.output and not options.adopt_all:
         raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '
                            'it then; --json and --report write the answer')

@@ -19,8 +19,11 @@ from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
+from pprs_dynamics.inference.adoption.refit import Refit, refit_base
 from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.fit.base_fit import require_open_numbers
 from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -118,14 +121,19 @@ class AdoptionRunResult(Result):
         Model and recordings.
     run : AdoptionRun
         What was adopted and refused, one after the other.
+    refit : Refit, optional
+        Of the base model beside it.
     """
 
     inputs: Inputs
     run: AdoptionRun
+    refit: Refit | None = None
 
     @property
     def model(self) -> ForceModel:
         """The model with all that was adopted, and its ledger."""
+        if self.refit is not None and self.refit.taken:
+            return self.refit.fit.model
         return self.run.model
 
     @property
@@ -149,7 +157,8 @@ class AdoptionRunResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs diagnose --adopt-all --json` writes as `adoption`."""
-        return self.run.to_dict()
+        refit = {} if self.refit is None else {'refit': self.refit.to_dict()}
+        return {**self.run.to_dict(), **refit}
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
@@ -228,14 +237,17 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
 
 
 def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *,
-              diagnosis: DiagnosisResult | None = None, topic: str | None = None,
-              progress: Progress | None = None) -> AdoptionRunResult:
+              refit: Recordings | None = None, diagnosis: DiagnosisResult | None = None,
+              topic: str | None = None, progress: Progress | None = None) -> AdoptionRunResult:
     """Diagnose and adopt until nothing more can be told.
 
     Parameters
     ----------
     model, recordings, validate, diagnosis, topic, progress
         As in `adopt`.
+    refit : path, Recording, or a sequence of them, optional
+        To which the base model is then fitted again, as `fit` does, beside what was adopted; it
+        is taken where the error on other data falls. An empty sequence means `recordings`.
 
     Returns
     -------
@@ -243,13 +255,25 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
 
     Raises
     ------
+    FitError
+        Where there is nothing to fit again.
     PprsError
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
-    return AdoptionRunResult(inputs, adopt_effects(
+    again: list[Recording] = []
+    if refit is not None:
+        require_open_numbers(inputs.model)
+        again = Inputs.of(inputs.model, refit, inputs.held_out, topic,
+                          progress).fitted or inputs.fitted
+    run = adopt_effects(
         inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
-        None if diagnosis is None else diagnosis.diagnosis))
+        None if diagnosis is None else diagnosis.diagnosis)
+    if not again or not run.adopted:
+        return AdoptionRunResult(inputs, run)
+    report = progress or (lambda what, share: None)
+    return AdoptionRunResult(inputs, run, refit_base(
+        run.model, again, inputs.held_out, lambda share: report('fitting the base', share)))
 
 
 def _plot(first: Adoption, last: Adoption) -> Figure:

@@ -11,7 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from pprs_dynamics.app.report.adoption_tables import error_rows, headline, parameter_rows
-from pprs_dynamics.app.report.diagnosis_figures import before_and_after, contributions
+from pprs_dynamics.app.report.diagnosis_figures import (
+    before_and_after,
+    contributions,
+    curve_with_band,
+)
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
@@ -53,6 +57,10 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                                          answer.noise_floors[most]),
                         f'{most}, where it changes most: effort and error, before and with it.',
                         over_time=True)
+    if answer.curve is not None:
+        page.figure(curve_with_band(answer), 'The measured curve with two standard deviations, '
+                    'and what the model without it leaves: a table of correction, not a cause. '
+                    'Beyond the measured range it goes on with its last value.')
     if command and answer.adopted:
         page.command('See what is still missing', command)
     page.table(('error on', f'before [{answer.unit}]', f'after [{answer.unit}]', 'change'),

@@ -24,6 +24,8 @@ from pprs_dynamics.app.report.comparison_figures import (
     in_two_rows,
 )
 from pprs_dynamics.app.report.page import plotly_objects
+from pprs_dynamics.inference.adoption.adoption import Adoption
+from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, curve_variable
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.partial import partial_residual, remaining_residuals
@@ -31,6 +33,7 @@ from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
+POINTS = 400  # of a curve, and of the errors around it
 AFTER, FLOOR, RIVAL, OTHER = '#009E73', '#1a1a1a', '#E69F00', '#bbbbbb'
 
 
@@ -55,6 +58,35 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
     for level in (-2 * floor, 2 * floor):
         figure.add_hline(y=level, row=2, col=1, line={'color': FLOOR, 'width': 1, 'dash': 'dot'})
     return in_two_rows(figure, before.drives[drive], units)
+
+
+def curve_with_band(answer: Adoption) -> Any:
+    """Return a measured curve over its variable, its band, and the errors that it stands for."""
+    assert isinstance(answer.request, CurveRequest)
+    assert answer.curve is not None
+    go = plotly_objects()
+    after, curve = answer.residuals_after, answer.curve.curve
+    drive = after.drives.index(answer.request.drive)
+    seen = curve_variable(after, answer.request)
+    factor, label = axis_of(curve.variable, after, answer.request.drive)
+    left = after.error[:, drive] + curve.force(seen)
+    shown = np.linspace(0, len(seen) - 1, min(len(seen), POINTS)).astype(int)
+    x = np.linspace(curve.start, curve.end, POINTS)
+    y, band = curve.force(x), 2 * answer.curve.band(x)
+    units = after.units_of(answer.request.drive)
+    figure = go.Figure()
+    figure.add_trace(go.Scatter(
+        x=factor * seen[shown], y=left[shown], mode='markers', name='without it',
+        marker={'size': 3, 'color': OTHER}, hoverinfo='skip'))
+    figure.add_trace(go.Scatter(
+        x=factor * np.concatenate((x, x[::-1])), y=np.concatenate((y + band, (y - band)[::-1])),
+        fill='toself', line={'width': 0}, fillcolor='rgba(0, 158, 115, 0.25)',
+        name='two standard deviations', hoverinfo='skip'))
+    figure.add_trace(go.Scatter(x=factor * x, y=y, mode='lines', name='measured curve',
+                                line={'color': AFTER, 'width': 1.5}, hovertemplate=hover(units)))
+    figure.update_layout(height=300, margin=MARGIN, legend=LEGEND, xaxis_title=label,
+                         yaxis_title=f'{answer.request.drive} [{units.effort}]')
+    return figure
 
 
 def contributions(residuals: Residuals, forces: dict[str, Any]) -> Any:

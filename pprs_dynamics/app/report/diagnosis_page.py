@@ -114,9 +114,8 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
         if picture is not None:
             page.figure(picture, f'What no effect explains, on {statement.drive}.')
             return
-    shown = sorted(diagnosis.effects, key=lambda one: not one.is_confirmed)
-    if shown:
-        page.figure(*figures.effect_pictures(diagnosis, shown[0])[0])
+    if diagnosis.effects:
+        page.figure(*figures.effect_pictures(diagnosis, diagnosis.effects[0])[0])
 
 
 def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,

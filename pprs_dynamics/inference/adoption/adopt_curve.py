@@ -89,7 +89,7 @@ def adopt_curve(
         request, request.drives, not against or force, bool(against) and force, reason,
         tuple(against), tuple(remarks), _parameters(request, fitted, start), (), (), model, after,
         before, residuals, rms(before), rms(residuals), *held_out,
-        VALIDATION if validate else BLOCKS, diagnosis.noise_floor, diagnosis.noise_floors)
+        VALIDATION if validate else BLOCKS, diagnosis.noise_floor, diagnosis.noise_floors, fitted)
 
 
 def with_curve(model: ForceModel, drive: str, fitted: FittedCurve) -> ForceModel:

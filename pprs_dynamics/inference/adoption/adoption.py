@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
+from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, FittedCurve
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
@@ -47,6 +47,8 @@ class Adoption:
         Root of the mean square of the noise, as the diagnosis has it [N].
     noise_floors : mapping of str to float
         The same by drive [N].
+    curve : FittedCurve, optional
+        Of a measured curve, with its band.
     """
 
     request: EffectRequest | CurveRequest
@@ -70,6 +72,7 @@ class Adoption:
     held_out_on: str
     noise_floor: float
     noise_floors: dict[str, float]
+    curve: FittedCurve | None = None
 
     @property
     def unit(self) -> str:

@@ -54,9 +54,11 @@ class Diagnosis:
     ----------
     verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
     effects : tuple of FoundEffect
-        Those without which the error would be largest first.
+        What lowers the error most first.
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
+    unconfirmed : tuple of FoundEffect
+        Fitted as well, but the error does not fall with them, or not on held-out data.
     candidates, suspects : tuple of RankedEffect
     depends_on : tuple of Statement
         What no effect explains.
@@ -90,6 +92,7 @@ class Diagnosis:
     verdict: str
     effects: tuple[FoundEffect, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
+    unconfirmed: tuple[FoundEffect, ...]
     candidates: tuple[RankedEffect, ...]
     suspects: tuple[RankedEffect, ...]
     depends_on: tuple[Statement, ...]
@@ -115,6 +118,7 @@ class Diagnosis:
             'verdict': self.verdict,
             'effects': [one.to_dict() for one in self.effects],
             'indistinguishable': [list(names) for names in self.indistinguishable],
+            'unconfirmed': [one.to_dict() for one in self.unconfirmed],
             'candidates': [one.to_dict() for one in self.candidates],
             'depends_on': [
                 {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
@@ -168,30 +172,44 @@ class _Answer:
                  decisions: Decisions) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
         self.search: Search = ranking.last
-        self.best, self.kept = ranking.best, ranking.kept
+        self.best = ranking.best
         self.design = self.search.design
         self.drives = self.design.drives
+
+    @property
+    def kept(self) -> CandidateSet:
+        """What is adopted."""
+        return self.ranking.kept
 
     def diagnosis(self) -> Diagnosis:
         search, regression = self.search, self.search.regression
         first = self.ranking.first.design
-        widths = estimate_widths(search, self.kept)
-        adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
-        remaining = first.residuals.measured - exact_forces(self.design, adopted)
+        unconfirmed: list[FoundEffect] = []
+        while True:
+            widths = estimate_widths(search, self.kept)
+            adopted = with_widths(fitted_model(search, self.kept), self.design, widths)
+            remaining = first.residuals.measured - exact_forces(self.design, adopted)
+            effects = self._effects(remaining)
+            weak = [one for one in effects if not one.is_confirmed]
+            if not weak:
+                break
+            least = min(weak, key=lambda one: one.evidence)
+            unconfirmed.append(least)
+            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)])
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}
         rivals = self._rivals()
         depends = self._depends_on(noise)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
-        effects = self._effects(remaining)
         verdict = ('unknown' if depends else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(search, self.kept, widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
         return Diagnosis(
-            verdict, tuple(effects), sets, self._candidates(), self._suspects(), depends,
-            tuple(map(self._within_model_error, self.ranking.remainders)), self._sets(),
+            verdict, tuple(effects), sets, tuple(unconfirmed), self._candidates(),
+            self._suspects(), depends, tuple(map(self._within_model_error,
+                                                 self.ranking.remainders)), self._sets(),
             tuple(moved), find_cautions(search, self.best, effects), first.notes,
             first.given, adopted, first.residuals, remaining, noise, floors,
             float(np.sqrt(np.mean(np.square(list(floors.values()))))),
@@ -217,7 +235,8 @@ class _Answer:
             found.append(FoundEffect(
                 candidate.effect, self._names(candidate), said.parameters,
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                search.library.force(self.kept, candidate, remaining.shape), said.at_bound))
+                search.library.force(self.kept, candidate, remaining.shape), said.at_bound,
+                self.ranking.shares[k]))
         return found
 
     def _evidence(self, candidate: Candidate) -> float:

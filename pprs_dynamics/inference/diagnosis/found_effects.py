@@ -32,7 +32,10 @@ class FoundEffect:
     force : (M, D) array
         What it contributes [N].
     at_bound : tuple of str
-        Parameters that stand at a bound.
+        Parameters whose value is none: at the edge of what was tried.
+    share : float
+        Of the error that it takes away, beside the effects before it: of the root mean square
+        over drives, each as a multiple of its noise.
     """
 
     effect: type[CatalogueEffect]
@@ -45,6 +48,7 @@ class FoundEffect:
     held_out_after: float
     force: Array
     at_bound: tuple[str, ...] = ()
+    share: float = 0.0
 
     @property
     def name(self) -> str:
@@ -58,15 +62,16 @@ class FoundEffect:
 
     @property
     def is_confirmed(self) -> bool:
-        """Return whether the error on held-out data falls with it."""
-        return self.held_out_after < self.held_out_before
+        """Return whether the error falls with it, and that on held-out data."""
+        return (self.error_after < self.error_before
+                and self.held_out_after < self.held_out_before)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
                 'alike': [list(names) for names in self.places if len(names) > 1],
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
-                'evidence': self.evidence,
+                'evidence': self.evidence, 'share_of_error': self.share,
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
 

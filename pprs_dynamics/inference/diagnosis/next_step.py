@@ -69,8 +69,9 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     if diagnosis.verdict == 'ambiguous':
         return ('Record a motion that tells the candidates apart; this designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
-    if doubted := [one.name for one in diagnosis.effects if not one.is_confirmed]:
-        return (f'Do not add {listed(doubted)} on this evidence. Record another motion, and '
+    if diagnosis.unconfirmed and not diagnosis.effects:
+        names = listed([one.name for one in diagnosis.unconfirmed])
+        return (f'Do not add {names} on this evidence. Record another motion, and '
                 'diagnose both recordings', repeat)
     if len(diagnosis.effects) == 1:
         found = diagnosis.effects[0]

@@ -21,6 +21,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     change,
     in_unit,
     listed,
+    percent,
     plain,
     sentence,
     with_drives,
@@ -144,7 +145,7 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    held, unit = [e for e in diagnosis.effects if e.is_confirmed], diagnosis.residuals.unit
+    held, unit = diagnosis.effects, diagnosis.residuals.unit
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
@@ -159,11 +160,11 @@ def _headline(diagnosis: Diagnosis) -> str:
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
     noise = in_unit(diagnosis.noise_floor, unit)
+    if not held and diagnosis.unconfirmed:
+        return f'Nothing that was found holds.{doubt}'
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
-    if not held:
-        return f'Nothing that was found holds on held-out data.{doubt}'
     left = held[-1].error_after
     level = (', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
              else f'. The noise is {noise}; the rest is within the model error of what was found.'
@@ -175,20 +176,24 @@ def _headline(diagnosis: Diagnosis) -> str:
     return f'The model lacks {named}{which}.{fall}{level}{doubt}'
 
 
-def _doubted(diagnosis: Diagnosis) -> list[str]:
-    """Return effects that held-out data do not confirm."""
-    return [one.name for one in diagnosis.effects if not one.is_confirmed]
-
-
 def _doubt(diagnosis: Diagnosis) -> str:
-    names = _doubted(diagnosis)
-    return '' if not names else (
-        f' {listed(names)} {"was" if len(names) == 1 else "were"} fitted as well, but the error '
-        f'on held-out data does not fall with {"it" if len(names) == 1 else "them"}.')
+    """Return what was fitted and does not hold, a sentence for each."""
+    told = []
+    for one in diagnosis.unconfirmed:
+        title = with_drives(one.name, one.drives, diagnosis.residuals.drives)
+        on, before, after = (
+            'the error', one.error_before, one.error_after) if (
+            one.error_after >= one.error_before) else (
+            'the error on held-out data', one.held_out_before, one.held_out_after)
+        told.append(f' {title} was fitted as well and is no finding: with it {on} '
+                    f'{change(before, after, diagnosis.residuals.unit)}.')
+    return ''.join(told)
 
 
 def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
-    return listed([_title(diagnosis, effect), *_rivals(diagnosis, effect)], 'or')
+    # One number for each, in the order of which they stand.
+    several = f' ({percent(-effect.share)})' if len(diagnosis.effects) > 1 else ''
+    return listed([_title(diagnosis, effect), *_rivals(diagnosis, effect)], 'or') + several
 
 
 def _title(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
@@ -206,9 +211,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card_in(diagnosis.model.kind)
     title = _title(diagnosis, found)
-    lacks = f'The model lacks {title}' if found.is_confirmed else (
-        f'Fitted, but not confirmed: {title}')
-    what = f'{lacks}: {_parameters(diagnosis, found)}'
+    what = f'The model lacks {title}: {_parameters(diagnosis, found)}'
     if issubclass(found.effect, MeasurementEffect):
         what += ('. This is what the sensor says, not what the drive must do: it enters '
                  'comparisons and the monitor, never a command')
@@ -270,11 +273,11 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
     held_out += change(found.held_out_before, found.held_out_after, unit)
-    held_out += '' if found.is_confirmed else ': do not adopt it'
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'With it the error {change(found.error_before, found.error_after, unit)}. '
+    return (f'It takes away {percent(found.share)} of the error, each drive in units of its noise. '
+            f'With it the error {change(found.error_before, found.error_after, unit)}. '
             f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
@@ -335,7 +338,7 @@ def _bound(found: FoundEffect) -> list[str]:
     if not found.at_bound:
         return []
     return [f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of what '
-            'was tried: not to be trusted.']
+            'was tried: no finding but that it is there or beyond.']
 
 
 def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:

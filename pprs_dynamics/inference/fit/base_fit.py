@@ -16,6 +16,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.arm_columns import columns_of
 from pprs_dynamics.inference.fit.arm_fit import ArmFit, fit_arm
 from pprs_dynamics.inference.fit.open_numbers import fit_open_numbers
+from pprs_dynamics.inference.regression.sensitivities import known_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -99,6 +100,7 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
     PprsError
         As `measure_residuals`.
     """
+    require_open_numbers(model)
     report = progress or (lambda share: None)
     fitted, numbers, told = _fitted(model, recordings)
     report(0.4)
@@ -114,6 +116,13 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
     report(0.9)
     return BaseFit(fitted, numbers, told, errors_of(model, recordings),
                    errors_of(fitted, recordings), held_out, on)
+
+
+def require_open_numbers(model: ForceModel) -> None:
+    """Raise FitError where a model has nothing that a fit may move."""
+    if not isinstance(model, ArmModel) and not known_numbers(model):
+        raise FitError('tolerances: the model gives none, must name the numbers that are to be '
+                       'fitted, e.g. masses.payload: 0.05')
 
 
 def halves(recording: Recording) -> list[Recording]:
@@ -151,9 +160,6 @@ def _fitted(model: ForceModel, recordings: Sequence[Recording],
     if isinstance(model, ArmModel):
         fit = fit_arm(model, columns_of(model, recordings))
         return fit.model, _numbers(model, fit), _told(model, fit)
-    if not any(key.startswith('tolerances.') and value for key, value in model.values.items()):
-        raise FitError('tolerances: the model gives none, must name the numbers that are to be '
-                       'fitted, e.g. masses.payload: 0.05')
     after, calibrated = fit_open_numbers(model, recordings)
     return after, tuple(FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
                         for one in calibrated), ()

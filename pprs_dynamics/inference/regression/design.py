@@ -19,6 +19,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.signal import correlate
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
@@ -61,6 +62,7 @@ from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
+LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 FREE = 1e-6  # prior precision of what is not known beforehand
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
@@ -215,7 +217,7 @@ class Design:
         return DriveRange(float(longest.time[-1] - longest.time[0]),
                           float(np.median(np.diff(longest.time))),
                           float(np.ptp(position)), float(np.abs(velocity).max()),
-                          self.given.gear_ratios[drive])
+                          self.given.gear_ratios[drive], _delay(longest, drive))
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive: it may act, and is not there."""
@@ -339,6 +341,27 @@ def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
     """Return the effects on drives that the given model may lack."""
     return [effect for effect in catalogue().values() if issubclass(effect, DriveEffect)
             and any(design.acts_on(effect, d) for d in range(len(design.drives)))]
+
+
+def _delay(recording: FullRate, drive: int) -> float:
+    """Return by how much the measured effort is most like the model's if that is late [s].
+
+    By the cross-correlation over the longest segment, within `LONGEST_DELAY`.
+    """
+    part = max(recording.segments, key=lambda one: one.stop - one.start)
+    time = recording.time[part]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    even = np.arange(time[0], time[-1], step) if step else np.zeros(0)
+    most = min(int(LONGEST_DELAY / step), len(even) // 4) if step else 0
+    measured = recording.effort_measured[part, drive]
+    known = np.isfinite(measured)
+    if not most or not np.any(known):
+        return 0.0
+    model, seen = (np.interp(even, t, values) for t, values in (
+        (time, recording.effort[part, drive]), (time[known], measured[known])))
+    alike = correlate(seen - seen.mean(), model - model.mean(), 'same', 'fft')
+    near = alike[len(even) // 2 - most:len(even) // 2 + most + 1]
+    return float((np.argmax(near) - most) * step)
 
 
 def _rows(column: Array) -> dict[int, Array]:

@@ -68,7 +68,7 @@ def known_numbers(model: ForceModel) -> tuple[Number, ...]:
     found = []
     for name, tolerance in model.values.items():
         key = name.removeprefix('tolerances.')
-        if key == name or not tolerance:
+        if key not in model.keys or key == name or not tolerance:
             continue
         value = model.values[key]
         elements = enumerate(value) if isinstance(value, tuple) else [(None, value)]

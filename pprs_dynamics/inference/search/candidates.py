@@ -50,6 +50,11 @@ class Component:
         """Return an effect on a drive or in the structure, of one shape."""
         return cls(effect, drive, names, tuple(sorted(shape.items())))
 
+    def is_within(self, coefficients: Array) -> bool:
+        """Return whether all linear parameters are within the bounds of the catalogue."""
+        values = self.values(coefficients)
+        return all(p.lower <= values[p.name] <= p.upper for p in self.effect.linear)
+
     @property
     def parameters(self) -> dict[str, float]:
         """Of the shape."""
@@ -195,7 +200,8 @@ class CandidateSet:
     doubtful : mapping of Component to tuple of Block
         Columns for what the components leave open, fitted with them.
     is_admissible : bool
-        False where a pattern may be the lack of fit of the effects beside it.
+        False where a body cannot be, a value is beyond its bounds, or a pattern may be the lack
+        of fit of the effects beside it.
     """
 
     candidates: tuple[Candidate, ...]
@@ -275,8 +281,13 @@ class Prices:
         return 2 * log(self.names) - 2 * log(self.decisions.effect_odds)
 
     def of_drives(self, count: int) -> float:
-        """Return the price of a choice of drives: how many, and which."""
-        return 2 * log(self.drives) + 2 * log(comb(self.drives, count))
+        """Return the price of a choice of drives: all, one or some; how many, and which.
+
+        One cause is in one drive or in all of them; to be in five of seven takes five.
+        """
+        D = self.drives
+        some = max(D - 2, 1) if 1 < count < D else 1
+        return 2 * log(min(D, 3)) + 2 * log(some) + 2 * log(comb(D, count))
 
     def of_candidate(self, candidate: Candidate, tried: Callable[[Component], int]) -> float:
         """Return the price of what was chosen: hypotheses, drives, variants and shapes.

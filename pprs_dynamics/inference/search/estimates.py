@@ -17,7 +17,6 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.reversal_widths import place_of
 from pprs_dynamics.inference.search.search import Search
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_AVERAGED = 4  # further sets that estimates are averaged over
@@ -67,7 +66,7 @@ class Estimates:
     parameters : dict of str to Estimate
         By drive.parameter, or parameter.
     at_bound : tuple of str
-        Those at a bound of the catalogue, or at the edge of the shapes that were tried.
+        Those at the edge of the shapes that were tried.
     """
 
     parameters: dict[str, Estimate]
@@ -139,7 +138,7 @@ def _of_component(search: Search, component: Component, c: Array, covariance: Ar
     unit_of = _units(search.design, component.drive)
     values = component.values(c)
     size = len(c)
-    found, bound = {}, []
+    found = {}
     # From coefficients to parameters: the map is smooth but for angles, which it may wrap.
     here = {name.rpartition('.')[0] for name in component.names}
     for parameter in effect.linear:
@@ -155,20 +154,14 @@ def _of_component(search: Search, component: Component, c: Array, covariance: Ar
         found[prefix + parameter.name] = Estimate(
             within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
             unit_of(parameter.unit))
-        if not parameter.lower <= values[parameter.name] <= parameter.upper:
-            bound.append(prefix + parameter.name)
     for k, parameter in enumerate(effect.shape):
         value = float(shape[parameter.name])
         amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
         found[prefix + parameter.name] = Estimate(
             within(parameter, value), parameter.spread(amount, value),
             unit_of(parameter.unit))
-        trials = sorted({trial[parameter.name] for trial in _trials(search, component)})
-        edge = search.decisions.edge_share
-        if len(trials) > 2 and not (trials[0] + edge * abs(trials[0]) < value
-                                    < trials[-1] - edge * abs(trials[-1])):
-            bound.append(prefix + parameter.name)
-    return found, bound
+    return found, [prefix + name for name in search.library.at_edge(
+        component, search.decisions.edge_share)]
 
 
 def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
@@ -177,13 +170,6 @@ def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
         return lambda unit: unit
     name = drive if isinstance(drive, str) else design.drives[drive]
     return design.residuals.units_of(name).of
-
-
-def _trials(search: Search, component: Component) -> Sequence[Mapping[str, float]]:
-    effect, d = component.effect, component.drive
-    if d is None or not issubclass(effect, DriveEffect):
-        return ()
-    return effect.trials(search.design.covered[d])
 
 
 def estimate_present(search: Search, found: CandidateSet, fitted: ForceModel, name: str,

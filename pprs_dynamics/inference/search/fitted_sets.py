@@ -28,6 +28,8 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.library import Library
+from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
+from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
@@ -90,7 +92,12 @@ class FittedSets:
             self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, doubtful), start)
         found = self._set(candidates, fit, doubtful)
-        return replace(found, is_admissible=self._is_admissible(found))
+        bodies = {one: block for one, block in found.blocks.items()
+                  if issubclass(one.effect, AddedBody)}
+        possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
+        if possible is not fit:
+            found = self._set(candidates, possible or fit, doubtful)
+        return replace(found, is_admissible=possible is not None and self._is_admissible(found))
 
     def blocks(self, candidates: Candidates, doubtful: Doubtful = MappingProxyType({}),
                ) -> list[Block]:
@@ -106,7 +113,13 @@ class FittedSets:
         return replace(found, total=fit.deviance + self.price(found))
 
     def _is_admissible(self, found: CandidateSet) -> bool:
-        """Return whether every pattern is more than the lack of fit of the effects beside it."""
+        """Return whether every value may be, and every pattern is one.
+
+        A value beyond its bounds may not; a pattern has to be more than the lack of fit of the
+        effects beside it.
+        """
+        if not all(one.is_within(found.coefficients(one)) for one in found.blocks):
+            return False
         return all(share_of_allowance(self.design, self.regression, self.decisions, found,
                                       candidate)[0] >= 1 for candidate in found.unknowns)
 

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +16,7 @@ from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.open_form import open_rows
+from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
@@ -97,6 +99,7 @@ class Library:
         self._terms: dict[Hashable, Term] = {}
         self._blocks: dict[Component, Block] = {}
         self._open: dict[Component, Array | None] = {}
+        self._ranges: dict[Hashable, Mapping[str, tuple[float, float, int]]] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
         felt = [effect for effect in searched_in_drives(design) if _is_felt_everywhere(effect)]
         self.spanning = [Component.of(effect, d, {}, names)
@@ -141,9 +144,45 @@ class Library:
     def block(self, component: Component) -> Block:
         """Return the columns of a component, transformed, with their prior."""
         if component not in self._blocks:
-            self._blocks[component] = self.regression.term_block(
-                self.term(component), component.names)
+            block = self.regression.term_block(self.term(component), component.names)
+            self._blocks[component] = replace(
+                block, precision=block.precision + self._expected(component))
         return self._blocks[component]
+
+    def _expected(self, component: Component) -> Array:
+        """Return the precision of coefficients that are usually small, (k, k)."""
+        precision = np.zeros(max(len(component.names), 1))
+        given = self.design.given
+        known = {c.name: c for c in component.effect.coefficients}
+        for k, name in enumerate(component.names):
+            expected = known[name].expected
+            if component.drive is not None and expected is not None:
+                limit = given.values.get(f'tolerances.{component.effect.name}.{name}')
+                usual = expected[given.units[component.drive].turns]
+                precision[k] = (limit / DEVIATIONS if limit else usual) ** -2
+        return np.diag(precision)
+
+    def at_edge(self, component: Component, share: float) -> list[str]:
+        """Return the shape parameters at the edge of what is tried, `share` of it or nearer."""
+        found = []
+        for name, value in component.shape:
+            lowest, highest, count = self._tried_shapes(component)[name]
+            if count > 2 and not (lowest + share * abs(lowest) < value
+                                  < highest - share * abs(highest)):
+                found.append(name)
+        return found
+
+    def _tried_shapes(self, component: Component) -> Mapping[str, tuple[float, float, int]]:
+        """Return the lowest, the highest and the number of values of each shape parameter."""
+        effect, d = component.effect, component.drive
+        if (effect, d) not in self._ranges:
+            assert d is not None
+            assert issubclass(effect, DriveEffect)
+            trials = effect.trials(self.design.covered[d])
+            values = {p.name: {trial[p.name] for trial in trials} for p in effect.shape}
+            self._ranges[effect, d] = {name: (min(some), max(some), len(some))
+                                       for name, some in values.items()}
+        return self._ranges[effect, d]
 
     def unloaded(self, component: Component) -> dict[int, Array] | None:
         """Return what its columns change by if friction did not follow its loads, (k, n)."""
@@ -177,8 +216,22 @@ class Library:
                 self.local[component.drive].trials.get(component.effect.name, 1))
 
     def price(self, candidate: Candidate) -> float:
-        """Return the price of everything that was chosen."""
-        return self.prices.of_candidate(candidate, self.tried)
+        """Return the price of everything that was chosen.
+
+        That an effect is usually small makes large values unlikely, and small ones no likelier.
+        """
+        price = self.prices.of_candidate(candidate, self.tried)
+        if isinstance(candidate, UnknownCandidate):
+            return price
+        return price + sum(self._narrowed(one) for one in candidate.components)
+
+    def _narrowed(self, component: Component) -> float:
+        """Return by how much what is usual narrows the prior of a component, in deviance."""
+        usual = self._expected(component)
+        if not np.any(usual):
+            return 0.0
+        both = self.block(component).precision
+        return float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
 
     def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
         """Return what a candidate of a set contributes, in the shape (M, D) [N]."""

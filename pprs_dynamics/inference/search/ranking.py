@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -63,7 +64,7 @@ class Ranking:
     without : mapping of Candidate to CandidateSet
         The kept set without each of its candidates.
     order : tuple of EffectCandidate
-        Those of the kept set, first the one without which the error would be largest.
+        Those of the kept set, each the one that lowers most what those before it leave.
     path : tuple of CandidateSet
         From the patterns of the kept set to all of it, an effect more in each in that order.
     """
@@ -83,16 +84,31 @@ class Ranking:
     def of(cls, first: Search, last: Search, best: CandidateSet) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
         best, kept, remainders = without_remainders(last, best)
+        return cls._keeping(first, last, best, kept, remainders)
 
-        def less(gone: Candidate) -> CandidateSet:
-            return last.evaluate(tuple(c for c in kept.candidates if c is not gone))
-        without = {candidate: less(candidate) for candidate in kept.candidates}
-        # First what lowers the error most, as a multiple of each drive's noise: drives may be of
-        # different sizes and units.
-        ordered = sorted(kept.effects, key=lambda c: -_over_noise(last, best, without[c]))
-        path = [last.evaluate((*ordered[:k], *kept.unknowns)) for k in range(len(ordered))]
+    @classmethod
+    def _keeping(cls, first: Search, last: Search, best: CandidateSet, kept: CandidateSet,
+                 remainders: tuple[Remainder, ...]) -> Ranking:
+        without = {gone: last.evaluate(tuple(c for c in kept.candidates if c is not gone))
+                   for gone in kept.candidates}
+        order, path = _falling(last, best, kept)
         return cls(first, last, _by_cost(first.sets), _by_cost(last.sets), best, kept, remainders,
-                   MappingProxyType(without), tuple(ordered), (*path, kept))
+                   MappingProxyType(without), order, path)
+
+    def less(self, gone: EffectCandidate) -> Ranking:
+        """Return the ranking without one of the kept effects, and what paid only beside it."""
+        return self._keeping(self.first, self.last, self.best,
+                             self.last.pruned(self.without[gone]), self.remainders)
+
+    @cached_property
+    def shares(self) -> tuple[float, ...]:
+        """Return the part of the error that each effect of `order` takes away.
+
+        Of its root mean square over drives, each as a multiple of its noise, with nothing added.
+        """
+        errors = [_over_noise(self.last, self.best, step) for step in self.path]
+        return tuple((before - after) / errors[0]
+                     for before, after in pairwise(errors)) if errors[0] > 0 else ()
 
     @cached_property
     def sets(self) -> tuple[CandidateSet, ...]:
@@ -105,7 +121,8 @@ class Ranking:
         if self.first is not self.last:
             found = [one for one in self.of_last if _is_bent(one)] + [
                 one for one in self.of_first if not _is_bent(one)]
-        return (self.best, *_by_cost([one for one in found if one is not self.best]))
+        return (self.best, *_by_cost([one for one in found
+                                      if one is not self.best and one.is_admissible]))
 
     @property
     def nothing(self) -> CandidateSet:
@@ -117,7 +134,7 @@ class Ranking:
         """The best set of each effect that was fitted as the only one, by its name."""
         found: dict[str, CandidateSet] = {}
         for one in self.of_first:
-            if len(one.candidates) == 1 and one.effects:
+            if len(one.candidates) == 1 and one.effects and one.is_admissible:
                 found.setdefault(one.effects[0].name, one)
         return found
 
@@ -213,6 +230,25 @@ def _is_bent(found: CandidateSet) -> bool:
 
 def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:
     return tuple(sorted(sets, key=lambda one: one.cost))
+
+
+def _falling(search: Search, best: CandidateSet, kept: CandidateSet,
+             ) -> tuple[tuple[EffectCandidate, ...], tuple[CandidateSet, ...]]:
+    """Return the effects of a set, what lowers the error most first, and the sets on the way.
+
+    As a multiple of each drive's noise, since drives may be of different sizes and units.
+    """
+    order: list[EffectCandidate] = []
+    path = [search.evaluate(kept.unknowns)]
+    left = list(kept.effects)
+    while left:
+        with_each = {one: kept if len(left) == 1 else search.evaluate(
+            (*order, one, *kept.unknowns)) for one in left}
+        following = min(left, key=lambda one: _over_noise(search, best, with_each[one]))
+        order.append(following)
+        path.append(with_each[following])
+        left.remove(following)
+    return tuple(order), tuple(path)
 
 
 def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:

@@ -53,6 +53,8 @@ class DriveRange:
         [m/s]
     gear_ratio : float
         Turns of the motor per turn of the drive; 1 where no gear is known.
+    delay : float
+        By which the measured effort is most like the model's [s].
     """
 
     duration: float
@@ -60,6 +62,7 @@ class DriveRange:
     stroke: float
     top_speed: float
     gear_ratio: float = 1.0
+    delay: float = 0.0
 
 
 class DriveEffect(CatalogueEffect):

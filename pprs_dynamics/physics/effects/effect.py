@@ -34,6 +34,9 @@ class Parameter:
         A size at which it matters, for numerical derivatives.
     is_angle : bool
         True for a phase: its size says nothing about how strong the effect is.
+    expected : (float, float), optional
+        How large it usually is, as a standard deviation, in a drive that pushes and in one that
+        turns; without it any size is as likely as another.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Parameter:
     default: float | None = None
     scale: float = 1.0
     is_angle: bool = False
+    expected: tuple[float, float] | None = None
 
     @property
     def is_relative(self) -> bool:

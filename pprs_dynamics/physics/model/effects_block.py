@@ -77,16 +77,28 @@ def _effects_of_sensors(parameters: Mapping[str, Any]) -> list[str]:
 
 
 def check_tolerances(parameters: Mapping[str, Any], keys: Mapping[str, Key]) -> None:
-    """Raise ModelError for a tolerance that is none, or of nothing that has one."""
+    """Raise ModelError for a tolerance that is none, or of nothing that has one.
+
+    Numbers of the model have one, in proportion to them; and what is usually small where a file
+    says nothing, such as the error of a zero, in its unit.
+    """
     for name, value in parameters.items():
         target = name.removeprefix('tolerances.')
         if target == name:
             continue
-        if target not in keys or not keys[target].is_number:
+        if (target not in keys or not keys[target].is_number) and _expected(target) is None:
             raise UnknownNameError('key', name, [f'tolerances.{key}' for key in keys
                                                  if keys[key].is_number])
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= 1:
             raise ModelError(name, value, 'be a relative tolerance between 0 and 1')
+
+
+def _expected(target: str) -> tuple[float, float] | None:
+    """Return how large `effect.parameter` usually is, None for what has no usual size."""
+    name, _, last = target.partition('.')
+    effect = find_effect(name) if last else None
+    return next((p.expected for p in effect.parameters if p.name == last),
+                None) if effect is not None and hasattr(effect, 'parameters') else None
 
 
 def _nested(root: str, flat: Mapping[str, Any]) -> dict[str, Any]:

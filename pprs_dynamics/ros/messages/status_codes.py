@@ -15,6 +15,7 @@ RejectionCode = Literal['EMPTY', 'NAMES', 'FRAME', 'SIZE', 'NON_FINITE', 'QUATER
 # of the trajectory proxy.
 Condition = Literal['OK', 'WAITING', 'CLOCK',
                     'DONE', 'STALE', 'CLAMPED', 'LAG', 'NEAR_SINGULAR', 'NEAR_WORKSPACE',
+                    'CURVE',
                     'UNCONFIGURED', 'INACTIVE', 'FINALIZED',
                     'HOLD', 'LATE', 'REFUSED', 'SATURATED', 'STOPPED',
                     'CHANGED',

@@ -10,6 +10,7 @@ J.-P. Merlet, Parallel Robots, 2nd ed., 2006, chapter on calibration.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -28,8 +29,9 @@ class HomingError(MeasurementEffect):
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = True
+    # A homing switch or a mark is good for a millimetre or a degree.
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
-                        scale=0.001),)
+                        scale=0.001, expected=(0.001, math.radians(1.0))),)
     card = Card(
         'measured position = q + z',
         'a slowly changing error on several drives at once, largest where the rods lean most: '

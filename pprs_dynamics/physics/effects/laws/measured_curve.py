@@ -135,6 +135,18 @@ class MeasuredCurve(DriveEffect):
                 variable_of(state, drive, curve.variable))
         return force
 
+    def left(self, state: DriveStates) -> str | None:
+        """Return which measured range a state leaves, as a sentence, or None."""
+        for drive, curve in self.curves.items():
+            x = variable_of(state, drive, curve.variable)
+            outside = curve.outside(x)
+            if np.any(outside):
+                value = float(x[int(np.argmax(outside))])
+                return (f'{drive}: {curve.variable} {value:.4g} is outside of '
+                        f'{curve.start:.4g} to {curve.end:.4g}, where its curve was measured: '
+                        'the curve goes on with its last value')
+        return None
+
     @classmethod
     def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
         """Build the effect from `{drive: {variable, from, to, values, periodic}}`."""

@@ -20,7 +20,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 
-LONGEST, STEP = 0.03, 0.002  # [s], tried; filters and buses of drives delay by less
+# [s], always tried: filters and buses of drives delay by less. Longer delays (a logger of another
+# topic) are tried within `AROUND` of that with which the efforts are most alike.
+LONGEST, STEP, AROUND = 0.03, 0.002, 0.02
 # Where the effort changes fast a delay of twice the true one fits worse than none.
 SHORT = (STEP / 8, STEP / 4, STEP / 2)
 
@@ -47,9 +49,17 @@ class TimeDelay(MeasurementEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return delays from -30 to 30 ms in steps of 2 ms, shorter ones in fractions of it."""
+        """Return delays from -30 to 30 ms in steps of 2 ms, shorter ones in fractions of it.
+
+        And those around a longer one that the recording shows at once.
+        """
         late = [*SHORT, *np.arange(STEP, LONGEST + 1e-9, STEP)]
-        return [{'delay': float(d)} for d in (*(-delay for delay in reversed(late)), *late)]
+        delays = {round(float(d), 9) for d in (*(-delay for delay in late), *late)}
+        if abs(covered.delay) > LONGEST - AROUND:
+            near = STEP * np.round(covered.delay / STEP) + np.arange(
+                -AROUND, AROUND + 1e-9, STEP)
+            delays |= {round(float(d), 9) for d in near} - {0.0}
+        return [{'delay': d} for d in sorted(delays)]
 
     @classmethod
     def drive_memory(cls) -> Any:

@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Fits in which bodies that are added or taken away, and what is left, are bodies that can be.
+
+A fit by least squares knows masses, moments and inertias as numbers, and noise makes impossible
+bodies of them. Where it does, the possible body nearest in the metric of the fit takes its place,
+everything else is fitted anew beside it, and the deviance rises by what that costs.
+
+References
+----------
+P. M. Wensing, S. Kim, J.-J. E. Slotine, Linear matrix inequalities for physically consistent
+inertial parameter identification, IEEE Robotics and Automation Letters 3 (2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import NonlinearConstraint, minimize
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.candidates import Component
+from pprs_dynamics.physics.effects.added_body import AXES, KEPT, MOMENTS, AddedBody
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from pprs_dynamics.physics.model.force_model import ForceModel
+
+MARGIN = 1e-6  # of a body's size, by which it is possible: values are rounded
+THIN = 1e-6  # of a body's largest second moment, which its least is taken to have
+MOST_STEPS, MOST_HALVINGS = 40, 20
+RADIUS, LEAST_MASS = 0.02, 1e-6  # [m, kg], of a small ball, and of a body that is any
+DOUBTED = 2.0  # deviations, within which it may be added or taken away
+POINT = {'mass', *(f'moment_{axis}' for axis in AXES)}  # what makes a body without extent
+
+
+def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFit,
+                         bodies: dict[Component, Block]) -> JointFit | None:
+    """Return a fit whose bodies can be; None where none can.
+
+    Parameters
+    ----------
+    model : ForceModel
+        As given.
+    regression : Regression
+    fit : JointFit
+    bodies : dict of Component to Block
+        Columns of the components of the fit that add a body.
+    """
+    for component, block in bodies.items():
+        place = fit.places[block]
+        found = nearest_possible(robot_of(model), component, fit.of(block),
+                                 fit.covariance[place, place])
+        if found is None:
+            return None
+        if not np.array_equal(found, fit.of(block)):
+            fit = held(regression, fit, block, found)
+    return fit
+
+
+def robot_of(model: ForceModel) -> Mechanism:
+    """Return the mechanism of a model with the bodies that its effects add."""
+    robot = model.robot  # type: ignore[attr-defined]
+    for effect in model.effects:
+        if isinstance(effect, BodyEffect):
+            robot = effect.changed(robot)
+    assert isinstance(robot, Mechanism)
+    return robot
+
+
+def nearest_possible(robot: Mechanism, component: Component, c: Array, covariance: Array,
+                     ) -> Array | None:
+    """Return the coefficients nearest to some with which all bodies can be; None for none.
+
+    Parameters
+    ----------
+    robot : Mechanism
+        To which a body is added.
+    component : Component
+        Of an `AddedBody`.
+    c : (k,) array
+    covariance : (k, k) array
+        Of their fit, which says what is near.
+    """
+    sign = 1.0 if c[0] >= 0 else -1.0
+    found = _nearest(robot, component, c, covariance, sign)
+    if found is c or abs(c[0]) > DOUBTED * covariance[0, 0] ** 0.5:
+        return found
+    other = _nearest(robot, component, c, covariance, -sign)
+    known = [one for one in (found, other) if one is not None]
+    return min(known, key=lambda one: float(
+        (one - c) @ np.linalg.solve(covariance, one - c)), default=None)
+
+
+def _nearest(robot: Mechanism, component: Component, c: Array, covariance: Array, sign: float,
+             ) -> Array | None:
+    """Return the same for a body that is added (1), or taken away (-1)."""
+    margins = _margins(robot, component, sign)
+    if np.all(margins(c) >= 0):
+        return c
+    root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
+    # From a small ball of about the fitted weight, as heavy as may be.
+    ball = [name.rpartition('.')[2] in MOMENTS for name in component.names]
+    start = np.where(ball, RADIUS ** 2, 0.0)
+    start[0] = 1.0
+    start *= sign * max(abs(c[0]), float(root[0, 0]))
+    for _ in range(MOST_HALVINGS):
+        if np.all(margins(start) >= 0):
+            break
+        start /= 2
+    else:
+        return None
+
+    def distance(u: Array) -> float:
+        return float(u @ u)
+
+    u = minimize(distance, np.linalg.solve(root, start - c), method='SLSQP',
+                 constraints=NonlinearConstraint(lambda u: margins(c + root @ u), 0.0, np.inf),
+                 options={'maxiter': MOST_STEPS}).x
+    found: Array = c + root @ u
+    # What rounding leaves outside is brought back towards the ball.
+    for share in (0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 1.0):
+        within: Array = found + share * (start - found)
+        if np.all(margins(within) >= -MARGIN / 2):
+            return within
+    return None
+
+
+def _margins(robot: Mechanism, component: Component, sign: float) -> Callable[[Array], Array]:
+    """Return what tells by how much bodies can be: at least 0 where they can, of order 1."""
+    kind = component.effect
+    assert issubclass(kind, AddedBody)
+    names = [name.rpartition('.') for name in component.names]
+    prefix, has_extent = ''.join(names[0][:2]), not {last for _, _, last in names} <= POINT
+    link, centre = next((link, np.array(centre)) for before, link, centre, _ in kind.places
+                        if before == prefix)
+    row, frame = robot.structure.links[link]
+    values, axes = np.linalg.eigh(pseudo_inertia(robot.by_joint[row]))
+    scaled = axes / np.sqrt(np.maximum(values, THIN * values[-1]))
+    order = [name for _, _, name in names]
+    tensor = [order.index(name) if name in order else -1
+              for name in ('xx', 'xy', 'xz', 'xy', 'yy', 'yz', 'xz', 'yz', 'zz')]
+
+    def margins(c: Array) -> Array:
+        padded = np.append(c, 0.0)
+        mass = c[0] if sign * c[0] > 0 else sign * LEAST_MASS  # else it is infinitely far away
+        away = c[1:4] / mass if len(c) > 1 else np.zeros(3)
+        inertia = padded[tensor].reshape(3, 3)
+        found = [np.array([sign * c[0] / LEAST_MASS - 1,
+                           1 - float(np.linalg.norm(away)) / robot.structure.size])]
+        if has_extent:
+            about = sign * (np.trace(inertia) / 2 * np.eye(3) - inertia)
+            extent = np.asarray(np.linalg.eigvalsh(about), dtype=float)
+            found.append(extent / max(float(np.abs(extent).sum()), 1e-12) - MARGIN)
+        if sign < 0:
+            # What is left keeps a share of the body in every direction.
+            body = inertial_in(frame, body_at(mass, tuple(centre + away), inertia))
+            taken = scaled.T @ pseudo_inertia(body) @ scaled
+            found.append(np.asarray(np.linalg.eigvalsh(taken), dtype=float) + 1 - KEPT)
+        return np.concatenate(found)
+    return margins
+
+
+def held(regression: Regression, fit: JointFit, block: Block, values: Array) -> JointFit:
+    """Return a fit with a block's coefficients as given, the others fitted beside them."""
+    place = fit.places[block]
+    away = values - fit.of(block)
+    pull = np.linalg.solve(fit.covariance[place, place], away)
+    coefficients = fit.coefficients + fit.covariance[:, place] @ pull
+    squares = fit.squares.copy()
+    for k, d in enumerate(regression.drives):
+        index, felt = regression.local(fit, d)
+        squares[k] = regression.equations(d, tuple(felt)).left(coefficients[index])
+    return replace(fit, coefficients=coefficients, squares=squares,
+                   deviance=fit.deviance + float(away @ pull))
