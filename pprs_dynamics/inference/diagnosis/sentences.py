@@ -180,7 +180,7 @@ def _doubt(diagnosis: Diagnosis) -> str:
     """Return what was fitted and does not hold, a sentence for each."""
     told = []
     for one in diagnosis.unconfirmed:
-        title = with_drives(one.name, one.drives, diagnosis.residuals.drives)
+        title = _title(diagnosis, one)
         on, before, after = (
             'the error', one.error_before, one.error_after) if (
             one.error_after >= one.error_before) else (
