@@ -106,8 +106,9 @@ def cells_of(path: str | PathLike[str], number: int, line: str, separator: str =
     try:
         # A second line that is swallowed shows that a quote was left open.
         cells, *following = csv.reader([f'{line}\n', 'following'], delimiter=separator)
-    except csv.Error as error:
-        raise UnreadableFileError(path, f'row {number} is no row of a table: {error}') from None
+    except csv.Error:
+        raise UnreadableFileError(path, f'row {number} has a cell of more than '
+                                  f'{csv.field_size_limit()} characters: not a table') from None
     if not following:
         raise UnreadableFileError(
             path, f'row {number} has a quote (") without its pair, so where the row ends cannot '

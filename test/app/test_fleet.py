@@ -322,6 +322,9 @@ def test_a_torn_part_is_done_again(damage: Callable[[bytes], bytes], client,
     part = next(Path(store.path).rglob(f'*{DONE}'))
     whole = store.read(('recording', 'value')).to_pylist()
     part.write_bytes(damage(part.read_bytes()))
+    if part.stat().st_size < 500:  # the bytes of a page are seen once it is read
+        with pytest.raises(UnreadableFileError, match='damaged; pprs survey on the same'):
+            store.read(('recording', 'value'))
     assert len([one for one in run_survey(client, [job(path)], store) if one]) == 1
     assert store.read(('recording', 'value')).to_pylist() == whole
     assert list(run_survey(client, [job(path)], store)) == [None]

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -252,3 +253,16 @@ def test_every_number_has_bounds_and_a_sentence(
             assert f'argument {option}: ' in last
             assert ' must ' in last
             assert len(last) < 200
+
+
+@pytest.mark.parametrize('place', [('info', '{}.csv'), ('info', 'a.csv', '--model', '{}.yaml'),
+                                   ('simulate', '--output', '{}.csv'), ('info', '--topic={}')])
+def test_a_name_that_would_fill_the_screen_is_shortened(
+    place: tuple[str, ...], capsys: pytest.CaptureFixture[str],
+) -> None:
+    from pprs_dynamics.app.commands.pprs import main
+
+    with contextlib.suppress(SystemExit):
+        assert main([part.format('a' * 5000) for part in place]) == 2
+    said = capsys.readouterr().err
+    assert 0 < len(said) < 900

@@ -36,6 +36,8 @@ from pprs_dynamics.system.threads import use_one_thread
 # Each a module of this folder with a docstring, add_arguments and run.
 COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
+# Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
+LONGEST_SENTENCE = 800
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -92,7 +94,14 @@ def _ended(given: Sequence[str]) -> int:
 
 def _say(sentence: str, given: Sequence[str]) -> None:
     command = next((f' {word}' for word in given if word in COMMANDS), '')
-    print(f'pprs{command}: {sentence}', file=sys.stderr)
+    print(f'pprs{command}: {_short(sentence)}', file=sys.stderr)
+
+
+def _short(sentence: str) -> str:
+    """Return a sentence without the middle of a name or value that would fill the screen."""
+    if len(sentence) <= LONGEST_SENTENCE:
+        return sentence
+    return f'{sentence[:LONGEST_SENTENCE // 2]}…{sentence[-LONGEST_SENTENCE // 2:]}'
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
@@ -105,7 +114,7 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
-        self.exit(2, f'{self.prog}: {message}\n')
+        self.exit(2, f'{self.prog}: {_short(message)}\n')
 
     def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
         """Return the value of an argument; of `--model=--` argparse itself makes an empty list."""

@@ -190,4 +190,6 @@ class Store:
                 raise UnreadableFileError(self.path, 'there is no store of pprs survey')
             return data.to_table(columns=list(columns) if columns else None, filter=filters)
         except (pa.ArrowInvalid, pa.ArrowTypeError) as error:
-            raise UnreadableFileError(self.path, str(error).splitlines()[0]) from None
+            raise UnreadableFileError(
+                self.path, 'a part of the store is damaged; pprs survey on the same recordings '
+                f'makes it anew: {str(error).splitlines()[0]}') from None
