@@ -8,13 +8,13 @@
 """
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
-from launch.actions import DeclareLaunchArgument, LogInfo
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import Command, LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -23,16 +23,22 @@ def generate_launch_description() -> LaunchDescription:
         'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
                   'model file, with a path'),
         'joint_states': ('joint_states', 'topic of the measurements'),
-        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1'),
+        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
+                   'the model file'),
     }
     given = {name: LaunchConfiguration(name) for name in ('urdf', *arguments)}
+
+    def monitor(context: LaunchContext) -> list[Node]:
+        own = {'joint_prefix': given['prefix']} if given['prefix'].perform(context) else {}
+        return [Node(package='pprs_dynamics', executable='monitor', output='screen',
+                     parameters=[given['model'], own],
+                     remappings=[('joint_states', given['joint_states'])])]
+
     actions = [
         DeclareLaunchArgument('urdf', description='file that pprs export has written'),
         *(DeclareLaunchArgument(name, default_value=value, description=text)
           for name, (value, text) in arguments.items()),
-        Node(package='pprs_dynamics', executable='monitor', output='screen',
-             parameters=[given['model'], {'joint_prefix': given['prefix']}],
-             remappings=[('joint_states', given['joint_states'])])]
+        OpaqueFunction(function=monitor)]
     try:
         get_package_prefix('robot_state_publisher')
     except PackageNotFoundError:

@@ -6,13 +6,13 @@
     ros2 launch pprs_dynamics feedforward.launch.py controller:=joint_trajectory_controller
 """
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.substitutions import FindPackageShare
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -21,23 +21,29 @@ def generate_launch_description() -> LaunchDescription:
         'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
                   'model file, with a path'),
         'namespace': ('', 'of the nodes'),
-        'prefix': ('', 'of the joints: joint_states and controllers say PREFIXslide_1'),
+        'prefix': ('', 'of the joints: joint_states and controllers say PREFIXslide_1; empty: '
+                   'joint_prefix of the model file'),
         'controller': ('forward_command_controller', 'that gets ~/commands and ~/joint_trajectory'),
         'monitor': ('true', 'compare joint_states with the model, too'),
         'joint_states': ('joint_states', 'topic of the measurements'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
-    parameters = [given['model'], {'joint_prefix': given['prefix'],
-                                   'use_sim_time': given['use_sim_time']}]
+
+    def nodes(context: LaunchContext) -> list[Node]:
+        own = {'use_sim_time': given['use_sim_time']}
+        if given['prefix'].perform(context):
+            own['joint_prefix'] = given['prefix']
+        parameters = [given['model'], own]
+        return [
+            Node(package='pprs_dynamics', executable='feedforward', namespace=given['namespace'],
+                 parameters=parameters, output='screen', remappings=[
+                     ('~/commands', [given['controller'], '/commands']),
+                     ('~/joint_trajectory', [given['controller'], '/joint_trajectory'])]),
+            Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
+                 parameters=parameters, output='screen', condition=IfCondition(given['monitor']),
+                 remappings=[('joint_states', given['joint_states'])])]
+
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=value, description=text)
-          for name, (value, text) in arguments.items()),
-        Node(package='pprs_dynamics', executable='feedforward', namespace=given['namespace'],
-             parameters=parameters, output='screen', remappings=[
-                 ('~/commands', [given['controller'], '/commands']),
-                 ('~/joint_trajectory', [given['controller'], '/joint_trajectory'])]),
-        Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
-             parameters=parameters, output='screen', condition=IfCondition(given['monitor']),
-             remappings=[('joint_states', given['joint_states'])]),
-    ])
+          for name, (value, text) in arguments.items()), OpaqueFunction(function=nodes)])

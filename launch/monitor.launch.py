@@ -6,13 +6,13 @@
     ros2 launch pprs_dynamics monitor.launch.py model:=/path/robot.yaml diagnose_every:=60.0
 """
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -21,18 +21,25 @@ def generate_launch_description() -> LaunchDescription:
         'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
                   'model file, with a path'),
         'namespace': ('', 'of the node'),
-        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1'),
+        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
+                   'the model file'),
         'joint_states': ('joint_states', 'topic of the measurements'),
-        'diagnose_every': ('0.0', 'seconds between diagnoses of the stream; 0: never'),
+        'diagnose_every': ('', 'seconds between diagnoses of the stream, 0: never; empty: as in '
+                           'the model file'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
+
+    def nodes(context: LaunchContext) -> list[Node]:
+        own = {'use_sim_time': given['use_sim_time']}
+        if given['prefix'].perform(context):
+            own['joint_prefix'] = given['prefix']
+        if given['diagnose_every'].perform(context):
+            own['diagnose_every'] = ParameterValue(given['diagnose_every'], value_type=float)
+        return [Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
+                     parameters=[given['model'], own], output='screen',
+                     remappings=[('joint_states', given['joint_states'])])]
+
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=value, description=text)
-          for name, (value, text) in arguments.items()),
-        Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
-             parameters=[given['model'], {
-                 'joint_prefix': given['prefix'], 'use_sim_time': given['use_sim_time'],
-                 'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
-             output='screen', remappings=[('joint_states', given['joint_states'])]),
-    ])
+          for name, (value, text) in arguments.items()), OpaqueFunction(function=nodes)])

@@ -33,7 +33,7 @@ from pprs_dynamics.inference.residuals.live import WINDOW
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages import conversions
 
-RATE, STATES = 500.0, 100.0  # [Hz], of trajectories and joint states
+RATE, STATES = 200.0, 100.0  # [Hz], of trajectories and joint states
 SPAN = 10.0  # [s], of the windows diagnosed
 OFFSET, NOISE = 1.0, 0.08  # [N]: something to be found takes longest
 START = 1_700_000_000_000_000_000  # [ns]
@@ -116,6 +116,8 @@ def one_round(domain: int, diagnose: bool, seconds: float, folder: Path) -> dict
         stream = Beside(recorded)
         try:
             stream.connect()
+            # Equations are compiled beside the first answers.
+            stream.wait_until(lambda: stream.status.get('preparing') is False, 'feedforward', 120)
             stream.wait_until(stream.states.get_subscription_count, 'monitor')
             for _ in range(round((SPAN + 0.5) * STATES)):  # the first window, faster than real time
                 stream.send_state()
