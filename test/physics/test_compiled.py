@@ -238,6 +238,26 @@ def test_a_motion_does_not_change_with_the_arrays_that_it_was_made_of():
         motion.position = columns[0]
 
 
+def test_a_program_that_soon_ends_does_not_wait_for_the_compiler():
+    pytest.importorskip('numba')
+    code = '''
+import sys
+import numpy as np
+from pprs_dynamics import DriveModel, Excitation
+from pprs_dynamics.physics.three_pprs import evaluation
+evaluation.PAYS = 1_000
+evaluation.postpone_compiling()
+model, motion = DriveModel.load(), Excitation(2.0).motion(np.arange(0.0, 2.0, 0.004))
+forces = [model.drive_forces(motion).total]
+print('numba' in sys.modules)
+for _ in range(2):
+    forces.append(model.drive_forces(motion).total)
+print('numba' in sys.modules, np.ptp(forces, axis=0).max() < 1e-11)
+'''
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ['False', 'True', 'True']
+
+
 def test_without_a_place_to_keep_compiled_code_nothing_is_compiled(monkeypatch):
     pytest.importorskip('numba')
 

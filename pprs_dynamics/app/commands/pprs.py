@@ -73,6 +73,9 @@ def _ended(given: Sequence[str]) -> int:
         # Importing a command takes long enough to be interrupted.
         options = _parser(given).parse_args(given)
         check_files(options)
+        from pprs_dynamics.physics.three_pprs.evaluation import postpone_compiling
+
+        postpone_compiling()
         status: int = _module(options.command).run(options)
     except PprsError as error:
         # What other packages and files say may hold what a terminal would obey.

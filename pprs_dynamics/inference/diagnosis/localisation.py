@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
-from scipy.special import ndtri
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
@@ -224,7 +224,8 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
     known = series.known
     scores = np.zeros(len(white))
     n = int(known.sum())
-    ranked = ndtri((_ranks(np.abs(white[known])) - 0.5) / n)
+    shares = (_ranks(np.abs(white[known])) - 0.5) / n
+    ranked = np.array([NormalDist().inv_cdf(share) for share in shares.tolist()])
     # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
     scores[known] = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
     best: tuple[float, str, Pattern, Array] | None = None

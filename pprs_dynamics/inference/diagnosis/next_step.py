@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
+
+if TYPE_CHECKING:  # naming files needs no diagnosis
+    from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 

@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ReversalShape, present_values, rounded
@@ -91,6 +90,8 @@ def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
         grid = np.linspace(np.log(NARROWEST), np.log(WIDEST), TRIALS)
         best = int(np.argmin([loss(trial) for trial in grid]))
         low, high = grid[max(best - 1, 0)], grid[min(best + 1, TRIALS - 1)]
+        from scipy.optimize import minimize_scalar  # takes half a second, and few need it
+
         refined = minimize_scalar(loss, bounds=(low, high), method='bounded',
                                   options={'maxiter': 15})
         if -float(refined.fun) > search.prices.of_width(TRIALS):

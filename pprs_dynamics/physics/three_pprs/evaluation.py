@@ -28,10 +28,14 @@ Kernel = Callable[..., Any]
 PLAIN = 'PPRS_DYNAMICS_PLAIN'  # set to anything but 0, nothing is compiled
 BLOCK = 2048  # samples: about 100 intermediate arrays then stay in a core's cache
 FEW = 8  # samples, up to which floats are faster than arrays
+# Loading what is compiled takes 0.9 s of processor time; on arrays a sample takes 1 us more, a call
+# 0.1 ms.
+PAYS, CALL = 500_000, 100  # samples
 
 _loops: dict[Kernel, Callable[..., int]] = {}
 _compile: Callable[[Kernel, tuple[Any, ...]], Callable[..., int]] | None = None
 _decided = False
+_plain_samples = 0  # that may still be evaluated before compiling pays
 _compiling: set[int] = set()  # threads that compile while others must not wait
 
 
@@ -46,9 +50,13 @@ def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) 
     tables : arrays
         C-contiguous; the first is (N, k), N samples.
     """
+    global _plain_samples
     loop = _loops.get(kernel)
     if loop is not None:
         return loop(parameters.row, *tables)
+    if _plain_samples > 0 and not _decided:
+        _plain_samples -= len(tables[0]) + CALL
+        return evaluate_plainly(kernel, parameters, *tables)
     # Who compiles in the background wants answers meanwhile.
     elsewhere = _compiling and threading.get_ident() not in _compiling
     if elsewhere or not is_compiled():
@@ -58,6 +66,12 @@ def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) 
     first = loop(parameters.row, *tables)
     _loops[kernel] = loop  # only now: another thread would wait for the compiler
     return first
+
+
+def postpone_compiling() -> None:
+    """Evaluate plainly until compiled code would have paid: for programs that soon end."""
+    global _plain_samples
+    _plain_samples = PAYS
 
 
 @contextmanager

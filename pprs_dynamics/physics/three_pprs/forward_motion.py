@@ -108,16 +108,18 @@ def follow_branch(
     Marks along the way, at most `LONGEST_MOVE` of any drive apart, are solved each from the one
     before; between them poses are interpolated.
     """
-    from scipy.spatial.transform import Rotation, Slerp
-
     marks = _marks(position)
     solved = _follow_marks(geometry, position[marks], marks, seed)
     samples = np.arange(len(position))
     if len(marks) == 1:
         return solved[np.zeros(len(position), dtype=int)]
-    between = np.stack([np.interp(samples, marks, axis) for axis in solved.position.T], axis=1)
-    turn = Slerp(marks, Rotation.from_quat(solved.orientation))
-    return PlatformMotion.at_rest(between, turn(samples).as_quat())
+    # Of the two quaternions of each orientation those that are near each other.
+    opposite = np.sum(solved.orientation[1:] * solved.orientation[:-1], axis=1) < 0
+    signs = np.cumprod(np.where(np.append(False, opposite), -1.0, 1.0))
+    between, turn = (
+        np.stack([np.interp(samples, marks, axis) for axis in values.T], axis=1)
+        for values in (solved.position, solved.orientation * signs[:, None]))
+    return PlatformMotion.at_rest(between, turn / np.linalg.norm(turn, axis=1, keepdims=True))
 
 
 def platform_rates(
