@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Type of the arrays of numbers that all modules share."""
+"""Types of numbers that all modules share."""
 
 from __future__ import annotations
 
@@ -9,3 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+# In kernels, which are run on one sample or on many: a number or one a sample, and which sample.
+Value = float | Array
+Sample = int | slice

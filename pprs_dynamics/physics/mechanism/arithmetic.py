@@ -14,21 +14,23 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Value
 
-def sqrt(x: Any) -> Any:
+
+def sqrt(x: Value) -> Value:
     """Return the square root, NaN below 0."""
     if isinstance(x, float):
         return math.sqrt(x) if x >= 0.0 else math.nan
     return np.sqrt(x)
 
 
-def tanh(x: Any) -> Any:
+def tanh(x: Value) -> Value:
     """Return the hyperbolic tangent."""
     # math.tanh rounds otherwise: one sample would not equal the same sample among others.
     return float(np.tanh(x)) if isinstance(x, float) else np.tanh(x)
 
 
-def larger(x: Any, y: Any) -> Any:
+def larger(x: Value, y: Value) -> Value:
     """Return the larger of two numbers, element by element; NaN where x is."""
     if isinstance(x, float):
         return y if x < y else x
@@ -40,12 +42,12 @@ def everywhere(condition: Any) -> bool:
     return bool(np.all(condition))
 
 
-def sin(x: Any) -> Any:
+def sin(x: Value) -> Value:
     """Return the sine [rad]."""
     return np.sin(x)
 
 
-def cos(x: Any) -> Any:
+def cos(x: Value) -> Value:
     """Return the cosine [rad]."""
     return np.cos(x)
 

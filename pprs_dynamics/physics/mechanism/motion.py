@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.motion_checks import (
@@ -263,10 +263,10 @@ def _joined(columns: Sequence[Any]) -> Array | None:
     return rows if right else None
 
 
-def _motion_kernel(p: tuple[()], s: Any, rows: Any) -> Any:
+def _motion_kernel(p: tuple[()], s: Sample, rows: Array) -> Any:
     """Normalise quaternions in place; return whether a sample needs no closer look."""
     x, y, z, w = rows[s, 3], rows[s, 4], rows[s, 5], rows[s, 6]
-    length = sqrt(x * x + y * y + z * z + w * w)
+    length: Any = sqrt(x * x + y * y + z * z + w * w)
     rows[s, 3], rows[s, 4] = x / length, y / length
     rows[s, 5], rows[s, 6] = z / length, w / length
     everything = length

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from pprs_dynamics.arrays import Value
+
 
 class Vector(NamedTuple):
     """A vector in `base` or `platform`."""
 
-    x: Any
-    y: Any
-    z: Any
+    x: Value
+    y: Value
+    z: Value
 
 
 class ChainVector(NamedTuple):
@@ -24,9 +26,9 @@ class ChainVector(NamedTuple):
     chains last.
     """
 
-    e: Any
-    n: Any
-    k: Any
+    e: Value
+    n: Value
+    k: Value
 
 
 def add(a: ChainVector, b: ChainVector) -> ChainVector:
@@ -44,12 +46,12 @@ def plus(a: Vector, b: Vector) -> Vector:
     return Vector(a.x + b.x, a.y + b.y, a.z + b.z)
 
 
-def times(factor: Any, a: Vector) -> Vector:
+def times(factor: Value, a: Vector) -> Vector:
     """Return a vector in `base` times a number."""
     return Vector(factor * a.x, factor * a.y, factor * a.z)
 
 
-def combine(f: Any, a: Vector, g: Any, b: Vector, h: Any, c: Vector) -> Vector:
+def combine(f: Value, a: Vector, g: Value, b: Vector, h: Value, c: Vector) -> Vector:
     """Return f a + g b + h c in `base`."""
     return Vector(f * a.x + g * b.x + h * c.x, f * a.y + g * b.y + h * c.y,
                   f * a.z + g * b.z + h * c.z)
@@ -60,7 +62,7 @@ def product(a: Vector, b: Vector) -> Vector:
     return Vector(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
-def dot(a: Vector, b: Vector) -> Any:
+def dot(a: Vector, b: Vector) -> Value:
     """Return a . b in `base`."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 

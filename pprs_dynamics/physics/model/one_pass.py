@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.physics.effects.laws.passive_friction import (
     JointResistance,
@@ -53,9 +53,9 @@ from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, Mechanis
 class DriveFriction(NamedTuple):
     """Friction of one drive: c [N s/m], mu and the reversal velocity [m/s]."""
 
-    viscous: Any
-    coulomb: Any
-    reversal_velocity: Any
+    viscous: Value
+    coulomb: Value
+    reversal_velocity: Value
 
 
 class ForcesParameters(NamedTuple):
@@ -67,12 +67,12 @@ class ForcesParameters(NamedTuple):
     """
 
     robot: RobotParameters
-    platform_radius: Any
-    printed: Any
-    printed_friction: Any
-    minimum_sine: Any
-    bound: Any
-    reversal_rate: Any
+    platform_radius: Value
+    printed: Value
+    printed_friction: Value
+    minimum_sine: Value
+    bound: Value
+    reversal_rate: Value
     joints: Joints
     drives: tuple[DriveFriction, ...]
 
@@ -131,7 +131,7 @@ class OnePass:
         return MechanismState.unsolved(self._fields, motion, kinematics)
 
 
-def forces_kernel(p: ForcesParameters, s: Any, motion: Any, parts: Any) -> Any:
+def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> Any:
     """Fill tables of forces from one of motions, see `OnePass.forces`."""
     m, geometry = motion_sample(motion, s), p.robot.geometry
     rods = chain_motions(geometry, m)
@@ -164,7 +164,7 @@ def _joint_resistances(
 
 
 def _write_forces(
-    drive: int, p: ForcesParameters, parts: Any, s: Any, rigid_body: Any, velocity: Any,
+    drive: int, p: ForcesParameters, parts: Any, s: Sample, rigid_body: Any, velocity: Any,
     load: Any, passive: Any,
 ) -> None:
     """Write the parts of a drive's force, and their sum."""
@@ -174,7 +174,7 @@ def _write_forces(
     parts[1, s, drive], parts[2, s, drive], parts[3, s, drive] = rigid_body, active, passive
 
 
-def _write_motion(i: int, parts: Any, s: Any, c: ChainSample) -> None:
+def _write_motion(i: int, parts: Any, s: Sample, c: ChainSample) -> None:
     """Write the motion of a chain's two drives."""
     parts[FORCES, s, i], parts[FORCES, s, 3 + i] = c.slide, c.lift
     parts[FORCES + 1, s, i], parts[FORCES + 1, s, 3 + i] = c.slide_velocity, c.lift_velocity

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -65,7 +66,7 @@ class Inverse(NamedTuple):
     """
 
     columns: DriveValues
-    determinant: Any
+    determinant: Value
 
 
 class ClosureRows(NamedTuple):
@@ -83,7 +84,7 @@ def unit_wrench(chain: Any, direction: ChainVector, arm: ChainVector) -> Wrench:
     return Wrench(in_base(chain, direction), in_base(chain, cross(arm, direction)))
 
 
-def closure_rows(chain: Any, arm: ChainVector, c_u: Any, s_u: Any) -> ClosureRows:
+def closure_rows(chain: Any, arm: ChainVector, c_u: Value, s_u: Value) -> ClosureRows:
     """Return the rows of [B] of a chain."""
     zero = 0.0 * c_u
     axis = ChainVector(zero, zero + 1.0, zero)
@@ -106,11 +107,11 @@ class Elimination(NamedTuple):
 
     along_x: Vector
     along_y: Vector
-    z0: Any
+    z0: Value
     w0: Vector
     z: tuple[Any, Any, Any]
     w: tuple[Vector, Vector, Vector]
-    determinant: Any
+    determinant: Value
 
 
 def eliminate(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> Elimination:
@@ -156,7 +157,9 @@ def solve_closure(
     return _twist(e, h_x, h_y, f0, right.lifts[0] + f1, right.lifts[1] + f2, right.lifts[2] + f3)
 
 
-def _twist(e: Elimination, h_x: Any, h_y: Any, f0: Any, f1: Any, f2: Any, f3: Any) -> Twist:
+def _twist(
+    e: Elimination, h_x: Value, h_y: Value, f0: Value, f1: Value, f2: Value, f3: Value,
+) -> Twist:
     omega = plus(times(f0, e.w0), combine(f1, e.w[0], f2, e.w[1], f3, e.w[2]))
     return Twist(Vector(h_x - dot(e.along_x, omega), h_y - dot(e.along_y, omega),
                         f0 * e.z0 + f1 * e.z[0] + f2 * e.z[1] + f3 * e.z[2]), omega)
@@ -182,7 +185,7 @@ def _lift_columns(i: int, e: Elimination) -> Twist:
 
 @each_chain
 def _horizontal_shares(
-    i: int, geometry: GeometryParameters, rods: Any, h_x: Any, h_y: Any,
+    i: int, geometry: GeometryParameters, rods: Any, h_x: Value, h_y: Value,
 ) -> Any:
     """Return the share of eliminated v_x and v_y in the right side of lift i."""
     k = geometry.chains[i]
@@ -199,18 +202,18 @@ def _reduced_moments(
     return combine(1.0, rows[i].lift.moment, c_u * k.cos, along_x, c_u * k.sin, along_y)
 
 
-def _difference(f: Any, a: Vector, g: Any, b: Vector) -> Vector:
+def _difference(f: Value, a: Vector, g: Value, b: Vector) -> Vector:
     return Vector(f * a.x - g * b.x, f * a.y - g * b.y, f * a.z - g * b.z)
 
 
-def rod_row(chain: Any, length: Any, arm: ChainVector, s_u: Any) -> Wrench:
+def rod_row(chain: Any, length: Value, arm: ChainVector, s_u: Value) -> Wrench:
     """Return u_dot_i per twist: the rod follows its tip, u_dot_i = e_i . v_Ai / (l sin u_i)."""
     share = 1.0 / (length * s_u)
     zero = 0.0 * s_u
     return unit_wrench(chain, ChainVector(share, zero, zero), arm)             # Eq. (10)
 
 
-def power(wrench: Wrench, twist: Twist) -> Any:
+def power(wrench: Wrench, twist: Twist) -> Value:
     """Return the power of a wrench on a twist."""
     return dot(wrench.force, twist.v) + dot(wrench.moment, twist.omega)
 
@@ -248,27 +251,27 @@ def _size(wrench: Wrench, n: Any) -> Any:
     return 1.0 + n * n * dot(wrench.moment, wrench.moment)
 
 
-def write_inverse(table: Any, s: Any, inverse: Inverse) -> None:
+def write_inverse(table: Array, s: Sample, inverse: Inverse) -> None:
     """Write [B]^-1 at sample s to a table, row after row."""
     for i in range(CHAINS):
         _write_column(table, s, i, inverse.columns.slides[i])
         _write_column(table, s, CHAINS + i, inverse.columns.lifts[i])
 
 
-def _write_column(table: Any, s: Any, j: int, twist: Twist) -> None:
+def _write_column(table: Array, s: Sample, j: int, twist: Twist) -> None:
     v, omega = twist.v, twist.omega
     table[s, j], table[s, 6 + j], table[s, 12 + j] = v.x, v.y, v.z
     table[s, 18 + j], table[s, 24 + j], table[s, 30 + j] = omega.x, omega.y, omega.z
 
 
-def read_inverse(table: Any, s: Any) -> Inverse:
+def read_inverse(table: Array, s: Sample) -> Inverse:
     """Return [B]^-1 at sample s of a table, without its determinant."""
     return Inverse(DriveValues(_read_columns(0, table, s),
                                _read_columns(CHAINS, table, s)), 0.0)
 
 
 @each_chain
-def _read_columns(i: int, first: int, table: Any, s: Any) -> Twist:
+def _read_columns(i: int, first: int, table: Array, s: Sample) -> Twist:
     j = first + i
     return Twist(Vector(table[s, j], table[s, 6 + j], table[s, 12 + j]),
                  Vector(table[s, 18 + j], table[s, 24 + j], table[s, 30 + j]))
@@ -278,11 +281,13 @@ class InverseParameters(NamedTuple):
     """Parameters of `inverse_kernel`: the bound is the square of the condition number allowed."""
 
     geometry: GeometryParameters
-    bound: Any
-    platform_radius: Any
+    bound: Value
+    platform_radius: Value
 
 
-def inverse_kernel(p: InverseParameters, s: Any, chains: Any, inverse: Any, bound: Any) -> Any:
+def inverse_kernel(
+    p: InverseParameters, s: Sample, chains: Array, inverse: Array, bound: Array,
+) -> Any:
     """Fill tables of [B]^-1 and of `condition_bound` from one of chains."""
     rods = read_chains(chains, s)
     rows = rows_of_chains(p.geometry, rods)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError
 from pprs_dynamics.physics.mechanism.arithmetic import everywhere, larger, sqrt
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -190,15 +190,15 @@ class Closure(NamedTuple):
     """
 
     arm: ChainVector
-    cos_u: Any
-    sin_u: Any
-    slide: Any
-    lift: Any
+    cos_u: Value
+    sin_u: Value
+    slide: Value
+    lift: Value
 
 
 @each_chain
 def chain_closures(
-    i: int, geometry: GeometryParameters, P: Vector, R: Rotation, q: Any, s: Any,
+    i: int, geometry: GeometryParameters, P: Vector, R: Rotation, q: Any, s: Sample,
 ) -> Closure:
     """Return the residuals of Eq. (3) in chain i for the drive positions of sample s.
 
@@ -214,13 +214,14 @@ def chain_closures(
     return Closure(arm, -rod.e / l, rod.k / l, rod.n, length - rod.n * rod.n / l)  # Eq. (3)
 
 
-def newton_kernel(p: GeometryParameters, s: Any, q: Any, pose: Any, found: Any) -> Any:
+def newton_kernel(p: GeometryParameters, s: Sample, q: Any, pose: Array, found: Any) -> Any:
     """Improve a table of poses until they belong to drive positions."""
     P = vector(pose, s, 0)
     x, y, z, w = pose[s, 3], pose[s, 4], pose[s, 5], pose[s, 6]
     # Heights far from 0 carry their own rounding.
     tolerance = RESIDUAL_TOLERANCE * (p.l + _largest(_farthest_positions(q, s)))
-    steps, determinant, upright, arrived = 0.0 * x, 0.0 * x, 0.0 * x, x > 2.0
+    steps, upright, arrived = 0.0 * x, 0.0 * x, x > 2.0
+    determinant: Value = 0.0 * x
     for k in range(MAXIMUM_STEPS + 1):
         rods = chain_closures(p, P, rotation(x, y, z, w), q, s)
         # The smallest sine of the rods, positive where all lean as `geometry.elbow` demands.
@@ -248,7 +249,7 @@ def newton_kernel(p: GeometryParameters, s: Any, q: Any, pose: Any, found: Any) 
 
 
 @each_chain
-def _farthest_positions(i: int, q: Any, s: Any) -> Any:
+def _farthest_positions(i: int, q: Any, s: Sample) -> Any:
     return larger(abs(q[s, i]), abs(q[s, CHAINS + i]))
 
 
@@ -266,7 +267,9 @@ def _largest(values: Any) -> Any:
     return larger(larger(values[0], values[1]), values[2])
 
 
-def turned_quaternion(half: Vector, x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any, Any]:
+def turned_quaternion(
+    half: Vector, x: Value, y: Value, z: Value, w: Value,
+) -> tuple[Any, Any, Any, Any]:
     """Return a unit quaternion after a turn whose vector in `base`, halved, is given.
 
     Exact to the turn's second order.

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.vectors import add, cross, in_chain
@@ -150,7 +150,8 @@ def _table(values: ArrayLike) -> Array:
 
 
 def rates_kernel(
-    p: GeometryParameters, s: Any, chains: Any, inverse: Any, q_dot: Any, q_ddot: Any, rates: Any,
+    p: GeometryParameters, s: Sample, chains: Array, inverse: Array, q_dot: Array, q_ddot: Array,
+    rates: Array,
 ) -> Any:
     """Fill a table of v, omega, a_o and epsilon from drives' rates."""
     rods = read_chains(chains, s)
@@ -168,22 +169,22 @@ def rates_kernel(
 
 
 @each_chain
-def _slide_rates(i: int, rates: Any, s: Any) -> Any:
+def _slide_rates(i: int, rates: Any, s: Sample) -> Any:
     return rates[s, i]
 
 
 @each_chain
-def _lift_rates(i: int, rates: Any, s: Any, rods: ThreeChains) -> Any:
+def _lift_rates(i: int, rates: Any, s: Sample, rods: ThreeChains) -> Any:
     return rods[i].sin_u * rates[s, 3 + i]
 
 
 @each_chain
-def _slide_accelerations(i: int, q_ddot: Any, s: Any, inward: Any) -> Any:
+def _slide_accelerations(i: int, q_ddot: Any, s: Sample, inward: Any) -> Any:
     return q_ddot[s, i] - inward[i][0]
 
 
 @each_chain
-def _lift_accelerations(i: int, q_ddot: Any, s: Any, rods: ThreeChains, inward: Any) -> Any:
+def _lift_accelerations(i: int, q_ddot: Any, s: Sample, rods: ThreeChains, inward: Any) -> Any:
     return rods[i].sin_u * q_ddot[s, 3 + i] - inward[i][1]
 
 

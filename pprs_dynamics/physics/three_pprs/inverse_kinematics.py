@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -93,28 +93,28 @@ class ChainSample(NamedTuple):
     """One chain at one sample, see `ChainKinematics`."""
 
     arm: ChainVector
-    cos_u: Any
-    sin_u: Any
-    u_dot: Any
-    u_ddot: Any
-    slide: Any
-    lift: Any
-    slide_velocity: Any
-    lift_velocity: Any
-    slide_acceleration: Any
-    lift_acceleration: Any
+    cos_u: Value
+    sin_u: Value
+    u_dot: Value
+    u_ddot: Value
+    slide: Value
+    lift: Value
+    slide_velocity: Value
+    lift_velocity: Value
+    slide_acceleration: Value
+    lift_acceleration: Value
     omega: ChainVector
 
 
 ThreeChains = tuple[ChainSample, ChainSample, ChainSample]
 
 
-def rod_direction(c_u: Any, s_u: Any) -> ChainVector:
+def rod_direction(c_u: Value, s_u: Value) -> ChainVector:
     """Return d_i, the unit vector along the rod from C_i to A_i."""
     return ChainVector(-c_u, 0.0 * c_u, s_u)
 
 
-def rod_normal(c_u: Any, s_u: Any) -> ChainVector:
+def rod_normal(c_u: Value, s_u: Value) -> ChainVector:
     """Return w_i, minus the direction in which the rod's tip moves as u_i grows."""
     return ChainVector(-s_u, 0.0 * c_u, -c_u)
 
@@ -152,7 +152,7 @@ def chain_motions(i: int, geometry: GeometryParameters, motion: MotionSample) ->
                        q_lift_dot, q_slide_ddot, q_lift_ddot, omega)
 
 
-def write_chain(i: int, table: Any, s: Any, c: ChainSample) -> None:
+def write_chain(i: int, table: Array, s: Sample, c: ChainSample) -> None:
     """Write chain i of sample s to a table, see `ChainKinematics.from_table`."""
     table[s, i], table[s, 3 + i], table[s, 6 + i] = c.arm.e, c.arm.n, c.arm.k
     table[s, 9 + i], table[s, 12 + i] = c.cos_u, c.sin_u
@@ -164,7 +164,7 @@ def write_chain(i: int, table: Any, s: Any, c: ChainSample) -> None:
 
 
 @each_chain
-def read_chains(i: int, table: Any, s: Any) -> ChainSample:
+def read_chains(i: int, table: Array, s: Sample) -> ChainSample:
     """Return chain i of sample s of a table, see `ChainKinematics.from_table`."""
     return ChainSample(
         ChainVector(table[s, i], table[s, 3 + i], table[s, 6 + i]),
@@ -186,10 +186,10 @@ class ReachParameters(NamedTuple):
     """Parameters of `chain_kernel`: the smallest |sin u_i| allowed."""
 
     geometry: GeometryParameters
-    minimum_sine: Any
+    minimum_sine: Value
 
 
-def chain_kernel(p: ReachParameters, s: Any, motion: Any, chains: Any) -> Any:
+def chain_kernel(p: ReachParameters, s: Sample, motion: Array, chains: Array) -> Any:
     """Fill a table of chains from a table of motions."""
     rods = chain_motions(p.geometry, motion_sample(motion, s))
     for i in range(CHAINS):

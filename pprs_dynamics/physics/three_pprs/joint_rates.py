@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.physics.mechanism.vectors import ChainVector
@@ -22,11 +22,11 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
 class Turnover(NamedTuple):
     """sgn(s) / s in C_i and in A_i [s/rad]."""
 
-    revolute: Any
-    spherical: Any
+    revolute: Value
+    spherical: Value
 
 
-def relative_rate(u_dot: Any, omega: ChainVector) -> ChainVector:
+def relative_rate(u_dot: Value, omega: ChainVector) -> ChainVector:
     """Return omega_n = u_dot_i n_i - omega, of the rod relative to the platform [rad/s]."""
     return ChainVector(-omega.e, u_dot - omega.n, -omega.k)                    # Eq. (9)
 
@@ -36,7 +36,7 @@ def length(v: ChainVector) -> Any:
     return sqrt(v.e * v.e + v.n * v.n + v.k * v.k)
 
 
-def turnover(u_dot: Any, omega: ChainVector, width: Any) -> Turnover:
+def turnover(u_dot: Value, omega: ChainVector, width: Value) -> Turnover:
     """Return the turnover of friction in the joints of a chain, within `width` [rad/s]."""
     return Turnover(sign_over_speed(abs(u_dot), width),
                     sign_over_speed(length(relative_rate(u_dot, omega)), width))
@@ -52,10 +52,10 @@ def turnover_table(chains: Array, width: float) -> Array:
 class TurnoverParameters(NamedTuple):
     """Parameters of `turnover_kernel`: the width in which friction turns over [rad/s]."""
 
-    width: Any
+    width: Value
 
 
-def turnover_kernel(p: TurnoverParameters, s: Any, chains: Any, table: Any) -> Any:
+def turnover_kernel(p: TurnoverParameters, s: Sample, chains: Array, table: Array) -> Any:
     """Fill a table of `turnover`."""
     rods = read_chains(chains, s)
     for i in range(CHAINS):

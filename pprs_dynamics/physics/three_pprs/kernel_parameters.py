@@ -10,6 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.vectors import Vector
 
 P = TypeVar('P', bound=tuple[Any, ...])
@@ -64,28 +65,28 @@ class Chain(NamedTuple):
     for a platform that does not turn.
     """
 
-    cos: Any
-    sin: Any
-    x: Any
-    y: Any
-    left_x: Any
-    left_y: Any
-    balance: Any
+    cos: Value
+    sin: Value
+    x: Value
+    y: Value
+    left_x: Value
+    left_y: Value
+    balance: Value
 
 
 class GeometryParameters(NamedTuple):
     """R and l [m], the sign of sin u_i, and the three chains."""
 
-    R: Any
+    R: Value
     l: Any  # noqa: E741
-    elbow: Any
+    elbow: Value
     chains: tuple[Chain, Chain, Chain]
 
 
 class PlatformBody(NamedTuple):
     """Mass [kg], centre [m] and inertia [kg m^2] of platform and payload, in `platform`."""
 
-    mass: Any
+    mass: Value
     centre: Vector
     moments: Vector
     products: Vector
@@ -94,9 +95,9 @@ class PlatformBody(NamedTuple):
 class ChainMasses(NamedTuple):
     """Masses in one chain [kg]."""
 
-    slide: Any
-    lift: Any
-    rod: Any
+    slide: Value
+    lift: Value
+    rod: Value
 
 
 class RobotParameters(NamedTuple):

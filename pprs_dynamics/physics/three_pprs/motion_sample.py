@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.vectors import Vector
 
 
@@ -29,12 +30,12 @@ class MotionSample(NamedTuple):
     epsilon: Vector
 
 
-def vector(table: Any, s: Any, k: int) -> Vector:
+def vector(table: Array, s: Sample, k: int) -> Vector:
     """Return the vector in columns k to k + 2 of sample s."""
     return Vector(table[s, k], table[s, k + 1], table[s, k + 2])
 
 
-def motion_sample(motion: Any, s: Any) -> MotionSample:
+def motion_sample(motion: Any, s: Sample) -> MotionSample:
     """Return sample s of a table of motions: P, quaternion, v, omega, a and epsilon."""
     return MotionSample(
         vector(motion, s, 0),
@@ -42,7 +43,7 @@ def motion_sample(motion: Any, s: Any) -> MotionSample:
         vector(motion, s, 7), vector(motion, s, 10), vector(motion, s, 13), vector(motion, s, 16))
 
 
-def rotation(x: Any, y: Any, z: Any, w: Any) -> Rotation:
+def rotation(x: Value, y: Value, z: Value, w: Value) -> Rotation:
     """Return the rotation of a unit quaternion."""
     return Rotation(
         Vector(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)),

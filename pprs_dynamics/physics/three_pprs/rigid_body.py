@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.vectors import (
@@ -119,16 +119,16 @@ class RigidBody:
 class ChainForces(NamedTuple):
     """Forces in one chain at one sample, see `Reactions` and `RigidBody`."""
 
-    H: Any
-    V: Any
-    W: Any
-    H_star: Any
-    V_star: Any
-    W_star: Any
-    slide: Any
-    lift: Any
-    slide_load: Any
-    lift_load: Any
+    H: Value
+    V: Value
+    W: Value
+    H_star: Value
+    V_star: Value
+    W_star: Value
+    slide: Value
+    lift: Value
+    slide_load: Value
+    lift_load: Value
 
 
 def platform_wrench(body: PlatformBody, g: Vector, m: MotionSample) -> Wrench:
@@ -191,7 +191,7 @@ def less_rod_reactions(
 
 
 def chain_forces(
-    mass: ChainMasses, rod_length: Any, g: ChainVector, c: ChainSample, f: ChainVector, H: Any,
+    mass: ChainMasses, rod_length: Value, g: ChainVector, c: ChainSample, f: ChainVector, H: Any,
     V: Any, W: Any, printed: Any,
 ) -> ChainForces:
     """Return reactions, drive forces and guide loads of a chain."""
@@ -252,12 +252,13 @@ class BodyParameters(NamedTuple):
     """Parameters of `body_kernel`: `printed` is 1 for Eq. (7) to the letter, else 0."""
 
     robot: RobotParameters
-    printed: Any
+    printed: Value
 
 
 def body_kernel(
-    p: BodyParameters, s: Any, motion: Any, chains: Any, inverse: Any, load: Any, force: Any,
-    guide_load: Any, reactions: Any,
+    p: BodyParameters, s: Sample, motion: Array, chains: Array, inverse: Array, load: Array,
+    force: Array,
+    guide_load: Array, reactions: Array,
 ) -> Any:
     """Fill tables of forces, guide loads and reactions.
 

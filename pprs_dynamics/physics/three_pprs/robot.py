@@ -42,7 +42,7 @@ class ChainFrames:
 
     def base(self, vector: ChainVector) -> Array:
         """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
-        result = np.empty((*vector.e.shape, 3))
+        result = np.empty((*np.shape(vector.e), 3))
         result[..., 0], result[..., 1], result[..., 2] = in_base(self, vector)
         return result
 

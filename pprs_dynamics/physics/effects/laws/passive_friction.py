@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
@@ -63,19 +63,19 @@ class Resistances(NamedTuple):
 class Joints(NamedTuple):
     """Parameters of `resistance_kernel`: c, mu and d of C_i and of A_i."""
 
-    c_r: Any
-    mu_r: Any
-    d_r: Any
-    c_s: Any
-    mu_s: Any
-    d_s: Any
+    c_r: Value
+    mu_r: Value
+    d_r: Value
+    c_s: Value
+    mu_s: Value
+    d_s: Value
 
 
 class JointResistance(NamedTuple):
     """k_ri and k_si of one chain at one sample [N m s/rad]."""
 
-    revolute: Any
-    spherical: Any
+    revolute: Value
+    spherical: Value
 
 
 def resistance(viscous: float, dry: Array | float, speed: Array, reversal_rate: float) -> Array:
@@ -84,12 +84,12 @@ def resistance(viscous: float, dry: Array | float, speed: Array, reversal_rate: 
     return k
 
 
-def resist(c: Any, dry: Any, turnover: Any) -> Any:
+def resist(c: Any, dry: Value, turnover: Any) -> Any:
     """Return k = c + M sgn(s)/s for dry friction M, from the turnover sgn(s)/s."""
     return c + dry * turnover                                                  # Eq. (2), (9)
 
 
-def dry_moment(mu: Any, d: Any, load: Any) -> Any:
+def dry_moment(mu: Value, d: Value, load: Any) -> Any:
     """Return the dry friction moment of a joint of diameter d under a load [N m]."""
     return mu * d / 2.0 * load                                                 # Eq. (1)
 
@@ -171,11 +171,12 @@ class TransferParameters(NamedTuple):
     """Parameters of `transfer_kernel`: `printed` is 1 for Eq. (12) to the letter, else 0."""
 
     geometry: GeometryParameters
-    printed: Any
+    printed: Value
 
 
 def transfer_kernel(
-    p: TransferParameters, s: Any, chains: Any, inverse: Any, resistances: Any, force: Any,
+    p: TransferParameters, s: Sample, chains: Array, inverse: Array, resistances: Array,
+    force: Array,
 ) -> Any:
     """Fill a table of forces from one of k_r, k_s."""
     _write_forces(force, s, friction_forces(
@@ -185,11 +186,13 @@ def transfer_kernel(
 
 
 @each_chain
-def _read_resistances(i: int, resistances: Any, s: Any) -> JointResistance:
+def _read_resistances(i: int, resistances: Any, s: Sample) -> JointResistance:
     return JointResistance(resistances[s, i], resistances[s, CHAINS + i])
 
 
-def resistance_kernel(p: Joints, s: Any, reactions: Any, turnover: Any, resistances: Any) -> Any:
+def resistance_kernel(
+    p: Joints, s: Sample, reactions: Array, turnover: Array, resistances: Array,
+) -> Any:
     """Fill a table of k_r, k_s."""
     k = _resistances_at(p, reactions, turnover, s)
     for i in range(CHAINS):
@@ -201,13 +204,14 @@ class PassiveParameters(NamedTuple):
     """Parameters of `passive_kernel`, see those of the two kernels that it joins."""
 
     geometry: GeometryParameters
-    printed: Any
+    printed: Value
     joints: Joints
 
 
 def passive_kernel(
-    p: PassiveParameters, s: Any, chains: Any, inverse: Any, reactions: Any, turnover: Any,
-    force: Any,
+    p: PassiveParameters, s: Sample, chains: Array, inverse: Array, reactions: Array,
+    turnover: Array,
+    force: Array,
 ) -> Any:
     """Fill a table of forces: `resistance_kernel`, then `transfer_kernel`."""
     _write_forces(force, s, friction_forces(
@@ -218,14 +222,14 @@ def passive_kernel(
 
 @each_chain
 def _resistances_at(
-    i: int, joints: Joints, reactions: Any, turnover: Any, s: Any,
+    i: int, joints: Joints, reactions: Any, turnover: Any, s: Sample,
 ) -> JointResistance:
     return joint_resistances(
         joints, reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i], reactions[s, 12 + i],
         reactions[s, 15 + i], Turnover(turnover[s, i], turnover[s, CHAINS + i]))
 
 
-def _write_forces(force: Any, s: Any, forces: DriveValues) -> None:
+def _write_forces(force: Any, s: Sample, forces: DriveValues) -> None:
     for i in range(CHAINS):
         force[s, i], force[s, CHAINS + i] = forces.slides[i], forces.lifts[i]
 
