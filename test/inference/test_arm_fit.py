@@ -15,6 +15,7 @@ import pytest
 from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.inference.adoption.refit import refit_base
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.fit.arm_columns import columns_of
 from pprs_dynamics.inference.fit.arm_fit import fit_arm
@@ -49,6 +50,31 @@ def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Pa
         assert fit.model.values[key] == pytest.approx(arm.FRICTION[key], rel=0.03)
     assert max(fit.held_out.values()) < 1.1 * NOISE
     assert min(fit.before.values()) > 5 * NOISE
+
+
+def test_the_base_is_fitted_again_beside_an_effect_that_it_held(tmp_path: Path) -> None:
+    load = {'effects.active': ['load_friction']} | {
+        f'effects.load_friction.{name}.coefficient': 0.05 for name in arm.JOINTS}
+    real = arm.real_arm(tmp_path, **load)
+    held = arm.real_arm(tmp_path, **load, **{
+        'friction.coulomb': tuple(1.3 * np.array(arm.FRICTION['friction.coulomb']))})
+    runs = [arm.record(real, arm.motion(10.0, seed=seed), NOISE, seed) for seed in (0, 1)]
+    again = refit_base(held, runs[:1], runs[1:])
+    assert again.taken, again.reason
+    assert again.fit.model.values['friction.coulomb'] == pytest.approx(
+        arm.FRICTION['friction.coulomb'], rel=0.05)
+    # What was adopted stays as it was.
+    for key in load:
+        assert again.fit.model.values[key] == held.values[key]
+
+
+def test_a_base_that_predicts_worse_is_not_taken(tmp_path: Path) -> None:
+    real, other = arm.real_arm(tmp_path), heavier(tmp_path)
+    run, validate = (arm.record(one, arm.motion(10.0, seed=seed), NOISE, seed)
+                     for one, seed in ((other, 0), (real, 1)))
+    again = refit_base(real, [run], [validate])
+    assert not again.taken
+    assert 'must fall' in again.reason
 
 
 def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:

@@ -227,7 +227,8 @@ class _Answer:
             models = [given, *(fitted_model(search, step) for step in steps[1:])]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
-            held_out = [hold_out(search, step).error for step in steps]
+            # Nothing is fitted in the model as given: all of its error is held out.
+            held_out = [errors[0], *(hold_out(search, step).error for step in steps[1:])]
         near = self.ranking.near(self.decisions.rival_margin)
         found = []
         for k, candidate in enumerate(ordered):

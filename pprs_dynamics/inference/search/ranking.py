@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
@@ -104,9 +105,12 @@ class Ranking:
     def shares(self) -> tuple[float, ...]:
         """Return the part of the error that each effect of `order` takes away.
 
-        Of its root mean square over drives, each as a multiple of its noise, with nothing added.
+        Of its root mean square over drives, each as a multiple of its noise, of the model as given.
         """
-        errors = [_over_noise(self.last, self.best, step) for step in self.path]
+        given = self.first.design.residuals.error
+        errors = [_over_noise(self.last, self.best, given), *(
+            _over_noise(self.last, self.best, linear_residual(self.last, step))
+            for step in self.path[1:])]
         return tuple((before - after) / errors[0]
                      for before, after in pairwise(errors)) if errors[0] > 0 else ()
 
@@ -244,16 +248,16 @@ def _falling(search: Search, best: CandidateSet, kept: CandidateSet,
     while left:
         with_each = {one: kept if len(left) == 1 else search.evaluate(
             (*order, one, *kept.unknowns)) for one in left}
-        following = min(left, key=lambda one: _over_noise(search, best, with_each[one]))
+        following = min(left, key=lambda one: _over_noise(
+            search, best, linear_residual(search, with_each[one])))
         order.append(following)
         path.append(with_each[following])
         left.remove(following)
     return tuple(order), tuple(path)
 
 
-def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:
-    """Return the root of the mean square of what a set leaves, over the noise of each drive."""
-    left = linear_residual(search, found)
+def _over_noise(search: Search, best: CandidateSet, left: Array) -> float:
+    """Return the root of the mean square of errors (M, D), over the noise of each drive."""
     shares = [np.nanmean(np.square(left[:, d])) / max(
         search.regression.noise_floor(best.fit, d), 1e-12) ** 2
         for d in search.regression.drives]
