@@ -91,8 +91,8 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
              'unconfirmed', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
-        assert set(effect) == {'name', 'drives', 'parameters', 'error_before', 'error_after',
-                               'held_out_before', 'held_out_after', 'evidence'}
+        assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',
+                               'error_after', 'held_out_before', 'held_out_after', 'evidence'}
         assert set(effect['drives']) <= set(DRIVES)
         for parameter in effect['parameters'].values():
             assert set(parameter) == {'value', 'std', 'unit'}

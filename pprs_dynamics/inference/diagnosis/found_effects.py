@@ -71,7 +71,7 @@ class FoundEffect:
         return {'name': self.name, 'drives': listed(self.drives),
                 'alike': [list(names) for names in self.places if len(names) > 1],
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
-                'evidence': self.evidence, 'share_of_error': self.share,
+                'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
 
