@@ -144,7 +144,7 @@ def page(effect: type[CatalogueEffect]) -> str:
     rows = [f'| `{each.name}` | {each.symbol} | {each.unit} | {each.description} | '
             f'{"" if each.default is None else f"{each.default:g}"} |'
             for each in effect.parameters]
-    kinds = {'platform': '3-PPRS', 'axis': 'single axis', 'arm': 'serial arm'}
+    kinds = {'platform': '3-PPRS', 'axis': 'single axis', 'arm': 'arm or robot with loops'}
     return '\n'.join([
         f'# {effect.name}', '', (effect.__doc__ or '').strip().splitlines()[0], '',
         '```text', card.equation, '```', '',

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from typing import Any
 
 from rclpy.duration import Duration
@@ -23,7 +24,7 @@ from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, paramet
 from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.request_reader import reader_for
+from pprs_dynamics.ros.messages.request_reader import RequestReader, readers_for
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS
@@ -56,7 +57,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._current: Any = None
-        self._subscription: Any = None
+        self._subscriptions: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
         self._failure: Exception | None = None
         parameters = parameters_for(drive_count(self))
@@ -65,7 +66,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         names = RobotNames.of(self._settings.model, own['frame_id'])
-        self._reader = reader_for(self._settings.model, names)
+        self._readers = readers_for(self._settings.model, names)
         self._written = command_writer(names)
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
@@ -142,9 +143,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self, lambda: self._settings.own['command_timeout'], self._on_stale)
         self._create_parts()
         # Raw: message objects of a long trajectory would take longer than the model.
-        self._subscription = subscription(
-            self, self._reader.message, '~/trajectory', self._on_trajectory, raw=True,
-            profile=UNANSWERED)
+        self._subscriptions = [
+            subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
+                         raw=True, profile=UNANSWERED)
+            for topic, reader in self._readers.items()]
 
     def _publisher(self, kind: type, topic: str) -> Any:
         self._publishers_made.append(publisher(self, kind, topic))
@@ -165,15 +167,15 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 self._parts[name] = publisher(self, JointState, f'~/effort/{name}')
 
     def _destroy_topics(self) -> None:
-        if self._subscription is not None:
-            self.destroy_subscription(self._subscription)
+        for each in self._subscriptions:
+            self.destroy_subscription(each)
         if self._watchdog is not None:
             self._watchdog.destroy()
         for each in (*self._publishers_made, *self._parts.values(), self._current):
             if each is not None:
                 self.destroy_publisher(each)
-        self._subscription = self._watchdog = self._current = None
-        self._publishers_made, self._parts = [], {}
+        self._watchdog = self._current = None
+        self._subscriptions, self._publishers_made, self._parts = [], [], {}
 
     def _use_settings(self) -> None:
         self._feedforward.use(self._settings.model, self._settings.own)
@@ -183,14 +185,14 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     # --- messages -------------------------------------------------------------------------------
 
-    def _on_trajectory(self, data: bytes, info: dict[str, int]) -> None:
+    def _on_trajectory(self, reader: RequestReader, data: bytes, info: dict[str, int]) -> None:
         began = time.perf_counter()
         if self.state != 'active' or self._watchdog is None:
             return
         self._counters['received'] += 1
         own, now = self._settings.own, self.get_clock().now().nanoseconds
         try:
-            request = self._reader.read(data, now, own['max_age'], own['missing_derivatives'])
+            request = reader.read(data, now, own['max_age'], own['missing_derivatives'])
             answer = self._feedforward.answer(request)
         except PprsError as error:
             self._reject(Rejection.of(error))

@@ -147,7 +147,7 @@ def require_known(names: tuple[str, ...]) -> None:
     """Raise HiddenEffectError for a name that no hidden effect of an arm has."""
     for name in names:
         if name not in NAMES:
-            raise HiddenEffectError(f'{name} is no hidden effect of an arm, must be one of '
+            raise HiddenEffectError(f'{name} is no hidden effect of such a robot, must be one of '
                                     f'{", ".join(NAMES)}')
 
 

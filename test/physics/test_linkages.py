@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 from oracles.mujoco_loops import MujocoLoops
+from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import ArmModel, DriveModel, JointMotion, load_model
+from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
 from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import friction_rows
 from pprs_dynamics.physics.mechanism import linkage
@@ -240,6 +241,53 @@ def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
     assert 0 < error.value.sample < 200
 
 
+def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None:
+    """Of a 6-UPS leg_i = |x_i|, x_i from its universal joint to its ball."""
+    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    s, rng, samples = model.robot.structure, np.random.default_rng(2), 20
+    home = model.robot.at(*(np.tile(each, (1, 1)) for each in (
+        s.home[s.tables.drives], np.zeros(6), np.zeros(6))))
+    P, R = home.frame_of('platform').p[0], home.frame_of('platform').R[0]
+    turned = Rotation.from_matrix(R) * Rotation.from_rotvec(rng.uniform(-0.2, 0.2, (samples, 3)))
+    v, w, a, e = rng.normal(size=(4, samples, 3))
+    motion = PlatformMotion(P + rng.uniform(-0.04, 0.04, (samples, 3)), turned.as_quat(), v, w, a,
+                            e)
+    moved = model.mechanism(motion)
+    for d, name in enumerate(s.drives):
+        n = name.removeprefix('leg_')
+        foot = home.motion.p[0, s.rows[f'hinge_{n}']]
+        ball = next(loop for loop in s.loops if loop.name == f'ball_{n}').frame_b.p
+        arm = turned.apply(ball)
+        x = motion.position + arm - foot
+        x_dot = v + np.cross(w, arm)
+        x_ddot = a + np.cross(e, arm) + np.cross(w, np.cross(w, arm))
+        length = np.linalg.norm(x, axis=1)
+        rate = np.sum(x * x_dot, axis=1) / length
+        start = np.linalg.norm(P + R @ ball - foot)
+        assert moved.position[:, d] - s.home[s.tables.drives[d]] == pytest.approx(
+            length - start, abs=1e-12)
+        assert moved.velocity[:, d] == pytest.approx(rate, abs=1e-11)
+        assert moved.acceleration[:, d] == pytest.approx(
+            (np.sum(x_dot ** 2 + x * x_ddot, axis=1) - rate ** 2) / length, abs=1e-10)
+
+
+def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) -> None:
+    model = ArmModel.load(robots.delta().write(tmp_path))
+    assert model.tool_pose.chosen.tolist() == [0, 1, 2]
+    motion = states(model, SIZES['delta'])
+    linkage = model.mechanism(motion).linkage
+    row, _ = model.robot.structure.links['platform']
+    frame, m = linkage.frame_of('platform'), linkage.motion
+    found = model.mechanism(PlatformMotion(
+        frame.p, Rotation.from_matrix(frame.R).as_quat(), m.u[:, row], m.w[:, row], m.ud[:, row],
+        m.wd[:, row]))
+    for name in ('position', 'velocity', 'acceleration'):
+        assert getattr(found, name) == pytest.approx(getattr(motion, name), abs=1e-9), name
+    tilted = PlatformMotion.at_rest(frame.p[:1], Rotation.from_rotvec([[0.0, 0.01, 0.0]]).as_quat())
+    with pytest.raises(WorkspaceError, match='pitch'):
+        model.drive_forces(tilted)
+
+
 def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
     """A counterweight that slides as the drive turns is an inertia and a weight more."""
     text = robots.RobotText('winch', tool='drum')
@@ -295,6 +343,14 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
         columns = np.column_stack((np.eye(4)[:, [0, 2]], constraint.T))
         expected = np.linalg.lstsq(columns, data.qfrc_inverse, rcond=1e-11)[0][:2]
         assert found[k] == pytest.approx(expected, abs=1e-9 * np.max(np.abs(found)))
+
+
+def test_it_is_told_as_a_robot_with_loops(tmp_path: Path) -> None:
+    file = robots.five_bar().write(tmp_path)
+    assert load_model(file).title == 'a robot with loops'
+    values = {**load_model(file).values, 'effects.platform_drag.translation': 0.1}
+    with pytest.raises(ModelError, match='acts in a robot with loops'):
+        ArmModel.from_parameters(values, str(file))
 
 
 def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:

@@ -224,7 +224,7 @@ def test_topics_have_the_qos_that_is_asked_for() -> None:
     with feedforward_bench(**overrides) as node:
         info, = node.bench.probe.get_publishers_info_by_topic('/feedforward/commands')
         assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-        assert node.node._subscription.qos_profile.depth == 7
+        assert node.node._subscriptions[0].qos_profile.depth == 7
         status, = node.bench.probe.get_publishers_info_by_topic('/feedforward/status')
         assert status.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         others, = node.bench.probe.get_publishers_info_by_topic('/feedforward/joint_command')

@@ -31,7 +31,8 @@ class FeedforwardBench:
     """The node, its topics and a publisher."""
 
     def __init__(
-        self, bench: Bench, message: type = MultiDOFJointTrajectory, **options: Any,
+        self, bench: Bench, message: type = MultiDOFJointTrajectory, topic: str = 'trajectory',
+        **options: Any,
     ) -> None:
         self.bench = bench
         self.node = bench.add(FeedforwardNode, **options)
@@ -43,7 +44,7 @@ class FeedforwardBench:
         self.joint_trajectory = bench.listen(JointTrajectory, '/feedforward/joint_trajectory')
         bench.follow_status('/feedforward/status')
         self.publisher = bench.probe.create_publisher(
-            message, '/feedforward/trajectory', 100)
+            message, f'/feedforward/{topic}', 100)
 
     def connect(self) -> FeedforwardBench:
         """Wait until node and probe see each other on every topic."""
@@ -86,17 +87,18 @@ class FeedforwardBench:
 
 @contextmanager
 def feedforward_bench(
-    message: type = MultiDOFJointTrajectory, **parameters: Any,
+    message: type = MultiDOFJointTrajectory, topic: str = 'trajectory', **parameters: Any,
 ) -> Iterator[FeedforwardBench]:
     """Give a running node with parameters of its own; it never goes stale unless told to.
 
-    Keywords are parameters with `__` for the dot, `message` what asks the node for forces.
+    Keywords are parameters with `__` for the dot, `message` on `topic` what asks the node for
+    forces.
     """
     values = {'command_timeout': 0.0, **parameters}
     overrides = [Parameter(name.replace('__', '.'), value=value)
                  for name, value in values.items()]
     with bench() as running:
-        yield FeedforwardBench(running, message, parameter_overrides=overrides).connect()
+        yield FeedforwardBench(running, message, topic, parameter_overrides=overrides).connect()
 
 
 def random_motion(rng: np.random.Generator, points: int) -> PlatformMotion:

@@ -37,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
                         choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
-                        f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm '
-                        f'{", ".join(ARM_EFFECTS)}')
+                        f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm or a '
+                        f'robot with loops {", ".join(ARM_EFFECTS)}')
     parser.add_argument('--scale', type=number(0.0, 1e6), default=1.0,
                         help='multiplies the strength of the effects (default 1)')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')

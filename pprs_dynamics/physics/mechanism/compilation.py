@@ -30,6 +30,7 @@ REPLACED: dict[Any, Any] = {
 PHYSICS = Path(__file__).parents[1]
 
 
+@cache
 def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
     """Return the compiler of a kernel's loop, or None without Numba or a place for its cache.
 

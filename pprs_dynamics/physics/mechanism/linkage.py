@@ -116,7 +116,7 @@ def new_motion(t: Tables, samples: int) -> Motion:
     shapes = dict.fromkeys(Motion._fields, (joints, 3)) | dict.fromkeys('qva', (coordinates,)) | {
         'R': (joints, 3, 3), 'A': (loops, 3, 3), 'B': (loops, 3, 3), 'pA': (loops, 3),
         'pB': (loops, 3), 'T': (coordinates, len(t.drives)), 'J': (count, count),
-        'inverse': (count, count), 'rows': (count, len(t.drives) + 1), 'state': (2,)}
+        'inverse': (count, count), 'rows': (count, len(t.drives) + 1), 'state': (3,)}
     return Motion(**{name: np.zeros((samples, *shape)) for name, shape in shapes.items()})
 
 

@@ -61,6 +61,8 @@ class Tables(NamedTuple):
         Of the two pairs.
     path_start : (L + 1,), path_joint, path_sign : int arrays
         Joints between a closure's two links, 1 on the side of B, -1 on that of A.
+    row_unit, passive_unit : (r,) arrays
+        The mechanism's size for lengths, 1 for angles: units in which conditioning is judged.
     """
 
     parent: Any
@@ -87,6 +89,8 @@ class Tables(NamedTuple):
     path_start: Any
     path_joint: Any
     path_sign: Any
+    row_unit: Any
+    passive_unit: Any
 
 
 class Motion(NamedTuple):
@@ -106,8 +110,8 @@ class Motion(NamedTuple):
         J_p and its inverse.
     rows : (r, D + 1) array
         Scratch.
-    state : (2,) array
-        Largest row before the last step; determinant of J_p.
+    state : (3,) array
+        Largest row before the last step; determinant and condition number of J_p.
     """
 
     q: Any
@@ -333,6 +337,7 @@ def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
                 inverse[r, c] = 1.0 if r == c else 0.0
         m.state[1] = solve(m.J, inverse, count, count)
         gradients(t, m, passive_of, m.J)
+        m.state[2] = condition(t, m)
         gradients(t, m, drive_of, rows)
         for c in range(count):
             for d in range(drives):
@@ -357,6 +362,19 @@ def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
                 x = x + inverse[c, r] * rows[r, 0]
             a[passive[c]] = -x
         accelerations(t, m)
+
+
+def condition(t: Tables, m: Motion) -> Any:
+    """Return the condition number of J_p, in Frobenius' norm."""
+    J, inverse, row_unit, unit = m.J, m.inverse, t.row_unit, t.passive_unit
+    there = back = 0.0 * m.q[0]
+    for r in range(len(row_unit)):
+        for c in range(len(unit)):
+            x = J[r, c] * (unit[c] / row_unit[r])
+            y = inverse[c, r] * (row_unit[r] / unit[c])
+            there = there + x * x
+            back = back + y * y
+    return sqrt(there * back)
 
 
 def velocities(t: Tables, m: Motion) -> None:

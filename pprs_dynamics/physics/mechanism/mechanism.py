@@ -20,12 +20,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage import (
-    follow,
-    friction_efforts,
-    press,
-    twists,
-)
+from pprs_dynamics.physics.mechanism.linkage import follow, friction_efforts, press, twists
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction, Loads, Motion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
@@ -33,7 +28,6 @@ from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
 
 # Condition number of the loops, lengths in units of the mechanism's size, over that at home.
 WORST_CONDITION = 300.0
-CONDITIONS = 64  # samples at most at which it is looked at, evenly spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +168,10 @@ class Linkage:
 
     @classmethod
     def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
-           ) -> Linkage:
-        """Return the motion, or raise as `Mechanism.at`."""
+           start: Array | None = None) -> Linkage:
+        """Return the motion, or raise as `Mechanism.at`; see `follow` on `start`."""
         t = structure.tables
-        motion, failed = follow(t, structure.home, position, velocity, acceleration)
+        motion, failed = follow(t, structure.home, position, velocity, acceleration, start)
         if failed >= 0:
             raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
                                  'must be within reach, on the way from home')
@@ -193,36 +187,24 @@ class Linkage:
 
     @property
     def condition(self) -> Array:
-        """Condition number of the loops over that at home, at `CONDITIONS` samples at most."""
-        chosen = self.motion.inverse[::-(-len(self.motion.q) // CONDITIONS)]
-        s = self.structure
-        t = s.tables
-        slides = np.array([not t.turns[np.flatnonzero(t.coordinate == c)[0]] for c in t.passive])
-        columns, rows = np.where(slides, s.size, 1.0), np.where(t.row_kind == 0, 1 / s.size, 1.0)
-        scaled = chosen / columns[:, None] / rows
-        with np.errstate(all='ignore'):
-            condition: Array = np.linalg.cond(np.where(np.isfinite(scaled), scaled, 1e300))
-        return condition / s.mobility.condition
+        """Condition number of the loops over that at home, (N,); 0 without loops."""
+        home = self.structure.home_state[2]
+        condition: Array = self.motion.state[:, 2] / home if home else self.motion.state[:, 2]
+        return condition
 
     def _require_regular(self) -> None:
-        determinant = self.motion.state[:, 1]
-        home = self._home_determinant
-        turned = np.flatnonzero(~(determinant * home > 0))
-        if len(turned):
+        lost = ~(self.motion.state[:, 1] * self.structure.home_state[1] > 0)
+        if lost.any():
             raise SingularityError(
-                int(turned[0]), 'the motion leaves the assembly of home through a singularity',
-                'the determinant of the loops must keep its sign')
+                int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
+                'singularity', 'the determinant of the loops must keep its sign')
         condition = self.condition
-        if not np.all(condition < WORST_CONDITION):
-            step = -(-len(determinant) // CONDITIONS)
-            worst = int(np.argmax(~(condition < WORST_CONDITION)))
+        poor = ~(condition < WORST_CONDITION)
+        if poor.any():
+            worst = int(np.argmax(poor))
             raise SingularityError(
-                worst * step, f'the loops are {condition[worst]:.3g} times worse conditioned than '
-                'at home', f'must be below {WORST_CONDITION:g}: the drives nearly lose hold')
-
-    @property
-    def _home_determinant(self) -> float:
-        return home_determinant(self.structure)
+                worst, f'the loops are {condition[worst]:.3g} times worse conditioned than at home',
+                f'must be below {WORST_CONDITION:g}: the drives nearly lose hold')
 
     def frame_of(self, link: str) -> Frame:
         """Return the frames of a link in the base's, R (N, 3, 3) and p (N, 3)."""
@@ -295,14 +277,6 @@ class Linkage:
         return found.reshape(samples, drives, -1)
 
 
-def home_determinant(structure: Structure) -> float:
-    """Return the determinant of the loops at home."""
-    t = structure.tables
-    q = structure.home[None, t.drives]
-    motion, _ = follow(t, structure.home, q, np.zeros_like(q), np.zeros_like(q))
-    return float(motion.state[0, 1])
-
-
 @dataclass(frozen=True, eq=False)
 class LinkageState(JointMotion):
     """A motion of a mechanism's drives with the quantities that effects take, (N, D) each."""
@@ -334,7 +308,7 @@ class LinkageState(JointMotion):
     @cached_property
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
-        efforts = self.linkage.efforts(self.robot) + self.robot.armature * self.acceleration
+        efforts: Array = self.reactions.efforts + self.robot.armature * self.acceleration
         if self.load is not None:
             efforts = efforts + self.linkage.wrench_efforts(self.load.wrench)
         return efforts

@@ -30,8 +30,8 @@ from pprs_dynamics.physics.mechanism.description import (
     Loop,
     inertial_in,
 )
-from pprs_dynamics.physics.mechanism.linkage import Integers, survey
-from pprs_dynamics.physics.mechanism.linkage_equations import Tables
+from pprs_dynamics.physics.mechanism.linkage import Integers, follow, survey
+from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Tables
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
@@ -85,6 +85,14 @@ class Structure:
     def home(self) -> Array:
         """Closed coordinates, (C,)."""
         return self.mobility.home
+
+    @cached_property
+    def home_state(self) -> Array:
+        """`Motion.state` at home, (3,)."""
+        q = self.home[None, self.tables.drives]
+        motion, _ = follow(self.tables, self.home, q, np.zeros_like(q), np.zeros_like(q))
+        state: Array = motion.state[0]
+        return state
 
     @cached_property
     def inertial(self) -> Array:
@@ -292,7 +300,9 @@ class _Builder:
             _integers([k for k, _ in kept]), _integers([row[0] for _, row in kept]),
             np.array([row[1] for _, row in kept], dtype=np.int64).reshape(-1, 4),
             np.array([row[2] for _, row in kept], dtype=float).reshape(-1, 2),
-            _integers(starts), _integers(joints), np.array(signs, dtype=float))
+            _integers(starts), _integers(joints), np.array(signs, dtype=float),
+            np.array([size if row[0] == TRANSLATION else 1.0 for _, row in kept]),
+            np.array([size if self.slides[c] else 1.0 for c in passive]))
 
     def _on(self, loop: Loop, side: str) -> tuple[int, Frame]:
         link, frame = ((loop.a, loop.frame_a) if side == 'a' else (loop.b, loop.frame_b))

@@ -27,8 +27,10 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import REVOLUTE
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import (
     RIGID_BODY,
@@ -77,7 +79,6 @@ class ArmModel(ForceModel):
     """
 
     kind: ClassVar[str] = ARM
-    title: ClassVar[str] = 'a serial arm'
 
     robot: Mechanism
 
@@ -195,12 +196,25 @@ class ArmModel(ForceModel):
                        reversal=Reversal(width, values.get('friction.reversal_rate', common)),
                        values=values, source=source)
 
-    def drive_forces(self, motion: JointMotion, state: ModelState | None = None) -> ArmForces:
+    @cached_property
+    def tool_pose(self) -> ToolPose:
+        """The drives' motion from that of the tool.
+
+        Raises
+        ------
+        ModelError
+            Where the tool's pose does not determine the drives.
+        """
+        return ToolPose(self.robot.structure)
+
+    def drive_forces(self, motion: JointMotion | PlatformMotion,
+                     state: ModelState | None = None) -> ArmForces:
         """Return the efforts that the joints need for a motion.
 
         Parameters
         ----------
-        motion : JointMotion
+        motion : JointMotion or PlatformMotion
+            Of the drives, or of the tool in the base where its pose determines them.
         state : ModelState, optional
             Carries effects with memory from call to call; see `DriveModel.drive_forces`.
         """
@@ -208,10 +222,13 @@ class ArmModel(ForceModel):
         with np.errstate(over='ignore', invalid='ignore'):
             return self.forces_at(self.mechanism(motion), state)
 
-    def mechanism(self, motion: JointMotion) -> LinkageState:
-        """Return what effects take of a motion."""
+    def mechanism(self, motion: JointMotion | PlatformMotion) -> LinkageState:
+        """Return what effects take of a motion; see `drive_forces`."""
+        known = None
+        if isinstance(motion, PlatformMotion):
+            motion, known = self.tool_pose.linkage(motion)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                            robot=self.robot, reversal=self.reversal)
+                            robot=self.robot, reversal=self.reversal, known=known)
 
     def forces_at(self, mechanism: LinkageState, state: ModelState | None = None) -> ArmForces:
         """Return the efforts at a state of the arm; see `drive_forces`."""

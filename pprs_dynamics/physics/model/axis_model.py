@@ -84,7 +84,6 @@ class AxisModel(ForceModel):
     """
 
     kind: ClassVar[str] = SINGLE_AXIS
-    title: ClassVar[str] = 'a single axis'
     drives: ClassVar[tuple[str, ...]] = (AXIS,)
     keys = AXIS_KEYS
 

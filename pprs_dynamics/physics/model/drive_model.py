@@ -35,7 +35,7 @@ from pprs_dynamics.physics.model.force_model import (
     ModelState,
     total_force,
 )
-from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism
+from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
@@ -90,7 +90,6 @@ class DriveModel(ForceModel):
     """
 
     kind: ClassVar[str] = PLATFORM
-    title: ClassVar[str] = 'a 3-PPRS'
     drives: ClassVar[tuple[str, ...]] = DRIVES
     keys = KEYS
 
@@ -138,9 +137,9 @@ class DriveModel(ForceModel):
             other = next((name for name in parameters if is_axis((name,)) or is_mechanism((name,))),
                          None)
             if other is not None:
-                kind = 'a serial arm' if is_mechanism((other,)) else 'a single axis'
                 raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
-                                 f'{kind} is for pprs compare, diagnose, adopt, fit and history')
+                                 f'{title_of(parameters)} is for pprs compare, diagnose, adopt, '
+                                 'fit and history')
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:

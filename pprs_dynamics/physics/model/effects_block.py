@@ -13,7 +13,7 @@ from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.keys import Key
+from pprs_dynamics.physics.model.keys import Key, title_of
 
 # Keys of the block `effects` that are no effect.
 LISTS = ('effects.active', 'effects.measured')
@@ -42,7 +42,7 @@ def added_effects(
         found = find_effect(name)
         if found is None:
             raise UnknownNameError('effect', name, catalogue(), 'effects')
-        _check_place(name, block, found, kind, drives)
+        _check_place(name, block, found, kind, drives, title_of(parameters))
         found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
         effect = found.from_file(block, complete=name in active)
@@ -55,11 +55,11 @@ def added_effects(
         raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
 
 
-def _check_place(name: str, block: Any, effect: type[CatalogueEffect],
-                 kind: type[ForceModel], drives: tuple[str, ...]) -> None:
+def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: type[ForceModel],
+                 drives: tuple[str, ...], title: str) -> None:
     """Raise ModelError where an effect is not one of this kind of model, or on another drive."""
     if not kind.offers(effect):
-        raise ModelError(f'effects.{name}', block, 'be an effect that acts in ' + kind.title)
+        raise ModelError(f'effects.{name}', block, 'be an effect that acts in ' + title)
     if issubclass(effect, DriveEffect) and isinstance(block, Mapping):
         for drive in block:
             if drive not in drives:

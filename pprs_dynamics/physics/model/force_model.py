@@ -24,7 +24,7 @@ from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.model.keys import Key
+from pprs_dynamics.physics.model.keys import Key, title_of
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 from pprs_dynamics.physics.three_pprs.state import DriveStates
 
@@ -114,8 +114,6 @@ class ForceModel(ABC):
     ----------------
     kind : {'platform', 'axis', 'arm'}
         Effects say in which kinds they act.
-    title : str
-        What it is a model of, for a sentence.
 
     Attributes
     ----------
@@ -125,7 +123,6 @@ class ForceModel(ABC):
     """
 
     kind: ClassVar[str]
-    title: ClassVar[str]
 
     effects: tuple[Effect, ...]
     reversal: Reversal
@@ -141,6 +138,11 @@ class ForceModel(ABC):
     @abstractmethod
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
+
+    @property
+    def title(self) -> str:
+        """What it is a model of, for a sentence."""
+        return title_of(self.values)
 
     @property
     def units(self) -> tuple[DriveUnits, ...]:

@@ -316,6 +316,17 @@ def is_mechanism(names: Iterable[str]) -> bool:
     return bool(mechanism_block(names))
 
 
+def title_of(parameters: Mapping[str, Any]) -> str:
+    """Return what keys and values are a model of, for a sentence."""
+    block = mechanism_block(parameters)
+    if block == ROBOT and any(name.startswith('robot.loops.') or (name == 'robot.mjcf' and value)
+                              for name, value in parameters.items()):
+        return 'a robot with loops'
+    if block:
+        return 'a serial arm'
+    return 'a single axis' if is_axis(parameters) else 'a 3-PPRS'
+
+
 def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
     """Return the keys of the kind of model that some keys and values belong to."""
     block = mechanism_block(parameters)

@@ -12,6 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.laws.passive_friction import IndependentChainsFriction
+from pprs_dynamics.physics.mechanism.mechanism import WORST_CONDITION
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
@@ -29,9 +30,9 @@ class Margins:
     Parameters
     ----------
     singularity : float or None
-        1 minus the largest of: condition number over its limit, smallest sine of a rod angle
-        over that of the rods, and, with independent chains, the ratio for the cosine. None for an
-        arm: what moves joints comes near none.
+        1 minus the largest of: condition number over its limit, of the 3-PPRS smallest sine of a
+        rod angle over that of the rods, and, with independent chains, the ratio for the cosine.
+        None without loops: what moves joints comes near none.
     workspace : float
         Distance of a drive from an end of its stroke, over half the stroke.
     drive : str
@@ -59,7 +60,11 @@ def margins(model: DriveModel | ArmModel, mechanism: Any) -> Margins:
             upper - lower) * 2
     room = np.where(np.isnan(room), 1.0, room)
     nearest = int(room.argmin())
-    singularity = _singularity(model, mechanism) if isinstance(model, DriveModel) else None
+    singularity = None
+    if isinstance(model, DriveModel):
+        singularity = _singularity(model, mechanism)
+    elif model.robot.structure.loops:
+        singularity = float(1 - mechanism.linkage.condition.max() / WORST_CONDITION)
     return Margins(singularity, float(room[nearest]), model.drives[nearest])
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages.cdr_validation import message_in
@@ -22,6 +23,8 @@ from pprs_dynamics.ros.messages.trajectory_request import (
     read_trajectory,
 )
 
+TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
+
 
 class RequestReader(NamedTuple):
     """How requests arrive.
@@ -29,7 +32,6 @@ class RequestReader(NamedTuple):
     Parameters
     ----------
     message : type
-        On `~/trajectory`.
     read : callable
         Bytes, time of arrival [ns], largest age [s] and what to do about missing derivatives ->
         TrajectoryRequest; see `read_trajectory`.
@@ -37,6 +39,25 @@ class RequestReader(NamedTuple):
 
     message: type
     read: Callable[[bytes, int, float, str], TrajectoryRequest]
+
+
+def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
+    """Return how trajectories for a model arrive, by topic.
+
+    A robot with loops takes the motion of its drives, and beside it that of its tool where the
+    tool's pose determines the drives.
+    """
+    readers = {TRAJECTORY: reader_for(model, names)}
+    if isinstance(model, ArmModel):
+        try:
+            tool = model.tool_pose.structure.tool
+        except ModelError:
+            return readers
+        frame = (names and names.frame) or str(model.values[f'{model.block}.base'])
+        readers[POSES] = RequestReader(
+            MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
+                message_in(data, MultiDOFJointTrajectory), now, age, missing, frame, tool))
+    return readers
 
 
 def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:

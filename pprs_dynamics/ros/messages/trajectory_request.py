@@ -69,7 +69,7 @@ def read_serialised(
 
 def read_trajectory(
     message: MultiDOFJointTrajectory, now: int, max_age: float = 0.0, missing: str = REJECT,
-    frame: str = BASE,
+    frame: str = BASE, body: str = PLATFORM,
 ) -> TrajectoryRequest:
     """Return the platform motion that a message asks for.
 
@@ -85,6 +85,8 @@ def read_trajectory(
         that are missing from a spline through the poses.
     frame : str
         In which poses must be given.
+    body : str
+        Whose they must be.
 
     Raises
     ------
@@ -94,9 +96,9 @@ def read_trajectory(
     points = message.points
     if not points:
         raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
-    if list(message.joint_names) != [PLATFORM]:
+    if list(message.joint_names) != [body]:
         raise Rejection('NAMES', f'joint_names is {list(message.joint_names)!r:.100}, '
-                        f'must be [{PLATFORM!r}]')
+                        f'must be [{body!r}]')
     if message.header.frame_id not in ('', frame):
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
                         f'must be {frame!r} or empty')

@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Inverse kinematics of a robot with loops: the drives' motion from that of the tool.
+
+The tool's pose becomes six coordinates of the mechanism, three slides along the base's axes and
+three turns about the tool's axes at home, tied to the tool by a closure of type `fixed`. Of these
+coordinates as many are given as the robot has drives; the drives are then passive, and
+`linkage.follow` closes the loops for them as it does for the drives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism.closures import RANK, ROWS
+from pprs_dynamics.physics.mechanism.description import Frame
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.linkage import Integers, follow, twists
+from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Tables
+from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.structure import STRIDE_SLIDE, STRIDE_TURN, Structure
+
+COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
+SLIDES = 3  # the first of them
+# What a robot with less than six drives cannot choose may be off by this much [m, rad]: poses in
+# messages are rounded, and a tool's frame is drawn to no better.
+FOLLOWED = 1e-3
+
+
+class ToolPose:
+    """The motion of a robot's drives from that of its tool.
+
+    Parameters
+    ----------
+    structure : Structure
+
+    Attributes
+    ----------
+    chosen : int array
+        Which of `COORDINATES` the drives follow; the others are then what they are.
+
+    Raises
+    ------
+    ModelError
+        Where the tool's pose does not determine the drives at home: of a robot without loops it
+        does so in several ways, and a drive may not move the tool at all.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+        t, home = structure.tables, structure.home
+        row, frame = structure.links[structure.tool]
+        q = home[None, t.drives]
+        m, _ = follow(t, home, q, np.zeros_like(q), np.zeros_like(q))
+        self.home = Frame(m.R[0, row], m.p[0, row]) @ frame
+        W, U = (each[0, row] for each in twists(t, m))
+        lever = m.R[0, row] @ frame.p
+        linear, angular = U + np.cross(W, lever, axis=0), W
+        self.chosen = _independent(np.vstack((linear / structure.size,
+                                              (self.home.R.T @ angular)[::-1])))
+        if not structure.loops or len(self.chosen) < len(t.drives):
+            raise ModelError('robot.tool', structure.tool, 'be a link of a robot with loops whose '
+                             'pose determines all drives, for a trajectory of its poses')
+        self._tied = replace(
+            structure, tables=_with_pose(t, row, frame, self.home, self.chosen, len(home),
+                                         structure.size),
+            mobility=replace(structure.mobility, home=np.append(home, np.zeros(6))))
+
+    def linkage(self, motion: PlatformMotion) -> tuple[JointMotion, Linkage]:
+        """Return the motion of the drives, and of all links, for that of the tool in the base.
+
+        Parameters
+        ----------
+        motion : PlatformMotion
+            Of the tool's origin and axes. Twists along what the robot cannot choose are not read.
+
+        Raises
+        ------
+        WorkspaceError
+            Where the tool cannot be there, in position or in attitude.
+        SingularityError
+            Where its pose does not determine the drives, or these not the motion.
+        """
+        q, v, a = self._coordinates(motion)
+        given = self.chosen
+        try:
+            tied = Linkage.of(self._tied, *(np.ascontiguousarray(each[:, given])
+                                            for each in (q, v, a)))
+        except SingularityError as error:
+            raise SingularityError(
+                error.sample, 'the pose of the tool does not determine the drives',
+                'must be on the way from home without a singular pose') from None
+        except WorkspaceError as error:
+            raise WorkspaceError(error.sample, f'{self.structure.tool} cannot be at '
+                                 f'{_in_words(motion, error.sample)}',
+                                 'must be within reach, on the way from home') from None
+        found, count, drives = tied.motion, len(self.structure.home), self.structure.tables.drives
+        self._require_followed(q, found.q[:, count:])
+        position, velocity, acceleration = (
+            np.ascontiguousarray(each[:, drives]) for each in (found.q, found.v, found.a))
+        moved = JointMotion(position, velocity, acceleration, motion.time)
+        return moved, Linkage.of(self.structure, moved.position, moved.velocity,
+                                 moved.acceleration, found.q[0, :count])
+
+    def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:
+        """Return the six coordinates of the motion with their derivatives, (N, 6) each.
+
+        With R = R_home Rz(psi) Ry(theta) Rx(phi) and the angular velocity w in the axes of home:
+        w = psi' z + theta' Rz y + phi' Rz Ry x. No number where theta is 90 degrees.
+        """
+        turn = self.home.R.T @ motion.rotation
+        psi, phi = (np.arctan2(turn[:, 1, 0], turn[:, 0, 0]),
+                    np.arctan2(turn[:, 2, 1], turn[:, 2, 2]))
+        s_theta = -turn[:, 2, 0]
+        c_theta = np.hypot(turn[:, 2, 1], turn[:, 2, 2])
+        s, c = np.sin(psi), np.cos(psi)
+        w_x, w_y, w_z = (motion.angular_velocity @ self.home.R).T
+        e_x, e_y, e_z = (motion.angular_acceleration @ self.home.R).T
+        with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+            across = w_y * c - w_x * s  # theta'
+            d_phi = (w_x * c + w_y * s) / c_theta
+            d_psi = w_z + d_phi * s_theta
+            dd_theta = e_y * c - e_x * s - d_psi * (w_x * c + w_y * s)
+            dd_phi = (e_x * c + e_y * s + (d_psi + d_phi * s_theta) * across) / c_theta
+            dd_psi = e_z + dd_phi * s_theta + d_phi * across * c_theta
+        angles = ((psi, np.arctan2(s_theta, c_theta), phi), (d_psi, across, d_phi),
+                  (dd_psi, dd_theta, dd_phi))
+        places = (motion.position - self.home.p, motion.linear_velocity,
+                  motion.linear_acceleration)
+        q, v, a = (np.column_stack((place, *three))
+                   for place, three in zip(places, angles, strict=True))
+        return q, v, a
+
+    def _require_followed(self, wanted: Array, found: Array) -> None:
+        """Raise WorkspaceError where what the robot cannot choose is not as it was asked for."""
+        off = np.abs(wanted - found)
+        if np.all(off <= FOLLOWED):
+            return
+        sample, k = np.unravel_index(np.argmax(~(off <= FOLLOWED)), off.shape)
+        unit = 'm' if k < SLIDES else 'rad'
+        raise WorkspaceError(
+            int(sample), f'{self.structure.tool} would have to be at {COORDINATES[k]} '
+            f'{wanted[sample, k]:.4f} {unit} from home, but its {len(self.structure.drives)} '
+            f'drives bring it to {found[sample, k]:.4f} {unit}', f'may be off by {FOLLOWED:g} '
+            f'{unit}')
+
+
+def _in_words(motion: PlatformMotion, sample: int) -> str:
+    x, y, z = motion.position[sample]
+    return (f'({x:.4g}, {y:.4g}, {z:.4g}) m, turned by '
+            f'{np.degrees(np.hypot(motion.tilt[sample], motion.turn[sample])):.3g} degrees')
+
+
+def _independent(rows: Array) -> Integers:
+    """Return rows (6, D) that are independent, translations before rotations, in their order."""
+    chosen: list[int] = []
+    left = rows.copy()
+    for first, last in ((0, SLIDES), (SLIDES, len(rows))):
+        for _ in range(first, last):
+            sizes = np.linalg.norm(left[first:last], axis=1)
+            k = first + int(np.argmax(sizes))
+            if len(chosen) == rows.shape[1] or not sizes[k - first] > RANK:
+                break
+            direction = left[k] / sizes[k - first]
+            left = left - np.outer(left @ direction, direction)
+            chosen.append(k)
+    return np.sort(np.array(chosen, dtype=np.int64))
+
+
+def _with_pose(t: Tables, row: int, frame: Frame, home: Frame, chosen: Integers, count: int,
+               size: float) -> Tables:
+    """Return tables with the pose's coordinates, those chosen as drives, tied to the tool."""
+    first, k = len(t.parent), len(t.loop_a)
+    units = np.where(np.arange(len(COORDINATES)) < SLIDES, size, 1.0)
+    strides = np.where(np.arange(len(COORDINATES)) < SLIDES, STRIDE_SLIDE * size, STRIDE_TURN)
+    left = np.setdiff1d(np.arange(len(COORDINATES)), chosen)
+    slides = {int(c): not turns for c, turns in zip(t.coordinate, t.turns, strict=True) if c >= 0}
+    axes, turned = np.eye(3)[[0, 1, 2, 2, 1, 0]], np.tile(np.eye(3), (6, 1, 1))
+    origins = np.zeros((6, 3))
+    origins[0], turned[SLIDES] = home.p, home.R
+    way = []
+    while row:
+        way.append(row)
+        row = int(t.parent[row])
+    ties, joints = ROWS['fixed'], np.arange(first, first + 6)
+    added = {
+        'parent': [0, *joints[:-1]], 'turns': [False] * 3 + [True] * 3, 'place_R': turned,
+        'place_p': origins, 'axis': axes, 'coordinate': count + np.arange(6), 'ratio': np.ones(6),
+        'offset': np.zeros(6), 'passive': [*t.drives, *(count + left)],
+        'loop_a': way[:1], 'loop_b': joints[-1:], 'a_R': frame.R[None], 'a_p': frame.p[None],
+        'b_R': np.eye(3)[None], 'b_p': np.zeros((1, 3)), 'row_loop': [k] * len(ties),
+        'row_kind': [tie[0] for tie in ties], 'row_axes': [tie[1] for tie in ties],
+        'row_weights': [tie[2] for tie in ties],
+        'path_start': [t.path_start[-1] + len(joints) + len(way)],
+        'path_joint': [*joints[::-1], *way], 'path_sign': [1.0] * len(joints) + [-1.0] * len(way),
+        'row_unit': [size if tie[0] == TRANSLATION else 1.0 for tie in ties],
+        'passive_unit': [*(size if slides[int(c)] else 1.0 for c in t.drives), *units[left]]}
+    return t._replace(
+        drives=count + chosen, stride=strides[chosen],
+        **{name: np.concatenate((getattr(t, name), np.asarray(values, getattr(t, name).dtype)))
+           for name, values in added.items()})
