@@ -5,6 +5,7 @@
 
     ros2 launch pprs_dynamics demo.launch.py
     ros2 launch pprs_dynamics demo.launch.py hidden_effects:="['stribeck_friction']"
+    ros2 launch pprs_dynamics demo.launch.py model:=/path/share/pprs_dynamics/config/hexapod.yaml
 """
 
 from launch.actions import DeclareLaunchArgument
@@ -40,7 +41,7 @@ def generate_launch_description() -> LaunchDescription:
         Node(executable='monitor', parameters=[given['model'], {
             'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
              **common),
-        Node(executable='play_trajectory', parameters=[{
+        Node(executable='play_trajectory', parameters=[given['model'], {
             'rate': ParameterValue(given['rate'], value_type=float),
             'repeat': ParameterValue(given['repeat'], value_type=int),
             'source': 'excitation', 'lead_in': 2.0, 'ahead': 0.05}], **common),

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 # Of the 3-PPRS of the paper.
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
+COUNT = len(DRIVES)
 
 # Units of a drive that pushes, and of the same quantity of one that turns.
 TURNED = {'m': 'rad', 'm/s': 'rad/s', 'm/s^2': 'rad/s^2', 'N': 'N m', 'kg': 'kg m^2',

@@ -50,9 +50,10 @@ class Hidden:
         return cls(words, drawn_with, tuple(
             kept.pop(word, effect) for word, effect in zip(words, effects, strict=True)))
 
-    def __str__(self) -> str:
-        truths = [effect.truth() for effect in self.effects]
-        return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
+
+def in_words(truths: Iterable[Mapping[str, Any]]) -> str:
+    """Return what is hidden, for the log."""
+    return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
 
 
 class HiddenParameters:
@@ -65,17 +66,18 @@ class HiddenParameters:
         The node's own.
     own : mapping
         Their values now.
-    hidden : Hidden
-        What is hidden now.
+    hidden : Hidden or None
+        What is hidden now; None of a robot in which that stays, too.
     use : callable
         Called with what is hidden from now on.
     """
 
     def __init__(self, node: Node, declared: Iterable[NodeParameter], own: Mapping[str, Any],
-                 hidden: Hidden, use: Callable[[Hidden], None]) -> None:
+                 hidden: Hidden | None, use: Callable[[Hidden], None]) -> None:
         self._node, self._use = node, use
-        self._declared = {one.name: one for one in declared if one.name in CHANGEABLE}
-        self._own = {name: own[name] for name in CHANGEABLE}
+        self._declared = {one.name: one for one in declared
+                          if hidden is not None and one.name in CHANGEABLE}
+        self._own = {name: own[name] for name in self._declared}
         self._hidden = hidden
         self._checked = self._own, hidden
         node.add_on_set_parameters_callback(self.check)
@@ -88,11 +90,13 @@ class HiddenParameters:
         before, after = current_values(self._node), current_values(self._node, changes)
         try:
             for name in (change.name for change in changes):
-                if name not in (*CHANGEABLE, *OF_ROS) and before.get(name) != after.get(name):
+                if name not in (*self._declared, *OF_ROS) and before.get(name) != after.get(name):
                     raise ModelError(name, after.get(name), 'stay as it was at the start: of a '
-                                     f'running robot only {", ".join(CHANGEABLE)} change')
+                                     'running robot only '
+                                     f'{", ".join(self._declared) or "the clock"} change')
             own = {name: one.check(after.get(name)) for name, one in self._declared.items()}
-            self._checked = own, Hidden.of(own, self._hidden)
+            if self._hidden is not None:
+                self._checked = own, Hidden.of(own, self._hidden)
         except PprsError as error:
             return SetParametersResult(successful=False, reason=with_hint(error))
         return SetParametersResult(successful=True)
@@ -101,4 +105,5 @@ class HiddenParameters:
         # What was checked, and nothing else, comes into force.
         if self._own != self._checked[0] and not are_of_topics(changes):
             self._own, self._hidden = self._checked
-            self._use(self._hidden)
+            if self._hidden is not None:
+                self._use(self._hidden)

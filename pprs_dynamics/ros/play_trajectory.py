@@ -1,30 +1,47 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node `play_trajectory`: publishes a path of the platform in real time, then ends."""
+"""Node `play_trajectory`: publishes a path of the platform, or of joints, then ends."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from rclpy.duration import Duration
 from rclpy.node import Node
-from trajectory_msgs.msg import MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.trajectory_request import Motion
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
-from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, refuse_unknown
+from pprs_dynamics.ros.node.parameters import (
+    NodeParameter,
+    current_values,
+    declare_arm,
+    declare_own,
+    overrides,
+    refuse_unknown,
+)
 from pprs_dynamics.ros.node.qos import publisher
 from pprs_dynamics.ros.run import Finished
+from pprs_dynamics.simulation.arm_run import draw_motion
 
 # Fast DDS asks listeners every 3 s what they have got, which none tells by itself.
 ACKNOWLEDGED = Duration(seconds=4.0)
-SOURCES = ('helix', 'excitation', 'csv')
+EXCITATION = 'excitation'
+SOURCES = ('helix', EXCITATION, 'csv')
 
 PARAMETERS = (
     NodeParameter('source', 'helix', 'what to play', choices=SOURCES),
@@ -42,18 +59,33 @@ PARAMETERS = (
 )
 
 
+# Of an arm or a robot with loops: what goes with its model, given as to the other nodes.
+OF_JOINTS = tuple(
+    replace(one, default=EXCITATION, choices=(EXCITATION,)) if one.name == 'source' else one
+    for one in PARAMETERS if one.name not in ('file', 'lead_in'))
+
+
 class PlayTrajectoryNode(Node):
-    """Publishes one message per period, once somebody listens on `feedforward/trajectory`."""
+    """Publishes one message per period, once somebody listens on `feedforward/trajectory`.
+
+    With the model file of an arm or of a robot with loops it plays an excitation of its drives.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__('play_trajectory', **options)
-        values = declare_own(self, PARAMETERS)
+        joints = is_mechanism(overrides(self))
+        values = declare_own(self, OF_JOINTS if joints else PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
         self._ahead = values['ahead']
-        refuse_unknown(self)
-        self._motion = _path(values)
+        self._motion: Motion
+        if joints:
+            self._motion, self._write = _joints(self, values)
+        else:
+            refuse_unknown(self)
+            self._motion, self._write = _path(values), conversions.write_trajectory
         self._next, self._round = 0, 1
-        self._publisher = publisher(self, MultiDOFJointTrajectory, 'feedforward/trajectory')
+        self._publisher = publisher(
+            self, JointTrajectory if joints else MultiDOFJointTrajectory, 'feedforward/trajectory')
         self.get_logger().info(
             f'{values["source"]}, {len(self._motion)} messages at {self._rate:g} Hz; waiting for '
             f'a listener on {self._publisher.topic_name}')
@@ -74,8 +106,7 @@ class PlayTrajectoryNode(Node):
             self._next, self._round = 0, self._round + 1
         part = self._motion[self._next:self._next + self._points]
         offsets = [round(k * conversions.NANOSECONDS / self._rate) for k in range(len(part))]
-        self._publisher.publish(conversions.write_trajectory(
-            part, conversions.time(self._stamp()), offsets))
+        self._publisher.publish(self._write(part, conversions.time(self._stamp()), offsets))
         self._next += 1
 
     def _look_at_clock(self) -> None:
@@ -90,6 +121,16 @@ class PlayTrajectoryNode(Node):
         return self._start + round(self._next * conversions.NANOSECONDS / self._rate)
 
 
+def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[..., Any]]:
+    """Return an excitation of the drives of the node's model, and what writes its messages."""
+    declare_arm(node)
+    given = current_values(node)
+    model = ArmModel.from_parameters({name: given[name] for name in given.keys() - values.keys()})
+    motion = draw_motion(model, values['duration'] + 1 / values['rate'], values['seed'],
+                         values['rate'])
+    return motion, partial(conversions.write_joint_trajectory, joints=RobotNames.of(model).joints)
+
+
 def _path(values: dict[str, Any]) -> PlatformMotion:
     if values['source'] == 'csv':
         if not values['file']:
@@ -97,7 +138,7 @@ def _path(values: dict[str, Any]) -> PlatformMotion:
         motion = read_poses(values['file'], values['rate'])
     else:
         path: HelicalPath | Excitation = HelicalPath()
-        if values['source'] == 'excitation':
+        if values['source'] == EXCITATION:
             path = Excitation(duration=values['duration'], seed=values['seed'])
         # One step beyond the end, held there: the last message is the pose at rest.
         motion = path.motion(np.arange(0.0, path.duration + 1 / values['rate'], 1 / values['rate']))

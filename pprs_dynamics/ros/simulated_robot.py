@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node `simulated_robot`: a physics-engine 3-PPRS to run against, in real time."""
+"""Node `simulated_robot`: a robot in a physics engine to run against, in real time."""
 
 from __future__ import annotations
 
@@ -13,17 +13,23 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.ros.hidden_parameters import Hidden, HiddenParameters
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.keys import is_mechanism
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.ros.hidden_parameters import Hidden, HiddenParameters, in_words
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,
+    declare_arm,
     declare_model,
     declare_own,
+    overrides,
 )
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
@@ -31,6 +37,7 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.linkage_plant import STEP, LinkagePlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -52,6 +59,17 @@ PARAMETERS = (
     NodeParameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
     NodeParameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
+# Of an arm or a robot with loops, whose drives are in several units and sizes.
+OF_JOINTS = (
+    NodeParameter('rate', 500.0, 'of joint_states, a divisor of 500 [Hz]', lower=10, upper=500),
+    NodeParameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
+                  upper=50),
+    NodeParameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
+    *(one for one in PARAMETERS[3:] if one.name not in ('encoder_resolution', 'effort_noise')),
+    NodeParameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
+    NodeParameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
+                  'share of the largest effort of an excitation [1]', lower=0, upper=1),
+)
 # A node that was stopped for longer than this [s] goes on from now instead of catching up.
 LONGEST_CATCH_UP = 0.5
 # Between them the executor takes one command: with more, commands at 200 Hz would pile up.
@@ -68,13 +86,16 @@ class SimulatedRobotNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
-        own = declare_own(self, PARAMETERS)
-        declare_model(self)
+        of_joints = is_mechanism(overrides(self))
+        own = declare_own(self, OF_JOINTS if of_joints else PARAMETERS)
+        (declare_arm if of_joints else declare_model)(self)
         values = {name: value for name, value in current_values(self).items() if name not in own}
-        self._model = DriveModel.from_parameters(values)
+        self._model = build_model(values)
+        self._names = RobotNames.of(self._model)
         self._use_effort = own['use_effort']
-        hidden = Hidden.of(own)
-        self._robot = _robot(self._model.values, own, hidden.effects)
+        hidden = Hidden.of(own) if not of_joints else None
+        self._robot = (_mechanism(self._model, own) if isinstance(self._model, ArmModel)
+                       else _platform(self._model, own, hidden.effects if hidden else ()))
         self._queue = SetpointQueue(self._robot.control)
         self._period = round(conversions.NANOSECONDS / own['rate'])
         self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
@@ -87,8 +108,8 @@ class SimulatedRobotNode(ExplainsRefusals):
                                       (Float64MultiArray, '~/commands', self._on_efforts)):
             subscription(self, kind, topic, callback, raw=True)
         self.get_logger().info(
-            f'{own["rate"]:g} Hz, PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m, '
-            f'hidden effects: {hidden}; holding at home')
+            f'{self._model.title}, {own["rate"]:g} Hz, {_loop_in_words(own)}, '
+            f'hidden effects: {in_words(self._robot.hidden)}; holding at home')
         self._robot.tick()
         self._start = self.get_clock().now().nanoseconds
         # How far the simulation has fallen behind the clock for good, where it could not keep up.
@@ -101,7 +122,7 @@ class SimulatedRobotNode(ExplainsRefusals):
     def _hide(self, hidden: Hidden) -> None:
         self._robot.use_effects(hidden.effects)
         self.get_logger().info(f'from {self._robot.time + self._lag:.3f} s after the start on, '
-                               f'hidden effects: {hidden}')
+                               f'hidden effects: {in_words(self._robot.hidden)}')
 
     def _on_timer(self) -> None:
         behind = self._now() - self._lag - self._robot.time
@@ -126,7 +147,7 @@ class SimulatedRobotNode(ExplainsRefusals):
             self._queue.clear()
         measured = robot.tick()
         self._states.publish(conversions.joint_state(
-            stamp, measured.effort, measured.position, measured.velocity))
+            stamp, measured.effort, measured.position, measured.velocity, self._names))
         if held and not robot.control.holding:
             self._status.report('OK', 'OK', 'following commands')
         for note in robot.notes:
@@ -139,7 +160,8 @@ class SimulatedRobotNode(ExplainsRefusals):
         try:
             message = message_in(data, JointState)
             fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
-            setpoint = Setpoint(*(conversions.read_drives(message, field) for field in fields))
+            setpoint = Setpoint(*(conversions.read_drives(message, field, drives=self._names.joints)
+                                  for field in fields))
         except PprsError as error:
             self._refuse(str(error))
             return
@@ -154,9 +176,9 @@ class SimulatedRobotNode(ExplainsRefusals):
         except PprsError as error:
             self._refuse(str(error))
             return
-        efforts = np.array(message.data)
-        if efforts.shape != (6,) or not np.all(np.isfinite(efforts)):
-            self._refuse(f'data holds {len(efforts)} values, must be six finite efforts')
+        efforts, count = np.array(message.data), len(self._names.joints)
+        if efforts.shape != (count,) or not np.all(np.isfinite(efforts)):
+            self._refuse(f'data holds {len(efforts)} values, must be {count} finite efforts')
             return
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))
@@ -179,14 +201,36 @@ class SimulatedRobotNode(ExplainsRefusals):
         return (self.get_clock().now().nanoseconds - self._start) / conversions.NANOSECONDS
 
 
-def _robot(values: Any, own: dict[str, Any], effects: Sequence[HiddenEffect]) -> SimulatedRobot:
-    if 2000 % own['rate']:
-        raise ModelError('rate', own['rate'], PARAMETERS[0].rule)
+def _loop_in_words(own: dict[str, Any]) -> str:
+    if 'bandwidth' in own:
+        return f'PD loop of {own["bandwidth"]:g} Hz and a damping ratio of {own["damping_ratio"]:g}'
+    return f'PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m'
+
+
+def _platform(model: ForceModel, own: dict[str, Any], effects: Sequence[HiddenEffect],
+              ) -> SimulatedRobot:
+    _require_rate(own, PARAMETERS[0], 2000)
     return SimulatedRobot(
-        values, effects, seed=own['seed'], rate=own['rate'],
-        control=ControlSettings(
-            own['stiffness'], own['damping'], gravity_compensation=not own['use_effort'],
-            command_timeout=own['command_timeout'] or np.inf,
-            actuation_delay=own['actuation_delay']),
-        sensors=SensorSettings.with_effort_noise(
-            own['effort_noise'], own['encoder_resolution']))
+        model.values, effects, seed=own['seed'], rate=own['rate'],
+        control=ControlSettings(own['stiffness'], own['damping'], **_behaviour(own)),
+        sensors=SensorSettings.with_effort_noise(own['effort_noise'], own['encoder_resolution']))
+
+
+def _mechanism(model: ArmModel, own: dict[str, Any]) -> SimulatedRobot:
+    _require_rate(own, OF_JOINTS[0], round(1 / STEP))
+    plant = LinkagePlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'])
+    return SimulatedRobot(
+        plant, seed=own['seed'], rate=own['rate'],
+        control=plant.gains(own['bandwidth'], own['damping_ratio'], **_behaviour(own)),
+        sensors=SensorSettings.with_effort_noise(own['effort_noise'], own['encoder_resolution']))
+
+
+def _require_rate(own: dict[str, Any], parameter: NodeParameter, steps: int) -> None:
+    if steps % own['rate']:
+        raise ModelError('rate', own['rate'], parameter.rule)
+
+
+def _behaviour(own: dict[str, Any]) -> dict[str, Any]:
+    return {'gravity_compensation': not own['use_effort'],
+            'command_timeout': own['command_timeout'] or np.inf,
+            'actuation_delay': own['actuation_delay']}

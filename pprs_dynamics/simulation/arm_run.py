@@ -23,7 +23,7 @@ from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, f
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import Frame, body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION
+from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
@@ -126,6 +126,7 @@ class ArmEngine:
         self.model.body_iquat[body] = quaternion
 
     def _put(self, robot: Mechanism, row: int) -> None:
+        self.robot = robot
         at = int(np.flatnonzero(robot.bodies == row)[0])
         self._set_body(self.links[row], robot.inertial[at])
         self.engine.mj_setConst(self.model, self.data)
@@ -148,6 +149,15 @@ class ArmEngine:
         _, frame = self.structure.links[link]
         centre = frame.inverse.of_point(parameters[1:4] / parameters[0])
         self._put(self.robot.with_body(link, body_at(mass, tuple(centre), np.zeros((3, 3)))), row)
+
+    def inverse(self, motion: Motion) -> tuple[Array, Array]:
+        """Return efforts of all joints of the tree, (nv,), and its inertia, at one sample."""
+        self.model.opt.gravity[:] = self.root.R.T @ self.gravity
+        self.state.put(motion, 0)
+        self.engine.mj_inverse(self.model, self.data)
+        inertia = np.empty((self.model.nv, self.model.nv))
+        self.engine.mj_fullM(self.model, self.data, inertia)
+        return self.data.qfrc_inverse, inertia
 
     def torques(self, motion: JointMotion, gravity: Array | None = None,
                 passive: Mapping[str, Array] | None = None) -> Array:
@@ -227,13 +237,16 @@ def _bare(path: Path) -> str:
     return ElementTree.tostring(robot, encoding='unicode')
 
 
-def draw_motion(model: ArmModel, duration: float, seed: int) -> JointMotion:
-    """Return a random Fourier series of all drives within their limits and the workspace."""
+def draw_motion(model: ArmModel, duration: float, seed: int, rate: float = RATE) -> JointMotion:
+    """Return a random Fourier series of all drives within their limits and the workspace.
+
+    It begins and ends at rest, in the middle of the drives' room; see `Structure.room`.
+    """
     structure, random = model.robot.structure, np.random.default_rng(seed)
     middle, room = structure.room(np.pi)
     reach = np.minimum(0.9 * room, WIDEST)
     shape = random.normal(size=(len(model.drives), JointSeries.size(HARMONICS)))
-    time = np.arange(0.0, duration, 1 / RATE)
+    time = np.arange(0.0, duration, 1 / rate)
     raw = JointSeries(shape, middle, duration, HARMONICS)
     motion = raw.motion(time)
     top = np.where(np.isfinite(structure.speed), structure.speed, np.pi)

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import COUNT
 from pprs_dynamics.errors import SingularityError
+from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.simulation.closed_chains import ClosedChains
-from pprs_dynamics.simulation.hidden_effect import DRIVES
 
 NoteCode = Literal['HOLD', 'REFUSED', 'SATURATED', 'STOPPED']
 
@@ -26,7 +27,7 @@ class ControlSettings:
 
     Parameters
     ----------
-    stiffness, damping : float or (6,) sequence
+    stiffness, damping : float or (D,) sequence
         Gains of position [N/m] and velocity [N s/m]. By default about 7 Hz and a damping ratio
         of 0.9 for the 1.5 to 2 kg that a drive of the paper's robot moves: 1 N of unknown
         force costs a quarter of a millimetre, as on a real machine of this size.
@@ -47,19 +48,19 @@ class ControlSettings:
 
 @dataclass(frozen=True)
 class Setpoint:
-    """Setpoint of one command; arrays (6,) in drive order.
+    """Setpoint of one command; arrays (D,) in drive order.
 
     Parameters
     ----------
     position, velocity : arrays, optional
         Of the PD loop [m, m/s]; both None for efforts alone.
     effort : array, optional
-        Feedforward, or the effort itself [N].
+        Feedforward, or the effort itself [N, N m]; None for none.
     """
 
     position: Array | None = None
     velocity: Array | None = None
-    effort: Array = field(default_factory=lambda: np.zeros(6))
+    effort: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -71,19 +72,26 @@ class Note:
     message: str
 
 
+class Weight(Protocol):
+    """Efforts that hold a robot still."""
+
+    def holding(self, position: Array) -> Array:
+        """Return efforts at drive positions (D,); where it cannot close, those of the last."""
+
+
 class WeightModel:
     """Efforts that hold the robot of a model file still, by its own copy in the engine."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._chains = ClosedChains(values)
-        self._effort = np.zeros(6)
+        self._effort = np.zeros(COUNT)
 
     def holding(self, position: Array) -> Array:
         """Return efforts at drive positions (6,); where it cannot close, those of the last."""
         kept = self._chains.qpos.copy()
         try:
             self._chains.place_drives(position)
-            self._effort = self._chains.evaluate(np.zeros(6)).drive_bias
+            self._effort = self._chains.evaluate(np.zeros(COUNT)).drive_bias
         except SingularityError:
             self._chains.qpos[:] = kept
         return self._effort
@@ -94,8 +102,8 @@ class DriveControl:
 
     Parameters
     ----------
-    values : mapping
-        Flat keys and values of a model file.
+    limits : DriveLimits
+    weight : Weight
     settings : ControlSettings
     step : float
         Time between two calls of `effort` [s].
@@ -107,31 +115,27 @@ class DriveControl:
     ----------
     notes : list of Note
         One for every change for the worse, not one for every step.
-    saturated_steps : (6,) int array
+    saturated_steps : (D,) int array
         How many steps each drive spent at its limit.
     """
 
-    def __init__(self, values: Mapping[str, Any], settings: ControlSettings, step: float,
+    def __init__(self, limits: DriveLimits, weight: Weight, settings: ControlSettings, step: float,
                  smoothing: float = 1.0) -> None:
-        self.settings = settings
+        self.settings, self._limits, self._weight = settings, limits, weight
         self._smoothing = smoothing
-        self.limit = np.array(values['limits.effort'])
-        self._lower = np.repeat([values['limits.slide_stroke'][0],
-                                 values['limits.lift_stroke'][0]], 3)
-        self._upper = np.repeat([values['limits.slide_stroke'][1],
-                                 values['limits.lift_stroke'][1]], 3)
-        self._stiffness, self._damping = (np.broadcast_to(np.asarray(gain, dtype=float), 6)
+        count = len(limits.drives)
+        self._stiffness, self._damping = (np.broadcast_to(np.asarray(gain, dtype=float), count)
                                           for gain in (settings.stiffness, settings.damping))
-        self._weight = WeightModel(values)
         self._delay_line: deque[Array] = deque(
             maxlen=1 + round(settings.actuation_delay / step))
         self.notes: list[Note] = []
-        self.saturated_steps = np.zeros(6, dtype=int)
-        self._at_limit = np.zeros(6, dtype=bool)
-        self.start(np.zeros(6))
+        self.saturated_steps = np.zeros(count, dtype=int)
+        self._at_limit = np.zeros(count, dtype=bool)
+        self._nothing = np.zeros(count)
+        self.start(self._nothing)
 
     def start(self, position: Array) -> None:
-        """Hold at measured drive positions (6,) [m], with nothing on its way to the drives."""
+        """Hold at measured drive positions (D,) [m, rad], with nothing on its way to the drives."""
         self._delay_line.clear()
         self._wanted_speed: tuple[Array, Array] | None = None
         self._hold(position)
@@ -165,16 +169,16 @@ class DriveControl:
         if self.settings.gravity_compensation and setpoint.position is not None:
             self._compensation = self._weight.holding(setpoint.position)
         else:
-            self._compensation = np.zeros(6)
+            self._compensation = self._nothing
         return True
 
     def effort(self, now: float, position: Array, velocity: Array) -> Array:
-        """Return the efforts that the drives apply until the next call [N], (6,).
+        """Return the efforts that the drives apply until the next call [N, N m], (D,).
 
         Parameters
         ----------
         now : float
-        position, velocity : (6,) arrays
+        position, velocity : (D,) arrays
             As measured.
         """
         age = now - self._since
@@ -183,8 +187,8 @@ class DriveControl:
             self._hold(position)
             age = 0.0
         setpoint = self._setpoint
-        wanted = setpoint.effort
-        if self._following is not None and self._after > 0:
+        wanted = self._nothing if setpoint.effort is None else setpoint.effort
+        if self._following is not None and self._after > 0 and self._following.effort is not None:
             share = min(age / self._after, 1.0)
             wanted = wanted + share * (self._following.effort - wanted)
         if setpoint.position is not None and setpoint.velocity is not None:
@@ -227,18 +231,20 @@ class DriveControl:
     def _hold(self, position: Array) -> None:
         self._since, self._held = 0.0, True
         self._following, self._after = None, 0.0
-        self._setpoint = Setpoint(np.array(position), np.zeros(6))
+        self._setpoint = Setpoint(np.array(position), self._nothing)
         # Holding against gravity without it would sag by millimetres.
         self._compensation = self._weight.holding(position)
 
     def _limited(self, now: float, wanted: Array) -> Array:
-        effort: Array = np.minimum(np.maximum(wanted, -self.limit), self.limit)
+        limits = self._limits
+        effort: Array = np.minimum(np.maximum(wanted, -limits.efforts), limits.efforts)
         over = effort != wanted
         if over.any():
             self.saturated_steps += over
             for i in np.flatnonzero(over & ~self._at_limit):
-                self._note(now, 'SATURATED', f'{DRIVES[i]} would need {wanted[i]:.4g} N, '
-                           f'limits.effort allows {self.limit[i]:g} N')
+                unit = limits.effort_units[i]
+                self._note(now, 'SATURATED', f'{limits.drives[i]} would need {wanted[i]:.4g} '
+                           f'{unit}, {limits.effort_source} allows {limits.efforts[i]:g} {unit}')
         self._at_limit = over
         return effort
 
@@ -249,16 +255,19 @@ class DriveControl:
     def _fault(self, setpoint: Setpoint) -> str:
         for name in ('position', 'velocity', 'effort'):
             value = getattr(setpoint, name)
-            if value is not None and (np.shape(value) != (6,) or not np.all(np.isfinite(value))):
-                return f'its {name} must be six finite numbers'
+            if value is not None and (np.shape(value) != self._nothing.shape
+                                      or not np.all(np.isfinite(value))):
+                return f'its {name} must be {len(self._nothing)} finite numbers'
         if (setpoint.position is None) != (setpoint.velocity is None):
             return 'it must have both position and velocity, or neither'
         if setpoint.position is not None:
-            outside = (setpoint.position < self._lower) | (setpoint.position > self._upper)
+            lower, upper = self._limits.strokes
+            outside = (setpoint.position < lower) | (setpoint.position > upper)
             if outside.any():
                 i = int(np.argmax(outside))
-                return (f'{DRIVES[i]} at {setpoint.position[i]:.6g} m lies outside its stroke '
-                        f'[{self._lower[i]:g}, {self._upper[i]:g}] m')
+                unit = self._limits.position_units[i]
+                return (f'{self._limits.drives[i]} at {setpoint.position[i]:.6g} {unit} lies '
+                        f'outside its stroke [{lower[i]:g}, {upper[i]:g}] {unit}')
         return ''
 
     def _note(self, now: float, code: NoteCode, message: str) -> None:

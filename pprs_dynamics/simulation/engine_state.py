@@ -12,6 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.description import Frame
+from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.mechanism.structure import Structure
 
 LEAST_SINGULAR = 1e-10  # of the largest singular value; closures may say a thing twice
@@ -51,27 +52,51 @@ class EngineState:
                         or int(structure.tables.coordinate[structure.rows[name]]) in held)]
         return np.array(standing, dtype=int)
 
+    @cached_property
+    def _hinged(self) -> tuple[Array, Array, Array]:
+        """Joints of one coordinate: places in `qpos` and `qvel`, and rows of the tables."""
+        found = [(int(self.model.jnt_qposadr[k]), int(self.model.jnt_dofadr[k]),
+                  self.structure.rows[name]) for k, name in self.joints.items()
+                 if name in self.structure.rows]
+        q, v, rows = np.array(found, dtype=int).reshape(-1, 3).T
+        return q, v, rows
+
+    @cached_property
+    def _free(self) -> list[tuple[int, int, int]]:
+        """Free joints, as `_hinged`."""
+        return [(int(self.model.jnt_qposadr[k]), int(self.model.jnt_dofadr[k]),
+                 self.structure.links[self.structure.description.joints[name].child][0])
+                for k, name in self.joints.items()
+                if self.model.jnt_type[k] == self.engine.mjtJoint.mjJNT_FREE]
+
     def put(self, m: Any, k: int) -> None:
         """Put positions, velocities and accelerations of sample k of a motion in place."""
         t, data = self.structure.tables, self.data
         data.qpos[:], data.qvel[:], data.qacc[:] = self.model.qpos0, 0.0, 0.0
-        for at, name in self.joints.items():
-            q, v = int(self.model.jnt_qposadr[at]), int(self.model.jnt_dofadr[at])
-            if self.model.jnt_type[at] == self.engine.mjtJoint.mjJNT_FREE:
-                row, _ = self.structure.links[self.structure.description.joints[name].child]
-                R = self.root.R.T @ m.R[k, row]
-                quaternion = np.empty(4)
-                self.engine.mju_mat2Quat(quaternion, R.ravel())
-                data.qpos[q:q + 3] = self.root.R.T @ (m.p[k, row] - self.root.p)
-                data.qpos[q + 3:q + 7] = quaternion
-                for own, (linear, angular) in ((data.qvel, (m.u, m.w)), (data.qacc, (m.ud, m.wd))):
-                    own[v:v + 3] = self.root.R.T @ linear[k, row]
-                    own[v + 3:v + 6] = m.R[k, row].T @ angular[k, row]
-            elif name in self.structure.rows:
-                row = self.structure.rows[name]
-                c, ratio = t.coordinate[row], t.ratio[row]
-                data.qpos[q] = ratio * m.q[k, c] + t.offset[row]
-                data.qvel[v], data.qacc[v] = ratio * m.v[k, c], ratio * m.a[k, c]
+        for q, v, row in self._free:
+            R = self.root.R.T @ m.R[k, row]
+            quaternion = np.empty(4)
+            self.engine.mju_mat2Quat(quaternion, R.ravel())
+            data.qpos[q:q + 3] = self.root.R.T @ (m.p[k, row] - self.root.p)
+            data.qpos[q + 3:q + 7] = quaternion
+            for own, (linear, angular) in ((data.qvel, (m.u, m.w)), (data.qacc, (m.ud, m.wd))):
+                own[v:v + 3] = self.root.R.T @ linear[k, row]
+                own[v + 3:v + 6] = m.R[k, row].T @ angular[k, row]
+        at, dofs, rows = self._hinged
+        c, ratio = t.coordinate[rows], t.ratio[rows]
+        data.qpos[at] = ratio * m.q[k, c] + t.offset[rows]
+        data.qvel[dofs], data.qacc[dofs] = ratio * m.v[k, c], ratio * m.a[k, c]
+
+    def rates(self, linkage: Linkage) -> Array:
+        """Return the engine's velocities per rate of the drives at a motion's first sample."""
+        t, m = self.structure.tables, linkage.motion
+        T = np.zeros((self.model.nv, len(t.drives)))
+        _, dofs, rows = self._hinged
+        T[dofs] = t.ratio[rows, None] * m.T[0, t.coordinate[rows]]
+        for _, v, row in self._free:
+            W, U = (each[0, row] for each in linkage.twists)
+            T[v:v + 3], T[v + 3:v + 6] = self.root.R.T @ U, m.R[0, row].T @ W
+        return T
 
     def driven(self, needed: Array, rows: Array) -> Array:
         """Return the drives' efforts, (D,), that with forces of closures give what is needed.

@@ -16,6 +16,7 @@ from itertools import islice
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import COUNT
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect, SensorEffect
 
 # Correlation times of the slow processes that add up to 1/f noise [samples], a factor 4 apart:
@@ -68,15 +69,15 @@ class SensorSettings:
 
 @dataclass(frozen=True)
 class SensorFaults:
-    """Faults of the sensors, summed over hidden effects; (6,) arrays.
+    """Faults of the sensors of D drives, summed over hidden effects; (D,) arrays.
 
     Parameters
     ----------
-    zero : (6,) array
+    zero : (D,) array
         By which positions are measured too high [m].
-    gain : (6,) array
+    gain : (D,) array
         Share by which efforts are.
-    effort_delay, position_delay : (6,) arrays
+    effort_delay, position_delay : (D,) arrays
         By which they are late [s], at least 0.
     """
 
@@ -86,25 +87,26 @@ class SensorFaults:
     position_delay: Array
 
     @classmethod
-    def of(cls, effects: Sequence[HiddenEffect]) -> SensorFaults:
+    def of(cls, effects: Sequence[HiddenEffect], drives: int = COUNT) -> SensorFaults:
         """Return the faults among effects."""
         faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
         zero, gain, delay = (
             np.sum([effect.values[name] for effect in faults if name in effect.values]
-                   or [np.zeros(6)], axis=0) for name in ('zero', 'gain', 'delay'))
+                   or [np.zeros(drives)], axis=0) for name in ('zero', 'gain', 'delay'))
         # No sensor looks ahead: an effort that comes early is one whose encoders, all of them,
         # come late.
         late = max(0.0, -float(delay.min()))
-        return cls(zero, gain, delay + late, np.full(6, late))
+        return cls(zero, gain, delay + late, np.full(drives, late))
 
 
 class EffortNoise:
-    """White, AR(1) and 1/f noise of six efforts, one sample at a time.
+    """White, AR(1) and 1/f noise of the drives' efforts, one sample at a time.
 
     Parameters
     ----------
     settings : SensorSettings
     rng : numpy.random.Generator
+    drives : int
 
     Notes
     -----
@@ -112,7 +114,8 @@ class EffortNoise:
     scale and whose variances go with time^(a - 1).
     """
 
-    def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
+    def __init__(self, settings: SensorSettings, rng: np.random.Generator, drives: int = COUNT,
+                 ) -> None:
         self._rng = rng
         weights = PINK_TIMES ** (settings.pink_exponent - 1)
         self._sizes = np.concatenate((
@@ -121,20 +124,20 @@ class EffortNoise:
         self._keep = np.concatenate(([settings.noise_correlation], np.exp(-1 / PINK_TIMES)))
         self._add = np.sqrt(1 - self._keep ** 2)
         self._white = settings.white_noise
-        self._states = rng.standard_normal((len(self._keep), 6))
+        self._states = rng.standard_normal((len(self._keep), drives))
 
     def sample(self) -> Array:
-        """Return the next sample [N], (6,)."""
-        news = self._rng.standard_normal((len(self._keep) + 1, 6))
+        """Return the next sample [N], (D,)."""
+        news = self._rng.standard_normal((len(self._keep) + 1, self._states.shape[1]))
         self._states = self._keep[:, None] * self._states + self._add[:, None] * news[1:]
         noise: Array = self._white * news[0] + self._sizes @ self._states
         return noise
 
     def samples(self, count: int) -> Array:
-        """Return the next samples [N], (count, 6): those that `sample` would give."""
+        """Return the next samples [N], (count, D): those that `sample` would give."""
         from scipy.signal import lfilter
 
-        news = self._rng.standard_normal((count, len(self._keep) + 1, 6))
+        news = self._rng.standard_normal((count, len(self._keep) + 1, self._states.shape[1]))
         noise: Array = self._white * news[:, 0]
         for i, (keep, add, size) in enumerate(zip(self._keep, self._add, self._sizes,
                                                   strict=True)):
@@ -153,7 +156,7 @@ class EffortNoise:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Readings of the sensors at one moment: `time` [s] and (6,) arrays in drive order."""
+    """Readings of the sensors at one moment: `time` [s] and (D,) arrays in drive order."""
 
     time: float
     position: Array
@@ -162,7 +165,7 @@ class Measurement:
 
 
 class Sensors:
-    """Encoders and effort sensors of the six drives.
+    """Encoders and effort sensors of the drives.
 
     Parameters
     ----------
@@ -172,6 +175,8 @@ class Sensors:
     rng : numpy.random.Generator
     effects : sequence of HiddenEffect
         Of which the faults of sensors act here.
+    scale : (D,) array, optional
+        Units in which the settings give the noise of the efforts.
 
     Attributes
     ----------
@@ -180,18 +185,19 @@ class Sensors:
     """
 
     def __init__(self, settings: SensorSettings, step: float, rng: np.random.Generator,
-                 effects: Sequence[HiddenEffect] = ()) -> None:
+                 effects: Sequence[HiddenEffect] = (), scale: Array | None = None) -> None:
         self.settings, self._step = settings, step
-        self._noise = EffortNoise(settings, rng)
+        self._scale = np.ones(COUNT) if scale is None else scale
+        self._noise = EffortNoise(settings, rng, len(self._scale))
         self._past: deque[tuple[Array, Array, Array]] = deque()
-        self.position, self.velocity, self.zero = np.zeros(6), np.zeros(6), np.zeros(6)
+        self.position, self.velocity, self.zero = np.zeros((3, len(self._scale)))
         self.use_effects(effects)
         self.smoothing = 1.0 if settings.true_velocity else 1 - float(
             np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
 
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
         """Have the faults of other effects from now on; a moved zero is no velocity."""
-        self._faults = SensorFaults.of(effects)
+        self._faults = SensorFaults.of(effects, len(self._scale))
         self.position = self.position + self._faults.zero - self.zero
         self.zero = self._faults.zero
         delays = (self._faults.effort_delay, self._faults.position_delay)
@@ -199,12 +205,12 @@ class Sensors:
         self._past = deque(islice(self._past, length), maxlen=length)
 
     def start(self, position: Array, velocity: Array) -> None:
-        """Forget the past: the robot is at (6,) [m] and moves with (6,) [m/s]."""
+        """Forget the past: the robot is at (D,) [m] and moves with (D,) [m/s]."""
         self._past.clear()
         self.position, self.velocity = self._encoder(position), np.array(velocity)
 
     def read_encoders(self, position: Array, velocity: Array) -> None:
-        """Take the true positions and velocities, (6,), as the drives' electronics see them."""
+        """Take the true positions and velocities, (D,), as the drives' electronics see them."""
         seen = self._encoder(position)
         if self.settings.true_velocity:
             self.velocity = np.array(velocity)
@@ -214,7 +220,7 @@ class Sensors:
         self.position = seen
 
     def read_effort(self, before: Array, after: Array) -> None:
-        """Take the efforts applied just before and after now, (6,) each, and remember them.
+        """Take the efforts applied just before and after now, (D,) each, and remember them.
 
         Efforts are constant over a time step: at its border their mean is what belongs to the
         motion there. Either one alone would be half a step late or early.
@@ -227,7 +233,7 @@ class Sensors:
         position, velocity = (self._delayed(i, faults.position_delay) for i in (0, 1))
         effort = self._delayed(2, faults.effort_delay)
         return Measurement(time, position, velocity,
-                           (1 + faults.gain) * effort + self._noise.sample())
+                           (1 + faults.gain) * effort + self._scale * self._noise.sample())
 
     def _encoder(self, position: Array) -> Array:
         return self.settings.quantised(position + self.zero)
@@ -238,7 +244,7 @@ class Sensors:
         # Between readings by straight lines; before the first reading, the first.
         steps = delay / self._step
         whole = np.floor(steps).astype(int)
-        share, last, drives = steps - whole, len(self._past) - 1, range(6)
+        share, last, drives = steps - whole, len(self._past) - 1, range(len(delay))
         newer = np.array([self._past[min(whole[i], last)][quantity][i] for i in drives])
         older = np.array([self._past[min(whole[i] + 1, last)][quantity][i] for i in drives])
         delayed: Array = newer + share * (older - newer)

@@ -6,29 +6,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import SingularityError
-from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
+from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.physics.model.limits import DriveLimits, Limits
+from pprs_dynamics.simulation.drive_control import (
+    ControlSettings,
+    DriveControl,
+    Note,
+    Setpoint,
+    Weight,
+    WeightModel,
+)
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.linkage_plant import LinkagePlant
 from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth, UnsolvedError
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
 
 
 class SimulatedRobot:
-    """A 3-PPRS to run against; it starts at home, the platform unturned at 0.5 m, and holds.
+    """A robot to run against; it starts at home and holds.
+
+    Of the 3-PPRS home is the platform unturned at 0.5 m.
 
     Call `command` whenever a command arrives, and `tick` at the rate at which it publishes.
 
     Parameters
     ----------
-    values : mapping
-        Flat keys and values of a model file, e.g. `DriveModel.values`.
+    values : mapping or LinkagePlant
+        Flat keys and values of a 3-PPRS's model file, e.g. `DriveModel.values`; or an arm, or a
+        robot with loops, and what is hidden in it.
     effects : sequence of HiddenEffect
-        Physics that the model knows nothing of. They carry memory: every robot needs its own.
+        Of the 3-PPRS, that the model knows nothing of. They carry memory: every robot needs its
+        own.
     seed : int
         Of the noise.
     rate : float
@@ -47,19 +61,28 @@ class SimulatedRobot:
     """
 
     def __init__(
-        self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (), *, seed: int = 0,
-        rate: float = 500.0, plant: PlantSettings | None = None,
+        self, values: Mapping[str, Any] | LinkagePlant, effects: Sequence[HiddenEffect] = (), *,
+        seed: int = 0, rate: float = 500.0, plant: PlantSettings | None = None,
         control: ControlSettings | None = None, sensors: SensorSettings | None = None,
     ) -> None:
-        self.plant = Plant(values, effects, plant)
+        self.plant: Plant | LinkagePlant
+        weight: Weight
+        noise = None
+        if isinstance(values, LinkagePlant):
+            self.plant = weight = values
+            limits: DriveLimits = values.limits
+            noise = values.largest
+        else:
+            self.plant, weight = Plant(values, effects, plant), WeightModel(values)
+            limits = Limits(**{one.name: values[f'limits.{one.name}'] for one in fields(Limits)})
         step = self.plant.settings.step
         self.steps_per_tick = max(1, round(1 / (rate * step)))
         if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
             raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
         self.effects = tuple(effects)
         self.sensors = Sensors(sensors or SensorSettings(), step, np.random.default_rng(seed),
-                               effects)
-        self.control = DriveControl(values, control or ControlSettings(), step,
+                               effects, noise)
+        self.control = DriveControl(limits, weight, control or ControlSettings(), step,
                                     self.sensors.smoothing)
         self._ticks = 0
         self._stopped = False
@@ -72,12 +95,19 @@ class SimulatedRobot:
         return self._ticks * self.steps_per_tick * self.plant.settings.step
 
     @property
+    def hidden(self) -> list[dict[str, Any]]:
+        """What is hidden in it: name, drives, parameters and form of each effect."""
+        if isinstance(self.plant, LinkagePlant):
+            return self.plant.hidden
+        return [effect.truth() for effect in self.effects]
+
+    @property
     def notes(self) -> list[Note]:
         """Messages of the robot so far."""
         return self.control.notes
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
-        """Put the drives at encoder positions (6,) [m], at rest or with velocities [m/s].
+        """Put the drives at encoder positions (D,) [m, rad], at rest or with velocities [m/s].
 
         Raises
         ------
@@ -93,6 +123,8 @@ class SimulatedRobot:
 
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
         """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
+        if isinstance(self.plant, LinkagePlant):
+            raise TypeError('what is hidden in a mechanism stays')
         self.plant.use_effects(effects)
         self.sensors.use_effects(effects)
         self.effects = tuple(effects)
@@ -114,11 +146,12 @@ class SimulatedRobot:
             effort = self._next_effort(now + k * step)
             if measurement is None:
                 measurement = self.sensors.measure(now)
-                truth = plant.observe(effort) if want_truth else None
+                truth = (plant.observe(effort) if want_truth and isinstance(plant, Plant)
+                         else None)
             if not self._stopped:
                 try:
                     plant.step(effort)
-                except (SingularityError, UnsolvedError) as error:
+                except (WorkspaceError, UnsolvedError) as error:
                     self._stop(now + k * step, error)
                     self.unsolved = error if isinstance(error, UnsolvedError) else None
             self.sensors.read_encoders(plant.position, plant.velocity)
@@ -132,7 +165,7 @@ class SimulatedRobot:
         self._effort = effort
         return effort
 
-    def _stop(self, now: float, error: SingularityError | UnsolvedError) -> None:
+    def _stop(self, now: float, error: WorkspaceError | UnsolvedError) -> None:
         self._stopped = True
-        self.plant.velocity = np.zeros(6)
+        self.plant.velocity = np.zeros_like(self.plant.velocity)
         self.notes.append(Note(now, 'STOPPED', f'the robot stopped: {error.found}'))

@@ -12,7 +12,11 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of
+from node_bench import bench
+from rclpy.parameter import Parameter
 from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -22,6 +26,11 @@ from trajectory_msgs.msg import (
 from pprs_dynamics import ArmModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
+from pprs_dynamics.ros.feedforward import FeedforwardNode
+from pprs_dynamics.ros.monitor import MonitorNode
+from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
+from pprs_dynamics.ros.run import Finished
+from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes
 
@@ -105,3 +114,46 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
         node.node._margins_due = 0.0
         node.send(message_of(PlatformMotion.at_rest(at_home, near)))
         assert node.wait_for_status(code='NEAR_SINGULAR')['singularity_margin'] < 0.99
+
+
+def given(**own: Any) -> list[Parameter]:
+    """Return the file's parameters, and a node's own, as a node takes them."""
+    return [Parameter(name.replace('__', '.'), value=value)
+            for name, value in {**parameters(), **own}.items()]
+
+
+def test_the_closed_loop_follows_an_excitation_and_the_monitor_agrees() -> None:
+    """Simulated robot, feedforward, monitor and path, each with the hexapod's file."""
+    with bench() as running:
+        states = running.listen(JointState, '/joint_states', 5000)
+        errors = running.listen(Float64MultiArray, '/monitor/error', 1000)
+        running.follow_status('/simulated_robot/status')
+        running.add(SimulatedRobotNode, parameter_overrides=given(
+            rate=100.0, command_timeout=0.3, effort_noise=0.001))
+        running.add(FeedforwardNode, parameter_overrides=given(command_timeout=0.0), cli_args=[
+            '--ros-args', '-r', '~/joint_command:=/simulated_robot/joint_command'])
+        running.add(MonitorNode, parameter_overrides=given())
+        running.add(PlayTrajectoryNode, parameter_overrides=given(
+            duration=4.0, rate=50.0, ahead=0.1, seed=1))
+        played = False
+
+        def ended() -> bool:
+            nonlocal played
+            try:
+                running.executor.spin_once(timeout_sec=0.02)
+            except Finished:
+                played = True
+            return played and running.status[-1]['code'] == 'HOLD'
+
+        assert running.spin_until(ended, 40)
+        model = ArmModel.load(FILE)
+        home, _ = model.robot.structure.room(np.pi)
+        positions = np.array([state.position for state in states])
+        assert tuple(states[-1].name) == model.drives
+        assert np.ptp(positions, axis=0).min() > 0.02
+        np.testing.assert_allclose(positions[-1], home, rtol=0, atol=1e-4)
+        # Efforts of 30 to 100 N, friction included; noise and differentiation leave tenths.
+        assert len(errors) > 50
+        assert np.nanmedian([error.data for error in errors]) < 0.5
+        codes = {status['code'] for status in running.status}
+        assert codes <= {'OK', 'HOLD', 'LATE'}, running.status

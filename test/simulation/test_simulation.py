@@ -19,7 +19,12 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MissingLibraryError, MotionError
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Setpoint
+from pprs_dynamics.simulation.drive_control import (
+    ControlSettings,
+    DriveControl,
+    Setpoint,
+    WeightModel,
+)
 from pprs_dynamics.simulation.hidden_effect import DRIVES, HiddenEffectError
 from pprs_dynamics.simulation.hidden_effects import (
     HIDDEN_EFFECTS,
@@ -231,7 +236,8 @@ def test_the_lag_of_differentiated_velocities_is_no_tracking_error(
 def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
     """Setpoints every 5 ms fall between ticks every 2 ms: up to one tick passes before the next."""
     speed, period, step = 0.2, 0.005, 0.0005
-    control = DriveControl(DriveModel.load().values, ControlSettings(), step)
+    model = DriveModel.load()
+    control = DriveControl(model.limits, WeightModel(model.values), ControlSettings(), step)
 
     def setpoint(time: float) -> Setpoint:
         return Setpoint(np.full(6, 0.1 + speed * time), np.full(6, speed))

@@ -30,7 +30,6 @@ REPLACED: dict[Any, Any] = {
 PHYSICS = Path(__file__).parents[1]
 
 
-@cache
 def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
     """Return the compiler of a kernel's loop, or None without Numba or a place for its cache.
 
@@ -52,7 +51,12 @@ def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
 
 def compiled_or_none(function: Any) -> Callable[..., Any] | None:
     """Return a function of this package compiled, or None where `compiler` is."""
-    return _kept(function) if compiler() else None
+    return _kept(function) if _compiles() else None
+
+
+@cache
+def _compiles() -> bool:
+    return compiler() is not None
 
 
 @cache

@@ -348,6 +348,7 @@ NODE_KEYS = frozenset({
     'ahead', 'stiffness', 'damping', 'use_effort', 'command_timeout', 'actuation_delay',
     'window', 'error_span', 'update_rate', 'diagnose_every', 'diagnose_span', 'frame_id',
     'encoder_resolution', 'effort_noise',
+    'bandwidth', 'damping_ratio',
     'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
     'use_sim_time', 'start_type_description_service'})

@@ -14,12 +14,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import LimitError, WorkspaceError
 from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
-
-COUNT = len(DRIVES)
 
 
 class DriveLimits(ABC):

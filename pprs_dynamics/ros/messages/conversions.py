@@ -12,10 +12,16 @@ import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
 from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from trajectory_msgs.msg import (
+    JointTrajectory,
+    JointTrajectoryPoint,
+    MultiDOFJointTrajectory,
+    MultiDOFJointTrajectoryPoint,
+)
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.messages.rejection import Rejection
@@ -52,6 +58,19 @@ def write_trajectory(
             accelerations=[Twist(linear=_vector(motion.linear_acceleration[sample]),
                                  angular=_vector(motion.angular_acceleration[sample]))],
             time_from_start=duration(offset)))
+    return message
+
+
+def write_joint_trajectory(
+    motion: JointMotion, stamp: Time, offsets: Sequence[int], joints: Sequence[str],
+) -> JointTrajectory:
+    """Return the message that asks for a motion of joints; see `write_trajectory`."""
+    message = JointTrajectory(joint_names=list(joints), points=[
+        JointTrajectoryPoint(positions=doubles(q), velocities=doubles(v), accelerations=doubles(a),
+                             time_from_start=duration(offset))
+        for q, v, a, offset in zip(motion.position, motion.velocity, motion.acceleration, offsets,
+                                   strict=True)])
+    message.header.stamp = stamp
     return message
 
 

@@ -1,0 +1,343 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""An arm, or a robot with loops, in motion under the efforts of its drives.
+
+Masses, gravity and inertial forces are MuJoCo's, of the tree; loops are eliminated, as in `plant`:
+with T the rates of all joints per rate of the drives and h of the tree,
+
+    T' M T a = tau - T' h - T' (M T_dot v) - friction
+
+A step is the midpoint rule, friction taken at the velocity of the midpoint. Friction of a joint is
+c(|w|) w with c = c_v + (T + mu r F) tanh(|w| / width) / |w|: with the c of the round before it is
+linear in the acceleration. Loads are those of the acceleration of the step before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
+from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.limits import JointLimits
+from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, truth
+from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion
+from pprs_dynamics.simulation.drive_control import ControlSettings
+from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.plant import UnsolvedError
+
+STEP = 0.002  # [s]; 0.2 to 1 ms of processor time for a hexapod, so that it runs in real time
+ROUNDS = 12  # of friction's coefficients in a step
+SOLVED = 1e-6  # of the width in which friction turns over, between rounds
+SLOWEST = 1e-9  # of that width, below which tanh(x) / x is 1
+# Stops at the ends of ranges: a spring of that frequency with the drive's inertia at home, damped.
+STOP_FREQUENCY, STOP_DAMPING = 40.0, 0.3  # [Hz], of critical
+BEYOND = 1.0  # of a range behind its stop, from which on the motion means nothing
+FASTEST = 100.0  # of a range, or of a turn, in a second
+NOMINAL = 10.0  # [s], of the motion that tells how large efforts and speeds of this robot are
+# Hidden effects that need no more than the moment.
+BODIES = ('payload_mass', 'link_mass')
+OF_MOMENT = tuple(name for name in FORMS if name not in ('hysteresis', 'drive_inertia'))
+HIDDEN = (*OF_MOMENT, *BODIES, 'base_tilt')
+
+
+@dataclass(frozen=True)
+class LinkagePlantSettings:
+    """Time step of the simulation [s]."""
+
+    step: float = STEP
+
+
+class LinkagePlant:
+    """A mechanism under efforts of its drives; it starts at home, an arm amid its ranges.
+
+    Parameters
+    ----------
+    model : ArmModel
+        Of which the mechanism and its own friction count, and no added effects.
+    names : sequence of str
+        Of `HIDDEN`, or 'random': physics that the model lacks.
+    seed : int
+        Of these.
+    scale : float
+        Multiplies their size.
+
+    Attributes
+    ----------
+    time : float
+    position, velocity : (D,) arrays
+        Of the drives [m, rad].
+    hidden : list of dict
+        What is hidden.
+    largest : (D,) array
+        Largest efforts of an excitation [N, N m].
+    inertia : (D,) array
+        Seen by each drive at home, the others free to be held [kg, kg m^2].
+
+    Raises
+    ------
+    MissingLibraryError
+        Where mujoco is not installed.
+    HiddenEffectError
+        For a name of none.
+    """
+
+    def __init__(self, model: ArmModel, names: Sequence[str] = (), seed: int = 0,
+                 scale: float = 1.0) -> None:
+        self.settings = LinkagePlantSettings()
+        self.model, self.engine = model, ArmEngine(model)
+        self.structure = s = model.robot.structure
+        random = np.random.default_rng(seed)
+        motion = draw_motion(model, NOMINAL, seed)
+        efforts = self.engine.torques(motion)
+        self.largest = np.abs(efforts).max(axis=0)
+        values, reversal = model.values, model.reversal
+        self._viscous, self._coulomb, self._offset = (
+            np.asarray(values[f'friction.{key}'], dtype=float)
+            for key in ('viscous', 'coulomb', 'offset'))
+        self._width = np.broadcast_to(np.asarray(reversal.velocity, dtype=float), len(s.drives))
+        self._passive = [effect.table(reversal) for effect in model.effects
+                         if isinstance(effect, LinkageFriction)]
+        self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
+        self.hidden = [self._hide(name, motion, efforts, random, scale)
+                       for name in _drawn(names, random)]
+        home, _ = s.room(np.pi)  # where motions that are drawn begin
+        self.lower, self.upper = s.lower, s.upper
+        with np.errstate(invalid='ignore'):
+            span = self.upper - self.lower
+        self._span = np.where(np.isfinite(span), span, 2 * np.pi)
+        self.time = 0.0
+        self._rest = np.zeros_like(home)
+        self.place(home)
+        self.inertia = np.diag(self._equations(home, self._rest, self._rest)[0]).copy()
+
+    def _hide(self, name: str, motion: JointMotion, efforts: Array, random: np.random.Generator,
+              scale: float) -> dict[str, Any]:
+        model = self.model
+        if name == 'payload_mass':
+            mass = scale * float(random.uniform(0.05, 0.12) * model.robot.masses.sum())
+            self.engine.add_payload(mass, np.zeros(3))
+            return truth(name, None, {'mass': mass}, 'a point at the tool\'s origin')
+        if name == 'link_mass':
+            links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier]
+            body = int(random.choice(links))
+            mass = scale * float(random.uniform(0.1, 0.3) * model.robot.masses[body])
+            self.engine.add_to_link(body, mass)
+            return truth(name, None, {f'{model.robot.body_names[body]}.mass': mass},
+                         'a point at its centre')
+        if name == 'base_tilt':
+            angle = scale * float(random.uniform(0.01, 0.03))
+            size = float(np.linalg.norm(self.engine.gravity))
+            self.engine.gravity = size * np.array([0.0, np.sin(angle), -np.cos(angle)])
+            return truth(name, None, {'x': angle, 'y': 0.0}, 'about x')
+        j = int(random.integers(len(model.drives)))
+        assert motion.time is not None
+        moment = JointMoment(
+            motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
+            np.abs(efforts[:, j]), float(self.largest[j]),
+            float(np.abs(motion.velocity[:, j]).max()), float(model.gear_ratios[j]))
+        drawn = FORMS[name].draw(random, moment)
+        drawn[next(iter(drawn))] *= scale
+        self._pushes.append((j, name, drawn, moment))
+        return truth(name, [model.drives[j]], drawn, FORMS[name].form)
+
+    @property
+    def limits(self) -> JointLimits:
+        """What the drives can do, in N and N m."""
+        model = self.model
+        return replace(model.limits, effort=self.structure.effort,
+                       effort_units=tuple(one.effort for one in model.units))
+
+    def gains(self, frequency: float, damping: float, **settings: Any) -> ControlSettings:
+        """Return a PD loop of a frequency [Hz] and a damping ratio for what the drives move."""
+        rate = 2 * np.pi * frequency
+        return ControlSettings(tuple(rate ** 2 * self.inertia),
+                               tuple(2 * damping * rate * self.inertia), **settings)
+
+    def holding(self, position: Array) -> Array:
+        """Return the efforts that hold the model's weight at positions of the drives (D,).
+
+        Where the loops do not close there, those of the last that did.
+        """
+        try:
+            rest = self._rest[None]
+            self._held: Array = self.model.robot.torques(position[None], rest, rest)[0]
+        except WorkspaceError:
+            pass
+        return self._held + self._offset
+
+    def place(self, position: Array, velocity: Array | None = None) -> None:
+        """Put the drives at positions (D,), at rest or with velocities.
+
+        Raises
+        ------
+        WorkspaceError
+            Where the mechanism cannot go there.
+        """
+        self.position = np.array(position, dtype=float)
+        self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
+        linkage = self._linkage(self.position, self.velocity, self._rest, self.structure.home)
+        self._closed = linkage.motion.q[0]
+        self._acceleration = np.zeros_like(self.position)
+        self._held = linkage.efforts(self.model.robot)[0]
+
+    def step(self, effort: Array) -> None:
+        """Advance by one time step under constant efforts (D,).
+
+        Raises
+        ------
+        WorkspaceError
+            Where the drives can no longer hold the tool.
+        UnsolvedError
+            Where the step has no solution that means anything.
+        """
+        h, v, a = self.settings.step, self.velocity, self._acceleration
+        middle = self.position + h / 2 * v + h * h / 8 * a
+        acceleration = self.acceleration(middle, v + h / 2 * a, effort, v, h / 2)
+        velocity = v + h * acceleration
+        position = self.position + h / 2 * (v + velocity)
+        if not np.all(np.abs(velocity) < FASTEST * self._span):
+            raise UnsolvedError(self.time, 'the engine could not solve its motion')
+        if np.any((position < self.lower - BEYOND * self._span)
+                  | (position > self.upper + BEYOND * self._span)):
+            raise UnsolvedError(self.time, 'a drive has gone through the stop at its end')
+        self.position, self.velocity, self._acceleration = position, velocity, acceleration
+        self.time += h
+
+    def acceleration(self, position: Array, velocity: Array, effort: Array, start: Array,
+                     ahead: float) -> Array:
+        """Return the acceleration of the drives, with friction at start + ahead * acceleration.
+
+        Parameters
+        ----------
+        position, velocity : (D,) arrays
+            At which inertia and inertial forces are taken.
+        effort : (D,) array
+        start : (D,) array
+            Velocity that friction starts from.
+        ahead : float
+            [s]
+        """
+        last = self._acceleration
+        M, bias, linkage = self._equations(position, velocity, last)
+        push = effort - bias - self._offset + self._stops(position, velocity)
+        rows, coefficients = self._joints(linkage)
+        a, found = last, last
+        for _ in range(ROUNDS):
+            mid = start + ahead * a
+            rates = rows @ mid
+            C = np.einsum('kid,k,kie->de', rows, coefficients(rates), rows)
+            hidden, slope = self._hidden(position, mid)
+            # A slope beside M: friction at the middle, linear with the secants of this round.
+            damping = C + np.diag(slope)
+            found = np.linalg.solve(M + ahead * damping, push - hidden - damping @ start)
+            if np.all(ahead * np.abs(found - a) <= SOLVED * self._width):
+                break
+            # Secants overshoot at a reversal: half of the way, where the velocity turns over.
+            turns = np.sign(start + ahead * found) != np.sign(mid)
+            a = np.where(turns, (a + found) / 2, found)
+        return found
+
+    def _linkage(self, position: Array, velocity: Array, acceleration: Array, start: Array,
+                 ) -> Linkage:
+        return Linkage.of(self.structure, position[None], velocity[None], acceleration[None],
+                          start)
+
+    def _equations(self, position: Array, velocity: Array, acceleration: Array,
+                   ) -> tuple[Array, Array, Linkage]:
+        """Return T' M T, all forces that do not depend on the acceleration, and the motion."""
+        linkage = self._linkage(position, velocity, acceleration, self._closed)
+        self._closed = linkage.motion.q[0]
+        engine, state = self.engine, self.engine.state
+        T = state.rates(linkage)
+        needed, M = engine.inverse(linkage.motion)
+        mass = T.T @ M @ T
+        bias = T.T @ needed - mass @ acceleration
+        return mass + np.diag(self.model.robot.armature), bias, linkage
+
+    def _joints(self, linkage: Linkage) -> tuple[Array, Any]:
+        """Return relative rates of rubbing joints per rate of drives (K, 3, D), and their law.
+
+        The law gives friction over rate, (K,), of rates (K, 3): a hinge's stand in the first.
+        """
+        count = len(self._rest)
+        rows = [np.concatenate((np.eye(count)[:, None], np.zeros((count, 2, count))), axis=1)]
+        laws = [(self._viscous, self._coulomb, self._width)]
+        if self._passive:
+            W = linkage.twists[0][0]
+            loads = linkage.loads(self.engine.robot, with_reactions=True)
+            for table in self._passive:
+                rows.append(_relative(self.structure.tables, linkage.motion, table, W))
+                load = _loads(linkage.motion, loads, table)
+                laws.append((table.viscous, table.torque + table.lever * load, table.width))
+        viscous, dry, width = (np.concatenate([law[k] for law in laws]) for k in range(3))
+
+        def coefficients(rates: Array) -> Array:
+            x = np.maximum(np.sqrt(np.einsum('ki,ki->k', rates, rates)) / width, SLOWEST)
+            found: Array = viscous + dry * np.tanh(x) / (x * width)
+            return found
+
+        return np.concatenate(rows), coefficients
+
+    def _hidden(self, position: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return hidden forces that do not go with velocities, and slopes of those that do."""
+        force, slope = np.zeros_like(position), np.zeros_like(position)
+        for j, name, drawn, nominal in self._pushes:
+            moment = JointMoment(
+                np.array([self.time]), position[j:j + 1], velocity[j:j + 1],
+                self._acceleration[j:j + 1], np.abs(self._held[j:j + 1]), nominal.effort,
+                nominal.speed, nominal.gear_ratio)
+            pushed = float(FORMS[name].force(drawn, moment)[0])
+            if pushed * velocity[j] > 0 and name.endswith('friction'):
+                slope[j] += pushed / velocity[j]
+            else:
+                force[j] += pushed
+        return force, slope
+
+    def _stops(self, position: Array, velocity: Array) -> Array:
+        """Return the forces of the stops at the ends of the ranges."""
+        beyond = np.minimum(self.upper - position, 0.0) + np.maximum(self.lower - position, 0.0)
+        if not beyond.any():
+            return beyond
+        rate = 2 * np.pi * STOP_FREQUENCY
+        pushed: Array = self.inertia * (rate ** 2 * beyond - 2 * STOP_DAMPING * rate * velocity
+                                        * (beyond != 0))
+        return pushed
+
+
+def _drawn(names: Sequence[str], random: np.random.Generator) -> list[str]:
+    """Return names of hidden effects, or raise HiddenEffectError."""
+    drawn = [str(random.choice(sorted(HIDDEN))) if name == 'random' else name for name in names]
+    for name in drawn:
+        if name not in HIDDEN:
+            raise HiddenEffectError(f'{name} cannot be hidden in such a robot while it moves, must '
+                                    f'be one of {", ".join(HIDDEN)}')
+    return drawn
+
+
+def _relative(t: Any, m: Any, table: JointFriction, W: Array) -> Array:
+    """Return relative rates per rate of drives, (K, 3, D); a hinge's stand in the first row."""
+    rates = np.zeros((len(table.joint), 3, W.shape[-1]))
+    hinges, loops = table.joint[table.joint >= 0], table.loop[table.loop >= 0]
+    rates[table.joint >= 0, 0] = t.ratio[hinges, None] * m.T[0, t.coordinate[hinges]]
+    rates[table.loop >= 0] = W[t.loop_b[loops]] - W[t.loop_a[loops]]
+    return rates
+
+
+def _loads(m: Any, loads: Any, table: JointFriction) -> Array:
+    """Return the force that each joint transmits across its axis [N], of a ball all of it, (K,)."""
+    force = np.empty((len(table.joint), 3))
+    hinges = table.joint[table.joint >= 0]
+    force[table.joint >= 0] = np.cross(loads.f[0, hinges], m.z[0, hinges])
+    force[table.loop >= 0] = loads.F[0, table.loop[table.loop >= 0]]
+    found: Array = np.sqrt(np.einsum('ki,ki->k', force, force))
+    return found
