@@ -126,8 +126,10 @@ def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[.
     declare_arm(node)
     given = current_values(node)
     model = ArmModel.from_parameters({name: given[name] for name in given.keys() - values.keys()})
-    motion = draw_motion(model, values['duration'] + 1 / values['rate'], values['seed'],
-                         values['rate'])
+    drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])
+    # One step beyond the end, which is where it began, at rest.
+    motion = JointMotion(*(np.concatenate((each, each[:1])) for each in (
+        drawn.position, drawn.velocity, drawn.acceleration)))
     return motion, partial(conversions.write_joint_trajectory, joints=RobotNames.of(model).joints)
 
 

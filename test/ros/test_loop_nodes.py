@@ -122,38 +122,35 @@ def given(**own: Any) -> list[Parameter]:
             for name, value in {**parameters(), **own}.items()]
 
 
-def test_the_closed_loop_follows_an_excitation_and_the_monitor_agrees() -> None:
-    """Simulated robot, feedforward, monitor and path, each with the hexapod's file."""
+def test_the_closed_loop_plays_an_excitation_and_comes_home() -> None:
+    """Simulated robot, feedforward, monitor and path, each with the hexapod's file.
+
+    How well it follows, and that efforts are the model's, is tested in simulated time.
+    """
     with bench() as running:
         states = running.listen(JointState, '/joint_states', 5000)
         errors = running.listen(Float64MultiArray, '/monitor/error', 1000)
         running.follow_status('/simulated_robot/status')
         running.add(SimulatedRobotNode, parameter_overrides=given(
-            rate=100.0, command_timeout=0.3, effort_noise=0.001))
+            rate=100.0, command_timeout=0.0, effort_noise=0.001))
         running.add(FeedforwardNode, parameter_overrides=given(command_timeout=0.0), cli_args=[
             '--ros-args', '-r', '~/joint_command:=/simulated_robot/joint_command'])
         running.add(MonitorNode, parameter_overrides=given())
-        running.add(PlayTrajectoryNode, parameter_overrides=given(
-            duration=4.0, rate=50.0, ahead=0.1, seed=1))
-        played = False
-
-        def ended() -> bool:
-            nonlocal played
-            try:
-                running.executor.spin_once(timeout_sec=0.02)
-            except Finished:
-                played = True
-            return played and running.status[-1]['code'] == 'HOLD'
-
-        assert running.spin_until(ended, 40)
+        player = running.add(PlayTrajectoryNode, parameter_overrides=given(
+            duration=3.0, rate=25.0, ahead=0.1, seed=1))
+        with pytest.raises(Finished):
+            running.spin_until(lambda: False, 60)
+        running.executor.remove_node(player)
+        player.destroy_node()
         model = ArmModel.load(FILE)
         home, _ = model.robot.structure.room(np.pi)
-        positions = np.array([state.position for state in states])
+
+        def has_ended() -> bool:
+            # Dry friction of 3 N holds the PD loop of 13 N/mm off by up to 0.2 mm.
+            return bool(np.allclose(states[-1].position, home, rtol=0, atol=1e-3))
+
+        assert running.spin_until(has_ended)
         assert tuple(states[-1].name) == model.drives
-        assert np.ptp(positions, axis=0).min() > 0.02
-        np.testing.assert_allclose(positions[-1], home, rtol=0, atol=1e-4)
-        # Efforts of 30 to 100 N, friction included; noise and differentiation leave tenths.
-        assert len(errors) > 50
-        assert np.nanmedian([error.data for error in errors]) < 0.5
-        codes = {status['code'] for status in running.status}
-        assert codes <= {'OK', 'HOLD', 'LATE'}, running.status
+        assert np.ptp([state.position for state in states], axis=0).min() > 0.01
+        assert np.isfinite(errors[-1].data).all()
+        assert {status['code'] for status in running.status} <= {'OK', 'HOLD', 'LATE'}

@@ -9,6 +9,7 @@ branch that home is on.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,21 @@ def _follow(t: Tables, m: Motion, start: Any, home: Any, v: Any, a: Any, passive
                 break
         for c in range(len(start)):
             start[c] = one.q[c]
+        if s + 1 < len(m.q):
+            predict(t, one, m.q[s + 1], start)
     return failed
+
+
+def predict(t: Tables, one: Motion, goal: Any, start: Any) -> None:
+    """Move coordinates near a sample to where its rates lead on the way to the next drives."""
+    for d in range(len(t.drives)):
+        if not abs(goal[t.drives[d]] - start[t.drives[d]]) < t.stride[d]:
+            return
+    for d in range(len(t.drives)):
+        moved = goal[t.drives[d]] - start[t.drives[d]]
+        start[t.drives[d]] = goal[t.drives[d]]
+        for c in range(len(t.passive)):
+            start[t.passive[c]] += one.T[t.passive[c], d] * moved
 
 
 def _press(t: Tables, m: Motion, inertial: Any, gravity: Any, with_reactions: bool, o: Loads,
@@ -109,15 +124,20 @@ def samples_last(arrays: Any) -> Any:
 
 def new_motion(t: Tables, samples: int) -> Motion:
     """Return space for the motion of samples."""
-    count, joints, loops = len(t.row_loop), len(t.parent), len(t.loop_a)
-    coordinates = len(t.passive) + len(t.drives)
-    coordinates = max(coordinates, int(np.max(t.coordinate, initial=-1)) + 1)
+    coordinates = int(t.coordinate.max()) + 1
+    shapes = _shapes(len(t.row_loop), len(t.parent), len(t.loop_a), len(t.drives), coordinates)
+    return Motion(*(np.zeros((samples, *shape)) for shape in shapes))
 
+
+@cache
+def _shapes(rows: int, joints: int, loops: int, drives: int, coordinates: int,
+            ) -> tuple[tuple[int, ...], ...]:
+    """Return the shapes of a motion's arrays, in their order."""
     shapes = dict.fromkeys(Motion._fields, (joints, 3)) | dict.fromkeys('qva', (coordinates,)) | {
         'R': (joints, 3, 3), 'A': (loops, 3, 3), 'B': (loops, 3, 3), 'pA': (loops, 3),
-        'pB': (loops, 3), 'T': (coordinates, len(t.drives)), 'J': (count, count),
-        'inverse': (count, count), 'rows': (count, len(t.drives) + 1), 'state': (3,)}
-    return Motion(**{name: np.zeros((samples, *shape)) for name, shape in shapes.items()})
+        'pB': (loops, 3), 'T': (coordinates, drives), 'J': (rows, rows),
+        'inverse': (rows, rows), 'rows': (rows, drives + 1), 'state': (3,)}
+    return tuple(shapes.values())
 
 
 def new_loads(t: Tables, m: Motion) -> Loads:

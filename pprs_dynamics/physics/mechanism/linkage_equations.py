@@ -107,7 +107,7 @@ class Motion(NamedTuple):
         Frames of the closures.
     T : (C, D) array
     J, inverse : (r, r) arrays
-        J_p and its inverse.
+        Scratch, and the inverse of J_p.
     rows : (r, D + 1) array
         Scratch.
     state : (3,) array
@@ -332,19 +332,19 @@ def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
         T[driven[d], d] = 1.0
     if count:
         gradients(t, m, passive_of, m.J)
+        there = size_of(t, m.J)
         for r in range(count):
             for c in range(count):
                 inverse[r, c] = 1.0 if r == c else 0.0
         m.state[1] = solve(m.J, inverse, count, count)
-        gradients(t, m, passive_of, m.J)
-        m.state[2] = condition(t, m)
+        m.state[2] = there * size_of_inverse(t, inverse)
         gradients(t, m, drive_of, rows)
+        # Drives innermost: their sums do not wait for one another.
         for c in range(count):
-            for d in range(drives):
-                x = zero
-                for r in range(count):
-                    x = x + inverse[c, r] * rows[r, d]
-                T[passive[c], d] = -x
+            k = passive[c]
+            for r in range(count):
+                for d in range(drives):
+                    T[k, d] -= inverse[c, r] * rows[r, d]
         for c in range(count):
             x = zero
             for d in range(drives):
@@ -364,17 +364,30 @@ def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
         accelerations(t, m)
 
 
-def condition(t: Tables, m: Motion) -> Any:
-    """Return the condition number of J_p, in Frobenius' norm."""
-    J, inverse, row_unit, unit = m.J, m.inverse, t.row_unit, t.passive_unit
-    there = back = 0.0 * m.q[0]
+def size_of(t: Tables, J: Any) -> Any:
+    """Return Frobenius' norm of J_p in units of the mechanism's size."""
+    row_unit, unit = t.row_unit, t.passive_unit
+    total = 0.0 * J[0, 0]
     for r in range(len(row_unit)):
+        along = 0.0 * total
         for c in range(len(unit)):
-            x = J[r, c] * (unit[c] / row_unit[r])
-            y = inverse[c, r] * (row_unit[r] / unit[c])
-            there = there + x * x
-            back = back + y * y
-    return sqrt(there * back)
+            x = J[r, c] * unit[c]
+            along = along + x * x
+        total = total + along / (row_unit[r] * row_unit[r])
+    return sqrt(total)
+
+
+def size_of_inverse(t: Tables, inverse: Any) -> Any:
+    """Return the same of its inverse."""
+    row_unit, unit = t.row_unit, t.passive_unit
+    total = 0.0 * inverse[0, 0]
+    for c in range(len(unit)):
+        along = 0.0 * total
+        for r in range(len(row_unit)):
+            x = inverse[c, r] * row_unit[r]
+            along = along + x * x
+        total = total + along / (unit[c] * unit[c])
+    return sqrt(total)
 
 
 def velocities(t: Tables, m: Motion) -> None:

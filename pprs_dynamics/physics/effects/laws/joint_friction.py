@@ -15,7 +15,7 @@ with Triangular Platform, 2007, on the friction of revolute and ball joints.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -165,10 +165,7 @@ class LinkageFriction(Effect):
 
     def __init__(self, structure: Structure, blocks: Mapping[str, Mapping[str, float]]) -> None:
         self.structure, self.blocks = structure, {name: dict(one) for name, one in blocks.items()}
-
-    def table(self, reversal: Reversal) -> JointFriction:
-        """Return the friction with widths of turning over."""
-        return friction_table(self.structure, self.blocks, reversal)
+        self.table = cache(partial(friction_table, structure, self.blocks))
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""

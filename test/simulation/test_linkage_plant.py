@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Arms and robots with loops in motion under the efforts of their drives, in simulated time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import made_up_arm
+import numpy as np
+import pytest
+import robots_with_loops as robots
+
+from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics.simulation.arm_run import draw_motion
+from pprs_dynamics.simulation.drive_control import Setpoint
+from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.linkage_plant import LinkagePlant
+from pprs_dynamics.simulation.sensors import SensorSettings
+from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
+
+QUIET = SensorSettings.with_effort_noise(0.0)
+TICK = 0.002
+
+
+def models(tmp_path: Path) -> dict[str, ArmModel]:
+    """Return the example robots with friction in every joint, and an arm."""
+    return {'hexapod': ArmModel.load('config/hexapod.yaml'),
+            'delta': ArmModel.load('config/delta.yaml'),
+            'arm': ArmModel.load(made_up_arm.write_arm(tmp_path, **{
+                key.replace('.', '__'): list(value)
+                for key, value in made_up_arm.FRICTION.items()}))}
+
+
+@pytest.mark.parametrize('name', ['hexapod', 'delta', 'arm'])
+def test_the_model_needs_the_efforts_under_which_the_plant_accelerates(
+    tmp_path: Path, name: str,
+) -> None:
+    model = models(tmp_path)[name]
+    plant = LinkagePlant(model)
+    rng, count = np.random.default_rng(3), len(plant.position)
+    scale = np.array([0.1 if unit.turns else 0.02 for unit in model.units])
+    q, v = plant.position + scale * rng.uniform(-1, 1, count), scale * rng.normal(size=count)
+    effort = plant.largest * rng.uniform(-1, 1, count)
+    # Loads of friction are those of the acceleration before: they settle.
+    for _ in range(5):
+        plant._acceleration = plant.acceleration(q, v, effort, v, 0.0)
+    needed = model.drive_forces(JointMotion(q[None], v[None], plant._acceleration[None])).total[0]
+    assert needed == pytest.approx(effort, abs=1e-5 * plant.largest.max())
+
+
+@pytest.mark.parametrize('name', ['hexapod', 'delta', 'arm'])
+def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
+    tmp_path: Path, name: str,
+) -> None:
+    model = models(tmp_path)[name]
+    motion = draw_motion(model, 8.0, 1, 1 / TICK)[:500]
+    forces = model.drive_forces(motion).total
+    plant = LinkagePlant(model)
+    robot = SimulatedRobot(plant, rate=1 / TICK, control=plant.gains(7.0, 0.9), sensors=QUIET)
+    points = [Setpoint(*each) for each in zip(motion.position, motion.velocity, forces,
+                                              strict=True)]
+    measured = []
+    for now, following in pairwise(points):
+        assert robot.command(now, following)
+        measured.append(robot.tick())
+    error = np.array([each.position for each in measured]) - motion.position[:-1]
+    assert np.abs(error).max() < 1e-3 * np.ptp(motion.position, axis=0).max()
+    missed = np.array([each.effort for each in measured]) - forces[:-1]
+    assert np.sqrt(np.mean(missed ** 2)) < 0.01 * plant.largest.max()
+    assert not robot.notes
+
+
+def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
+    plant = LinkagePlant(ArmModel.load('config/hexapod.yaml'))
+    robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9), sensors=QUIET)
+    home = plant.position.copy()
+    for _ in range(50):
+        robot.tick()
+    assert plant.position == pytest.approx(home, abs=1e-9)
+    assert not robot.command(Setpoint(home + 1.0, np.zeros(6)))
+    assert 'leg_1 at 1.4847 m lies outside its stroke' in robot.notes[-1].message
+    robot.command(Setpoint(None, None, np.full(6, 1e6)))
+    robot.tick()
+    assert robot.notes[-1].code == 'SATURATED'
+    assert ' N, limits' in robot.notes[-1].message or 'URDF' in robot.notes[-1].message
+
+
+def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) -> None:
+    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    plain, loaded = LinkagePlant(model), LinkagePlant(model, ['payload_mass'], seed=2)
+    rest = np.zeros(2)
+    weight = [each._equations(each.position, rest, rest)[0] for each in (plain, loaded)]
+    # The tool's origin is an elbow: one drive moves it.
+    assert np.diag(weight[1]) / np.diag(weight[0]) == pytest.approx([1.0, 1.167], abs=1e-3)
+    assert loaded.hidden[0]['name'] == 'payload_mass'
+    with pytest.raises(HiddenEffectError, match='rod_mass cannot be hidden'):
+        LinkagePlant(model, ['rod_mass'])
