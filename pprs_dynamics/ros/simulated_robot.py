@@ -37,7 +37,7 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.linkage_plant import STEP, LinkagePlant
+from pprs_dynamics.simulation.linkage_plant import LinkagePlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -61,7 +61,7 @@ PARAMETERS = (
 )
 # Of an arm or a robot with loops, whose drives are in several units and sizes.
 OF_JOINTS = (
-    NodeParameter('rate', 500.0, 'of joint_states, a divisor of 500 [Hz]', lower=10, upper=500),
+    NodeParameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
     NodeParameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
                   upper=50),
     NodeParameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
@@ -209,7 +209,8 @@ def _loop_in_words(own: dict[str, Any]) -> str:
 
 def _platform(model: ForceModel, own: dict[str, Any], effects: Sequence[HiddenEffect],
               ) -> SimulatedRobot:
-    _require_rate(own, PARAMETERS[0], 2000)
+    if 2000 % own['rate']:
+        raise ModelError('rate', own['rate'], PARAMETERS[0].rule)
     return SimulatedRobot(
         model.values, effects, seed=own['seed'], rate=own['rate'],
         control=ControlSettings(own['stiffness'], own['damping'], **_behaviour(own)),
@@ -217,17 +218,12 @@ def _platform(model: ForceModel, own: dict[str, Any], effects: Sequence[HiddenEf
 
 
 def _mechanism(model: ArmModel, own: dict[str, Any]) -> SimulatedRobot:
-    _require_rate(own, OF_JOINTS[0], round(1 / STEP))
-    plant = LinkagePlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'])
+    plant = LinkagePlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'],
+                         own['rate'])
     return SimulatedRobot(
         plant, seed=own['seed'], rate=own['rate'],
         control=plant.gains(own['bandwidth'], own['damping_ratio'], **_behaviour(own)),
         sensors=SensorSettings.with_effort_noise(own['effort_noise'], own['encoder_resolution']))
-
-
-def _require_rate(own: dict[str, Any], parameter: NodeParameter, steps: int) -> None:
-    if steps % own['rate']:
-        raise ModelError('rate', own['rate'], parameter.rule)
 
 
 def _behaviour(own: dict[str, Any]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ linear in the acceleration. Loads are those of the acceleration of the step befo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -35,7 +36,7 @@ from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.plant import UnsolvedError
 
-STEP = 0.002  # [s]; 0.2 to 1 ms of processor time for a hexapod, so that it runs in real time
+LONGEST_STEP = 0.002  # [s]; a hexapod's takes 0.3 to 1 ms of processor time, for real time
 ROUNDS = 12  # of friction's coefficients in a step
 SOLVED = 1e-6  # of the width in which friction turns over, between rounds
 SLOWEST = 1e-9  # of that width, below which tanh(x) / x is 1
@@ -54,7 +55,7 @@ HIDDEN = (*OF_MOMENT, *BODIES, 'base_tilt')
 class LinkagePlantSettings:
     """Time step of the simulation [s]."""
 
-    step: float = STEP
+    step: float
 
 
 class LinkagePlant:
@@ -70,6 +71,8 @@ class LinkagePlant:
         Of these.
     scale : float
         Multiplies their size.
+    rate : float
+        At which it is looked at [Hz]: a whole number of steps lies between.
 
     Attributes
     ----------
@@ -81,7 +84,8 @@ class LinkagePlant:
     largest : (D,) array
         Largest efforts of an excitation [N, N m].
     inertia : (D,) array
-        Seen by each drive at home, the others free to be held [kg, kg m^2].
+        That the drives' loops are made for, at home [kg, kg m^2]: what each moves while the others
+        stand, less where motions of several together move little.
 
     Raises
     ------
@@ -92,8 +96,8 @@ class LinkagePlant:
     """
 
     def __init__(self, model: ArmModel, names: Sequence[str] = (), seed: int = 0,
-                 scale: float = 1.0) -> None:
-        self.settings = LinkagePlantSettings()
+                 scale: float = 1.0, rate: float = 500.0) -> None:
+        self.settings = LinkagePlantSettings(1 / (rate * math.ceil(1 / (rate * LONGEST_STEP))))
         self.model, self.engine = model, ArmEngine(model)
         self.structure = s = model.robot.structure
         random = np.random.default_rng(seed)
@@ -118,7 +122,12 @@ class LinkagePlant:
         self.time = 0.0
         self._rest = np.zeros_like(home)
         self.place(home)
-        self.inertia = np.diag(self._equations(home, self._rest, self._rest)[0]).copy()
+        M = self._equations(home, self._rest, self._rest)[0]
+        alone = np.diag(M)
+        # A loop for `alone` would be unstable in the lightest motion, one for that weak in all
+        # others: the geometric mean of both.
+        lightest = np.linalg.eigvalsh(M / np.sqrt(np.outer(alone, alone)))[0]
+        self.inertia = alone * np.sqrt(lightest)
 
     def _hide(self, name: str, motion: JointMotion, efforts: Array, random: np.random.Generator,
               scale: float) -> dict[str, Any]:

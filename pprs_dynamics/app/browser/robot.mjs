@@ -41,14 +41,20 @@ export class Robot {
     });
   }
 
-  use(time, joints, before, now, angles) {
-    Object.assign(this, {time, joints, before, now, angles});
+  /* `header` says which points lines join and which drives these are, see Skeleton. */
+  use(header, arrays) {
+    const {lines, face, joints, labels} = header;
+    const [time, points, before, now] = ['time', 'points', 'before', 'now'].map(
+      (name) => arrays[name].values);
+    Object.assign(this, {lines, face, joints, labels, time, points, before, now});
+    this.count = points.length / (3 * time.length);
+    this.drives = before.length / time.length;
     // The 95th percentile: a single peak would make all else blue.
     const sorted = Float32Array.from(before).sort();
     this.most = sorted[Math.floor(0.95 * (sorted.length - 1))] || 1;
     this.frame = Math.min(this.frame, time.length - 1);
     const bounds = [0, 1, 2].map(() => [Infinity, -Infinity]);
-    joints.forEach((v, k) => {
+    points.forEach((v, k) => {
       const bound = bounds[k % 3];
       bound[0] = Math.min(bound[0], v);
       bound[1] = Math.max(bound[1], v);
@@ -91,9 +97,9 @@ export class Robot {
     this.playing = false;
   }
 
-  point(which, chain) {
-    const at = ((this.frame * 3 + which) * 3 + chain) * 3;
-    return [this.joints[at], this.joints[at + 1], this.joints[at + 2]];
+  point(which) {
+    const at = 3 * (this.frame * this.count + which);
+    return [this.points[at], this.points[at + 1], this.points[at + 2]];
   }
 
   draw() {
@@ -110,7 +116,7 @@ export class Robot {
       return [width / 2 + zoom * u, height / 2 - zoom * (ct * z + st * v), ct * v - st * z];
     };
     const errors = this[this.what];
-    const colour = (drive) => heat(errors[this.frame * 6 + drive] / this.most);
+    const colour = (drive) => heat(errors[this.frame * this.drives + drive] / this.most);
     const line = (a, b, stroke, thick) => {
       const [p, q] = [seen(a), seen(b)];
       context.beginPath();
@@ -121,35 +127,28 @@ export class Robot {
       context.lineCap = 'round';
       context.stroke();
     };
-    const feet = [0, 1, 2].map((i) => this.point(0, i));
     context.font = '12px system-ui';
-    for (const i of [0, 1, 2]) {
-      const [foot, elbow, tip] = [0, 1, 2].map((which) => this.point(which, i));
-      // A slide moves across its chain's plane.
-      const radius = Math.hypot(foot[0], foot[1]) || 1;
-      const angle = this.angles[i] + Math.PI / 2;
-      const way = [Math.cos(angle), Math.sin(angle), 0];
-      const half = 0.35 * this.size;
-      line(foot.map((v, k) => v - half * way[k]), foot.map((v, k) => v + half * way[k]),
-           css('--line'), 2);
-      line(foot.map((v, k) => v - 0.06 * radius * way[k]),
-           foot.map((v, k) => v + 0.06 * radius * way[k]), colour(i), 14);
-      line(foot, elbow, colour(3 + i), 8);
-      line(elbow, tip, css('--quiet'), 4);
-      for (const joint of [elbow, tip]) {
-        const [x, y] = seen(joint);
-        context.beginPath();
-        context.arc(x, y, 4, 0, 7);
-        context.fillStyle = css('--text');
-        context.fill();
-      }
-      const [x, y] = seen(feet[i]);
-      context.fillStyle = css('--quiet');
-      context.fillText(`chain ${i + 1}`, x + 12, y + 18);
+    for (const {start, end, kind, drive} of this.lines) {
+      line(this.point(start), this.point(end),
+           drive < 0 ? css(kind === 'guide' ? '--line' : '--quiet') : colour(drive),
+           drive < 0 ? (kind === 'guide' ? 2 : 4) : 8);
     }
-    const tips = [0, 1, 2].map((i) => seen(this.point(2, i)));
+    for (const joint of this.joints) {
+      const [x, y] = seen(this.point(joint));
+      context.beginPath();
+      context.arc(x, y, 4, 0, 7);
+      context.fillStyle = css('--text');
+      context.fill();
+    }
+    context.fillStyle = css('--quiet');
+    for (const [name, at] of Object.entries(this.labels)) {
+      const [x, y] = seen(this.point(at));
+      context.fillText(name, x + 12, y + 18);
+    }
+    if (!this.face.length) return;
     context.beginPath();
-    tips.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+    this.face.map((corner) => seen(this.point(corner))).forEach(
+      ([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
     context.closePath();
     context.fillStyle = 'rgba(230, 159, 0, .55)';
     context.fill();

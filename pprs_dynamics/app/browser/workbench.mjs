@@ -173,8 +173,7 @@ const loadRobot = async () => {
   try {
     const {header, arrays} = await server.ask('robot');
     $('robot-time').max = arrays.time.values.length - 1;
-    robot.use(arrays.time.values, arrays.joints.values, arrays.before.values, arrays.now.values,
-              header.angles);
+    robot.use(header, arrays);
     $('robot-most').textContent = `0 to ${amount(robot.most)} ${unit()}`;
     robot.moved(robot.frame);
   } catch (error) {

@@ -90,14 +90,10 @@ class SimulationResult(Result):
 
     def page(self) -> Page:
         """Return the page of `pprs simulate --report`: the moving robot."""
-        from pprs_dynamics.app.report.page import Page
         from pprs_dynamics.app.report.robot_view import robot_page
 
-        if isinstance(self.model, DriveModel) and isinstance(self.motion, PlatformMotion):
-            return robot_page(self.model, self.motion, 'The simulated motion')
-        page = Page('The simulated motion')
-        page.text(f'{len(self.recording.time)} samples at {self.rate:g} Hz.', 'lead')
-        return page
+        assert isinstance(self.model, (DriveModel, ArmModel))
+        return robot_page(self.model, self.motion, 'The simulated motion')
 
     def table(self) -> pd.DataFrame:
         """Return a row per drive: range of position, velocity and effort."""

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.report.page import Page, plotly_objects
-from pprs_dynamics.physics.mechanism.linkage import survey
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.skeleton import Skeleton
 
 COLOURS = {'driven': '#0072B2', 'passive': '#009E73', 'held': '#999999'}
 LOOP = '#E69F00'
@@ -86,22 +87,20 @@ def draw_mechanism(model: ArmModel, title: str) -> Any:
     from plotly.subplots import make_subplots
 
     go = plotly_objects()
-    s, t = model.robot.structure, model.robot.structure.tables
-    _, _, m = survey(t, s.home, np.arange(len(s.home)))
-    segments = []
-    for j in s.rows.values():
-        segments += [m.p[0, t.parent[j]], m.p[0, j], np.full(3, np.nan)]
-    for k in range(len(s.loops)):
-        for row, at in ((t.loop_a[k], m.pA[0, k]), (t.loop_b[k], m.pB[0, k])):
-            segments += [m.p[0, row], at, np.full(3, np.nan)]
-    links = np.array(segments)
+    s = model.robot.structure
+    home = s.home[None, s.tables.drives]
+    drawn = Skeleton.of(model, JointMotion(home, np.zeros_like(home), np.zeros_like(home)))
+    points = drawn.points[0]
+    links = np.concatenate([[points[line.start], points[line.end], np.full(3, np.nan)]
+                            for line in drawn.lines])
     figure = make_subplots(1, 2, subplot_titles=('from the front', 'from above'))
     for column, (across, up) in enumerate(((0, 2), (0, 1)), 1):
         marks = [(f'{role} joints', colour, 'circle', {
-            name: m.p[0, s.rows[name]] for name in s.rows if _role(model, name) == role})
+            name: points[at] for name, at in drawn.joints.items()
+            if _role(model, name) == role})
             for role, colour in COLOURS.items()]
         marks.append(('loops', LOOP, 'diamond', {
-            loop.name: m.pA[0, k] for k, loop in enumerate(s.loops)}))
+            name: points[at] for name, at in drawn.loops.items()}))
         figure.add_trace(go.Scatter(
             x=links[:, across], y=links[:, up], mode='lines', name='links', hoverinfo='skip',
             showlegend=column == 1, line={'color': '#777777', 'width': 3}), row=1, col=column)

@@ -5,16 +5,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
+from pprs_dynamics.physics.model.skeleton import Skeleton
 
 MOST_POSES = 600
 
@@ -25,19 +25,15 @@ class RobotMotion:
 
     Parameters
     ----------
-    angles : tuple of float
-        Of the chains about z [rad].
     time : (F,) array
         Of the residuals [s].
-    joints : (F, 3, 3, 3) array
-        Slide, joint C and joint A of every chain in `base` [m]; second axis: which, third: chain.
+    skeleton : Skeleton
     before, now : (F, D) array
         Error of the drives there, rms over the samples until the next pose [N].
     """
 
-    angles: tuple[float, ...]
     time: Array
-    joints: Array
+    skeleton: Skeleton
     before: Array
     now: Array
 
@@ -48,23 +44,22 @@ def robot_motion(session: Session, most: int = MOST_POSES) -> RobotMotion:
     Raises
     ------
     SessionError
-        For a model of another mechanism.
+        For a model that moves nothing.
     """
     model = session.model
-    if not isinstance(model, DriveModel):
-        raise SessionError(f'{model.title} is not drawn, only the 3-PPRS is')
+    if not isinstance(model, (DriveModel, ArmModel)):
+        raise SessionError(f'{model.title} is not drawn: it moves along a line')
     chosen = np.unique(np.linspace(0, len(session.data) - 1, most).astype(int))
-    joints, first = [], 0
+    found: list[Skeleton] = []
+    first = 0
     for one in session.fits.design.reconstructions:
         starts = one.treat.starts
         here = chosen[(chosen >= first) & (chosen < first + len(starts))] - first
         first += len(starts)
-        assert isinstance(one.motion, PlatformMotion)
         if len(here):
-            found = joint_positions(model.robot.geometry, one.motion[starts[here]])
-            joints.append(np.stack((found.foot, found.elbow, found.tip), axis=1))
-    angles = tuple(float(angle) for angle in model.values['geometry.chain_angles'])
-    return RobotMotion(angles, session.data.time[chosen], np.concatenate(joints),
+            found.append(Skeleton.of(model, one.motion[starts[here]]))
+    drawn = replace(found[0], points=np.concatenate([one.points for one in found]))
+    return RobotMotion(session.data.time[chosen], drawn,
                        _rms_between(session.before, chosen), _rms_between(session.now, chosen))
 
 

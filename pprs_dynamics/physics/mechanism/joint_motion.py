@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,7 +36,8 @@ class JointMotion:
     def __len__(self) -> int:
         return len(self.position)
 
-    def __getitem__(self, samples: slice) -> Self:
+    def __getitem__(self, samples: Any) -> Self:
+        """Return the samples that a slice, a mask or indices select."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples],
                        acceleration=self.acceleration[samples],
                        time=None if self.time is None else self.time[samples])

@@ -258,8 +258,10 @@ class Api:
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
         found = robot_motion(self.hub.the_session)
-        return binary({'angles': found.angles}, {
-            'time': found.time, 'joints': found.joints, 'before': found.before,
+        drawn = found.skeleton
+        return binary({'lines': [asdict(line) for line in drawn.lines], 'face': drawn.face,
+                       'joints': list(drawn.joints.values()), 'labels': drawn.labels}, {
+            'time': found.time, 'points': drawn.points, 'before': found.before,
             'now': found.now})
 
     def files(self, query: Any) -> Response:

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A robot as points, and lines between them, along a motion: what every drawing of it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
+
+LINK, DRIVE, GUIDE = 'link', 'drive', 'guide'
+SLIDE = 0.06  # length of a slide of the 3-PPRS, over its distance from the base's centre
+JOINED = 1e-6  # of the robot's size: joints closer than that are one point
+
+
+@dataclass(frozen=True)
+class Line:
+    """From one point to another.
+
+    Parameters
+    ----------
+    start, end : int
+        Of the points.
+    kind : {'link', 'drive', 'guide'}
+    drive : int
+        That moves along it or turns it, or -1.
+    name : str
+    """
+
+    start: int
+    end: int
+    kind: str = LINK
+    drive: int = -1
+    name: str = ''
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """F poses of a robot.
+
+    Parameters
+    ----------
+    points : (F, P, 3) array
+        In the base [m].
+    lines : tuple of Line
+    face : tuple of int
+        Corners of the platform, or of whatever carries the load; empty where there are none.
+    joints, loops : dict of str to int
+        Points by the names of joints and of closures.
+    labels : dict of str to int
+        Where names stand.
+    """
+
+    points: Array
+    lines: tuple[Line, ...]
+    face: tuple[int, ...]
+    joints: dict[str, int]
+    loops: dict[str, int]
+    labels: dict[str, int]
+
+    @classmethod
+    def of(cls, model: DriveModel | ArmModel, motion: PlatformMotion | JointMotion) -> Skeleton:
+        """Return the poses of a motion of a model."""
+        if isinstance(model, ArmModel):
+            return _of_linkage(model, model.mechanism(motion).linkage)
+        assert isinstance(motion, PlatformMotion)
+        return _of_platform(model, motion)
+
+
+def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
+    geometry, strokes = model.robot.geometry, model.limits.slide_stroke
+    found = joint_positions(geometry, motion)
+    points: list[Array] = []
+    lines: list[Line] = []
+    joints: dict[str, int] = {}
+    labels: dict[str, int] = {}
+    for i in range(3):
+        foot, elbow, tip = found.foot[:, i], found.elbow[:, i], found.tip[:, i]
+        frames = geometry.frames
+        along = np.array([-frames.sin[i], frames.cos[i], 0.0])
+        middle = geometry.base_radius * np.array([frames.cos[i], frames.sin[i], 0.0])
+        half = SLIDE * geometry.base_radius * along
+        first = len(points)
+        points += [np.broadcast_to(middle + end * along, foot.shape) for end in strokes]
+        points += [foot - half, foot + half, foot, elbow, tip]
+        lines += [Line(first, first + 1, GUIDE, -1, f'guide {i + 1}'),
+                  Line(first + 2, first + 3, DRIVE, i, f'slide_{i + 1}'),
+                  Line(first + 4, first + 5, DRIVE, 3 + i, f'lift_{i + 1}'),
+                  Line(first + 5, first + 6, LINK, -1, f'rod {i + 1}')]
+        joints |= {f'C_{i + 1}': first + 5, f'A_{i + 1}': first + 6}
+        labels[f'chain {i + 1}'] = first + 4
+    return Skeleton(np.stack(points, axis=1), tuple(lines),
+                    tuple(joints[f'A_{i}'] for i in (1, 2, 3)), joints, {}, labels)
+
+
+def _of_linkage(model: ArmModel, linkage: Linkage) -> Skeleton:
+    s, m = model.robot.structure, linkage.motion
+    t, size = s.tables, s.size
+    count = len(t.parent)
+    points = [*np.moveaxis(m.p, 1, 0), *np.moveaxis(m.pA, 1, 0), *np.moveaxis(m.pB, 1, 0),
+              linkage.frame_of(s.tool).p]
+    driven = {s.rows[name]: d for d, name in enumerate(s.drives)}
+    lines: list[Line] = []
+
+    def join(row: int, end: int, joint: int, name: str) -> None:
+        """Add a line from a joint to what hangs on its link, where the two are apart."""
+        if np.linalg.norm(points[row][0] - points[end][0]) > JOINED * size:
+            d = driven.get(joint, -1) if joint in driven and not t.turns[joint] else (
+                driven.get(row, -1))
+            lines.append(Line(row, end, LINK if d < 0 else DRIVE, d, name))
+
+    for name, row in s.rows.items():
+        join(int(t.parent[row]), row, row, name)
+    on_tool = []
+    tool, _ = s.links[s.tool]
+    for k, loop in enumerate(s.loops):
+        for row, end, link in ((int(t.loop_a[k]), count + k, loop.a),
+                               (int(t.loop_b[k]), count + len(s.loops) + k, loop.b)):
+            if row == tool:
+                on_tool.append(end)
+            else:
+                join(row, end, -1, link)
+    on_tool += [row for row in s.rows.values() if t.parent[row] == tool]
+    if len(on_tool) < 3:
+        for end in (*on_tool, len(points) - 1):
+            join(tool, end, -1, s.tool)
+        on_tool = []
+    joints = dict(s.rows)
+    return Skeleton(np.stack(points, axis=1), tuple(lines), _around(points, on_tool), joints,
+                    {loop.name: count + k for k, loop in enumerate(s.loops)},
+                    {name: s.rows[name] for name in s.drives})
+
+
+def _around(points: list[Array], corners: list[int]) -> tuple[int, ...]:
+    """Return corners in their order about their centre, as seen along their common normal."""
+    if not corners:
+        return ()
+    at = np.array([points[k][0] for k in corners])
+    from_centre = at - at.mean(axis=0)
+    _, _, axes = np.linalg.svd(from_centre)
+    angle = np.arctan2(from_centre @ axes[1], from_centre @ axes[0])
+    return tuple(corners[k] for k in np.argsort(angle))
