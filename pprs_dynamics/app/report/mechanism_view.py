@@ -90,17 +90,17 @@ def draw_mechanism(model: ArmModel, title: str) -> Any:
     s = model.robot.structure
     home = s.home[None, s.tables.drives]
     drawn = Skeleton.of(model, JointMotion(home, np.zeros_like(home), np.zeros_like(home)))
-    points = drawn.points[0]
-    links = np.concatenate([[points[line.start], points[line.end], np.full(3, np.nan)]
+    placed = drawn.points[0]
+    links = np.concatenate([[placed[line.start], placed[line.end], np.full(3, np.nan)]
                             for line in drawn.lines])
     figure = make_subplots(1, 2, subplot_titles=('from the front', 'from above'))
     for column, (across, up) in enumerate(((0, 2), (0, 1)), 1):
         marks = [(f'{role} joints', colour, 'circle', {
-            name: points[at] for name, at in drawn.joints.items()
+            name: placed[at] for name, at in drawn.joints.items()
             if _role(model, name) == role})
             for role, colour in COLOURS.items()]
         marks.append(('loops', LOOP, 'diamond', {
-            name: points[at] for name, at in drawn.loops.items()}))
+            name: placed[at] for name, at in drawn.loops.items()}))
         figure.add_trace(go.Scatter(
             x=links[:, across], y=links[:, up], mode='lines', name='links', hoverinfo='skip',
             showlegend=column == 1, line={'color': '#777777', 'width': 3}), row=1, col=column)
