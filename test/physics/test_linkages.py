@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 from oracles.mujoco_loops import MujocoLoops
+from random_states import random_motion
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
@@ -78,8 +79,11 @@ def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
 PAPER_FRICTION = ('friction.revolute', 'friction.spherical')
 
 
-def three_pprs(tmp_path: Path) -> tuple[DriveModel, ArmModel]:
-    """Return the paper's robot in closed form, and as a tree with loops."""
+def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, ArmModel]:
+    """Return the paper's robot in closed form, and as a tree with loops.
+
+    Friction of the drives follows their guides' loads where it is among that of the joints.
+    """
     paper = DriveModel.load()
     values = {**paper.values, 'masses.inertia': (0.005, 0.006, 0.01, 0.0, 0.0, 0.0)}
     paper = DriveModel.from_parameters(values)
@@ -92,6 +96,9 @@ def three_pprs(tmp_path: Path) -> tuple[DriveModel, ArmModel]:
             joints[name] = {key: float(values[f'friction.{kind}.{key}'])
                             for key in ('viscous', 'coulomb')}
             joints[name]['radius'] = float(values[f'friction.{kind}.diameter']) / 2
+    for d, name in enumerate(paper.drives if drives else ()):
+        joints[name] = {key: float(values[f'friction.drives.{key}'][d])
+                        for key in ('viscous', 'coulomb')}
     model = ArmModel.load(text.write(tmp_path, {
         'joints': joints, 'reversal_rate': float(values['friction.reversal_rate']),
         'reversal_velocity': float(values['friction.reversal_velocity'])}))
@@ -114,6 +121,18 @@ def test_the_3_pprs_with_loops_is_its_closed_form(tmp_path: Path, which: int) ->
     found = model.drive_forces(JointMotion(s.position, s.velocity, s.acceleration))
     for part in ('rigid_body', 'passive_friction'):
         assert found.parts[part] == pytest.approx(forces.parts[part], abs=1e-10), part
+
+
+def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states(tmp_path: Path) -> None:
+    """Rigid body, friction of the drives with the load of their guides, and of passive joints."""
+    paper, model = three_pprs(tmp_path, drives=True)
+    forces = paper.drive_forces(random_motion(np.random.default_rng(8), 1000))
+    s = forces.mechanism
+    found = model.drive_forces(JointMotion(s.position, s.velocity, s.acceleration)).parts
+    assert found['rigid_body'] == pytest.approx(forces.parts['rigid_body'], abs=1e-10)
+    active, passive = (forces.parts[f'{kind}_friction'] for kind in ('active', 'passive'))
+    assert found['passive_friction'] == pytest.approx(active + passive, abs=1e-10)
+    assert min(np.abs(part).max() for part in (active, passive)) > 1
 
 
 def energy(model: ArmModel, moved: linkage.Motion) -> np.ndarray:

@@ -18,8 +18,8 @@ NO_LIMIT = (-3.1, 3.1, 20.0, 200.0)
 
 
 def words(values: Any) -> str:
-    """Return numbers as a file has them."""
-    return ' '.join(f'{float(value):.12g}' for value in np.asarray(values).ravel() + 0.0)
+    """Return numbers as a file has them, in full: comparisons reach beyond 12 digits."""
+    return ' '.join(f'{float(value):.17g}' for value in np.asarray(values).ravel() + 0.0)
 
 
 def rpy_of(R: np.ndarray) -> tuple[float, float, float]:
@@ -58,8 +58,8 @@ class RobotText:
         xx, yy, zz = inertia
         self.parts.append(
             f'  <link name="{name}">\n    <inertial>\n      <origin xyz="{words(centre)}"/>\n'
-            f'      <mass value="{mass:.12g}"/>\n      <inertia ixx="{xx:.12g}" iyy="{yy:.12g}" '
-            f'izz="{zz:.12g}" ixy="0" ixz="0" iyz="0"/>\n    </inertial>\n  </link>')
+            f'      <mass value="{mass:.17g}"/>\n      <inertia ixx="{xx:.17g}" iyy="{yy:.17g}" '
+            f'izz="{zz:.17g}" ixy="0" ixz="0" iyz="0"/>\n    </inertial>\n  </link>')
 
     def joint(self, name: str, kind: str, parent: str, child: str, xyz: Any = (0, 0, 0),
               R: np.ndarray | None = None, axis: Any = (0, 0, 1), limit: Any = NO_LIMIT,
@@ -82,7 +82,7 @@ class RobotText:
         """Add a closure."""
         sides = {}
         for side, link, xyz, rpy in (('a', a, xyz_a, rpy_a), ('b', b, xyz_b, rpy_b)):
-            sides[side] = {'link': link, 'xyz': [round(float(x), 12) + 0.0 for x in xyz]}
+            sides[side] = {'link': link, 'xyz': [float(x) for x in xyz]}
             if rpy is not None:
                 sides[side]['rpy'] = [float(x) for x in rpy]
         self.loops[name] = {'type': kind, **sides}
