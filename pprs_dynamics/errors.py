@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Errors of the package: one root, each composing its sentence from what it keeps."""
+"""Exceptions of the package, all derived from PprsError."""
 
 from __future__ import annotations
 

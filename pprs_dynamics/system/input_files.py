@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What may be read: regular files. Opening a pipe waits for a writer, a device has no end."""
+"""Check that an input is a regular file: a pipe would block, a device has no end."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The one writer of files and folders: a reader sees the old content or the new one, never half.
+"""Atomic writing of files and folders: readers see the old content or the new one.
 
 Only regular files are replaced. Of a symbolic link the target is written, which must be of the
 same kind by its ending.

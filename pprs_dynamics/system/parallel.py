@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Work on drives side by side: numpy lets go of the interpreter while it computes."""
+"""Thread pool over drives; NumPy releases the interpreter lock while it computes."""
 
 from __future__ import annotations
 

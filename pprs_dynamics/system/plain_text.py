@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Text for every terminal and file: plain characters, and names of files as they can be shown."""
+"""Sanitised text for terminals and files: control characters, undecodable file names."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line, without all that would be right; --help has that."""
+    """Parser whose errors are one line, without the usage."""
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Standard output and error that take every text, and whose end does not end the work."""
+"""Standard output and error: characters that the encoding lacks, closed pipes, full disks."""
 
 from __future__ import annotations
 

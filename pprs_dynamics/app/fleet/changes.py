@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Changes in a series of values over time: steps, or a slope that begins some day.
+"""Change points in a series of values over time: steps, and slopes with a beginning.
 
 A change is told only where a constant is refuted by an F test, corrected for every place at which
 it might have been found (Bonferroni) and for noise that is correlated from one value to the next.

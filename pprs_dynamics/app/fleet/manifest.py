@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which recordings there are, whose they are, and when they were made.
+"""Manifest of a fleet: recordings, their robots, times and conditions.
 
 A manifest is a CSV file with the columns path, robot and time, optionally model; every further
 column is a condition, a number that trends can be drawn beside. Paths are files or whatever

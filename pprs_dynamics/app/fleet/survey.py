@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""One recording to its rows: read, checked, compared, and diagnosed or fitted.
+"""Survey of one recording: read, checked, compared, diagnosed or fitted; the rows of its results.
 
 `examine` is what workers run. It never raises for what is wrong with a recording: that becomes a
 row with the reason.

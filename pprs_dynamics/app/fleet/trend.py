@@ -35,7 +35,7 @@ QUANTILES = (0.025, 0.5, 0.975)
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is followed: a parameter of an effect, a number of the model, or an error.
+    """A tracked quantity: a parameter of an effect, a number of the model, or an error.
 
     Parameters
     ----------

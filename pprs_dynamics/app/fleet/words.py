@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Trends in words: first what changed, since when, by how much, and when a limit is reached."""
+"""Sentences of trends: what changed, since when, by how much, and when a limit is reached."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a session refuses."""
+"""Errors of a session."""
 
 from pprs_dynamics.errors import PprsError
 
 
 class SessionError(PprsError, ValueError):
-    """What a session cannot do."""
+    """A request that a session refuses."""
 
 
 class StaleError(SessionError):

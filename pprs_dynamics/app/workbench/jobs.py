@@ -17,7 +17,7 @@ NUMBERS = count(1)  # each job has one of its own
 
 
 class Cancelled(Exception):
-    """Work that somebody called off. Not a `PprsError`: nothing may take it for bad input."""
+    """A cancelled job. Not a `PprsError`: nothing may take it for bad input."""
 
 
 class Job(Generic[Result]):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What takes seconds to minutes, as functions that another process can find."""
+"""Work of seconds to minutes, as picklable functions for a worker process."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parts of the data that somebody points at: a span of time, a region of a scatter."""
+"""Selections (brushing): samples in a span of time, or in a region of a scatter plot."""
 
 from __future__ import annotations
 

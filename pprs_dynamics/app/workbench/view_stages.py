@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""From ticks to what is shown of them: at once a linear fit, then all that follows from it."""
+"""Stages of a fit of ticked effects: linear at once, then noise, shapes and the exact model."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a session shows at one moment: all of it belongs to one set of ticks."""
+"""View state of a session: fit, errors, values and evidence of one set of ticks."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Long work in a process of its own: it takes nothing from the answers to ticks, and can be ended.
+"""Worker process for long work, with progress and cancellation.
 
 The process is a fresh Python that gets function and arguments as a pickle on its standard input,
 so that scripts and notebooks need no `if __name__ == '__main__'`.

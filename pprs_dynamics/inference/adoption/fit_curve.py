@@ -48,7 +48,7 @@ class CurveError(PprsError, ValueError):
 
 @dataclass(frozen=True)
 class CurveRequest:
-    """A curve that somebody wants in the model: measured_curve:DRIVE@VARIABLE.
+    """A request for a measured curve: measured_curve:DRIVE@VARIABLE.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What speaks against adding an effect to a model, each in a sentence with its figures."""
+"""Acceptance checks of an adoption: held-out error, evidence, rivals, bounds; each a sentence."""
 
 from __future__ import annotations
 

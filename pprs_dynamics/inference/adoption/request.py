@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""An effect that somebody wants in the model: EFFECT, or EFFECT:drive,drive."""
+"""Requests for an effect: EFFECT, or EFFECT:drive,drive; parsed and checked."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class EffectRequestError(PprsError, ValueError):
 
 @dataclass(frozen=True)
 class EffectRequest:
-    """An effect that somebody wants in the model.
+    """A requested effect, and on which drives.
 
     Parameters
     ----------

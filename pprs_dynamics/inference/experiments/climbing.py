@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A few steps uphill within limits, by scipy's sequential quadratic programming.
+"""Local optimisation of a motion within limits: sequential quadratic programming (SLSQP).
 
 The criterion is dear and, since drives turn over in a millimetre per second, rough: slopes are
 differences over wide steps, and each round stays near where they were taken.

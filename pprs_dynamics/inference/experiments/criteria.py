@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much a motion would tell: about which of two explanations is right, or about numbers.
+"""Criteria of experiment design: expected evidence between rival models; D-optimality of numbers.
 
 References
 ----------
@@ -30,7 +30,7 @@ EVIDENCE_FLOOR = 1.0  # misfits below it count as none
 
 
 class Criterion(Protocol):
-    """What is to be made as large as possible."""
+    """Objective of a design, to be maximised."""
 
     def value(self, gram: Array) -> float:
         """Return it for the information of recordings, motion and prior together, (P, P)."""
@@ -69,7 +69,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Contest:
-    """Whether a rival would be told from what is true.
+    """Expected discrimination of a rival from the true model.
 
     Parameters
     ----------

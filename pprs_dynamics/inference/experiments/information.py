@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What recordings and motions say about columns: Gram matrices under the noise of the drives.
+"""Information (Gram) matrices of columns under the noise of the drives.
 
 As in a fit, columns are transformed by the orthonormal DCT and divided by the root of the noise's
 power spectrum.

@@ -43,7 +43,7 @@ class PurposeError(PprsError, ValueError):
 
 @dataclass(frozen=True)
 class ExpectedEvidence:
-    """What a motion promises for one contest.
+    """Expected evidence of a motion in one contest.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A motion with what it promises.
+    """A designed motion with its expected evidence.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is to be found out: which explanations remain, or which numbers are poorly known."""
+"""The question of an experiment: rival explanations, or numbers that are poorly known."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class NoMotionError(PprsError, ValueError):
 
 @dataclass(frozen=True)
 class Found:
-    """A motion with what it is worth and uses.
+    """A motion with its value and its use of the limits.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What an arm's efforts are linear in: inertia of its links and rotors, friction and offsets."""
+"""Regressor of an arm's efforts: inertia of links and rotors, friction, offsets."""
 
 from __future__ import annotations
 

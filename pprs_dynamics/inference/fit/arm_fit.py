@@ -48,7 +48,7 @@ STANDS = 0.05  # share of the samples in which a joint must move for its frictio
 
 @dataclass(frozen=True)
 class ArmFit:
-    """What was found.
+    """Result of the fit of an arm.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Inertial parameters of links that bodies can have, and how far they are from a description's.
+"""Physically consistent inertial parameters of links (pseudo-inertia), and their prior.
 
 A body's pseudo-inertia P (4 x 4: second moments, first moment, mass) is positive definite, and
 every such P belongs to a body. P = L_0 M M^T L_0^T with L_0 L_0^T = P_0, the description's, and M

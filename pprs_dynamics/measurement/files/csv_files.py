@@ -50,7 +50,7 @@ SEPARATORS = (',', ';', '\t')
 
 @dataclass(frozen=True)
 class _Table:
-    """What the header says: the separator, all columns, and which of them are used."""
+    """Header of a table: separator, all columns, and those that are used."""
 
     separator: str
     header: list[str]

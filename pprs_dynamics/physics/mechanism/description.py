@@ -121,7 +121,7 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What a file says of a robot.
+    """Description of a robot: links, joints, closures.
 
     Parameters
     ----------

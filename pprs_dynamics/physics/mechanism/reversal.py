@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""sgn(v), turning over within a finite velocity instead of jumping.
+"""Smoothed sign function of a velocity, tanh(v / v_rev), for dry friction.
 
 A hard sign costs up to 0.9 N of spurious force at a reversal of the paper's robot, and it is
 undefined at rest. The paper takes "the modulus of the relative velocity" into account without

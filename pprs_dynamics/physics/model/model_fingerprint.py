@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What tells one model from every other: the SHA-256 of its values."""
+"""SHA-256 fingerprint of a model's values."""
 
 from __future__ import annotations
 

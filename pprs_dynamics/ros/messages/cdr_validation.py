@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whether the CDR bytes of a message hold every element that their length words promise.
+"""Validation of CDR bytes: length words against the size of the message.
 
 The deserialiser of rmw_fastrtps does not notice where a message is cut off within padding before
 a number, and reads on in foreign memory. What arrives from other machines is looked at before.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whether our bytes of messages are those of this rclpy: compared once, when a node starts.
+"""Check at start that our CDR serialisation equals that of the installed rclpy.
 
 Another middleware, or another version of a message, may lay out its bytes in another way. The node
 then reads and writes message objects, which costs a long trajectory some 20 ms.

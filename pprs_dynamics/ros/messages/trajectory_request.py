@@ -28,7 +28,7 @@ Motion = PlatformMotion | JointMotion
 
 
 class TrajectoryRequest(NamedTuple):
-    """What a trajectory message asks for.
+    """A request for the forces of a trajectory.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The steady clock, which nobody sets back or stops, and a simulation's clock that is missing."""
+"""Steady (monotonic) clock of timers; detection of a missing /clock."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which model a node runs, so that a recording of its status tells it too."""
+"""Provenance in ~/status: file, fingerprint and effects of the model that a node runs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How topics are delivered, and how a user overrides it, topic by topic."""
+"""QoS profiles of topics, and their overrides by parameters."""
 
 from __future__ import annotations
 

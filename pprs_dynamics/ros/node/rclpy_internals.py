@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Names of rclpy that are not public: all that the nodes use, and no other file does.
+"""Private names of rclpy that the nodes use; no other file does.
 
 They may change with any release. `missing` tells which of them an rclpy lacks, and each has rclpy's
 public way beside it: the executor then spins as rclpy's own, which costs latency, and parameters

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a node tells about itself: JSON on `~/status`, and `/diagnostics` where it exists."""
+"""Status of a node: JSON on `~/status`, and `/diagnostics` where that package is."""
 
 from __future__ import annotations
 

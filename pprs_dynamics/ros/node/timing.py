@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How long things took lately."""
+"""Running statistics of durations."""
 
 from __future__ import annotations
 

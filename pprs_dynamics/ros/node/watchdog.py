@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Notices that commands have gone stale, once."""
+"""Watchdog: timeout of commands, told once."""
 
 from __future__ import annotations
 

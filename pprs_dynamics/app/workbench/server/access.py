@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who may speak to the workbench: everything that a request must pass before it is answered.
+"""Access control of the workbench: token, cookie, Host and Origin of requests, sizes of bodies.
 
 The server runs with the rights of its user, on an address that every page in the same browser can
 reach. So each request has to name our own host (a foreign name that resolves to this machine is

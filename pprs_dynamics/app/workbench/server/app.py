@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Addresses of the workbench and what each answers: one call of the session, and its result."""
+"""Routes of the workbench (HTTP and WebSocket): each one call of the session, and its result."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ async def asset(request: Request) -> Response:
 
 
 class Api:
-    """What the page asks for.
+    """Handlers of the requests of the page.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What of a state changed since a browser last heard of it."""
+"""Deltas of the state: the parts that changed since a version that a browser has."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What all browsers of a workbench share: the session, and what goes on behind it."""
+"""State that all browsers share: the session, its worker thread, and uploads."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class LiveSource(Protocol):
 
 
 class Hub:
-    """The session, its worker, and those who listen.
+    """The session, its worker, and the subscribed browsers.
 
     Parameters
     ----------

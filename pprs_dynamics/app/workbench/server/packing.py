@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Answers that are no page: a header with arrays as typed arrays take them, and files."""
+"""Binary answers: a JSON header with arrays for typed arrays; files to download."""
 
 from __future__ import annotations
 

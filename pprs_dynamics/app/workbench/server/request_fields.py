@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fields of requests, judged: what is not as the page sends it is refused in a sentence.
+"""Validation of the fields of requests.
 
 Every function raises `BadRequestError`.
 """

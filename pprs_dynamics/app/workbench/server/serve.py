@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Listening: a socket on this machine, the address with its token, and the server's loop."""
+"""The server: its socket, the address with the token, and the event loop."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def serve(hub: Any, host: str, port: int, opens_browser: bool) -> None:
         webbrowser.open(keys.address)
 
     class Server(uvicorn.Server):
-        """One whose browsers are told of the end: else their listening is waited for."""
+        """Server that closes the event streams of browsers at shutdown, which it would wait for."""
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             hub.end()
