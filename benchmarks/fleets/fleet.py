@@ -32,7 +32,7 @@ from benchmarks.hidden.strength import tolerated_numbers
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import read_manifest
 from pprs_dynamics.app.fleet.store import Store
-from pprs_dynamics.app.fleet.survey import Job
+from pprs_dynamics.app.fleet.survey import SurveyJob
 from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.drives import DRIVES
@@ -170,12 +170,12 @@ def _record(path: Path, plant: PrescribedPlant, truth: Truth | None, day: int, n
     part.rename(path)
 
 
-def jobs(folder: Path) -> Iterator[Job]:
+def jobs(folder: Path) -> Iterator[SurveyJob]:
     """Yield the recordings of a fleet."""
     model = tolerant_model(TOLERANCE)
     name = fingerprint(model)
     for entry in read_manifest(str(folder / 'robots.csv')):
-        yield Job(entry, model.values, name, EFFECTS)
+        yield SurveyJob(entry, model.values, name, EFFECTS)
 
 
 def judge(fleet: FleetTrends, truths: dict[int, Truth], robots: int) -> dict[str, object]:

@@ -25,9 +25,9 @@ import numpy as np
 from benchmarks.fleets import fleet
 from benchmarks.fleets.cluster_kills import EFFECTS, MODEL, write_axis
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
-from pprs_dynamics.app.fleet.manifest import Entry
+from pprs_dynamics.app.fleet.manifest import ManifestEntry
 from pprs_dynamics.app.fleet.store import Store
-from pprs_dynamics.app.fleet.survey import Job, examine, identify
+from pprs_dynamics.app.fleet.survey import SurveyJob, examine, identify
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 
@@ -37,7 +37,7 @@ SMALL = 150  # samples
 PAGE = resource.getpagesize()
 
 
-def fleet_jobs(folder: Path, count: int) -> list[Job]:
+def fleet_jobs(folder: Path, count: int) -> list[SurveyJob]:
     """Return recordings of one robot."""
     fleet.make_fleet(folder, SEED, 1, count, quiet=True)
     return list(fleet.jobs(folder))
@@ -55,7 +55,7 @@ def cost(folder: Path, count: int) -> None:
           f'processor time ({low:.2f} to {high:.2f})')
 
 
-def rate(workers: int, jobs: list[Job], store: Path) -> float:
+def rate(workers: int, jobs: list[SurveyJob], store: Path) -> float:
     """Return recordings per minute, after the first ones."""
     with cluster(workers) as client:
         # A recording for every worker, several times, so that each is warm.
@@ -77,7 +77,7 @@ def workers(folder: Path, count: int) -> None:
               f'{os.getloadavg()[0]:.1f} after', flush=True)
 
 
-def small_jobs(folder: Path, count: int, refused: bool) -> Iterator[Job]:
+def small_jobs(folder: Path, count: int, refused: bool) -> Iterator[SurveyJob]:
     """Yield small recordings, or files that are refused, each written when it is asked for."""
     model = load_model(MODEL)
     name = fingerprint(model)
@@ -88,7 +88,8 @@ def small_jobs(folder: Path, count: int, refused: bool) -> Iterator[Job]:
         # The same but for a digit that nobody sees, so that contents differ.
         path.write_text(f'no recording {k}\n' if refused else
                         ''.join(text[:-1]) + f'{text[-1].rstrip()}{k:05d}\n')
-        yield Job(Entry(str(path), f'robot_{k % 100}', float(k)), model.values, name, EFFECTS)
+        entry = ManifestEntry(str(path), f'robot_{k % 100}', float(k))
+        yield SurveyJob(entry, model.values, name, EFFECTS)
 
 
 def memory(folder: Path, count: int, refused: bool) -> None:

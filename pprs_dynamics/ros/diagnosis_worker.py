@@ -26,7 +26,7 @@ LOW_PRIORITY = 10
 LEAST_WINDOW = 0.5  # share of the span that a window must have to be diagnosed
 
 
-class Samples(NamedTuple):
+class StreamWindow(NamedTuple):
     """Joint states of one window: stamps [ns] (N,), position and effort (N, D)."""
 
     stamp: np.typing.NDArray[np.int64]
@@ -63,7 +63,7 @@ class StreamWindows:
         while self._ring[0][0] < stamp - self._span:
             self._ring.popleft()
 
-    def take(self) -> Samples | None:
+    def take(self) -> StreamWindow | None:
         """Return the window that is due, None where none is; its samples are given away."""
         if self._due is None or not self._ring or self._ring[-1][0] < self._due:
             return None
@@ -73,7 +73,7 @@ class StreamWindows:
             return None
         rows = list(self._ring)
         self._ring.clear()
-        return Samples(np.array([stamp for stamp, _, _ in rows]),
+        return StreamWindow(np.array([stamp for stamp, _, _ in rows]),
                        np.stack([position for _, position, _ in rows]),
                        np.stack([effort for _, _, effort in rows]))
 
@@ -86,7 +86,7 @@ class DiagnosisWorker:
         self._pipe: Any = None
         self.busy = False
 
-    def submit(self, values: Mapping[str, Any], source: str, samples: Samples) -> None:
+    def submit(self, values: Mapping[str, Any], source: str, samples: StreamWindow) -> None:
         """Begin with a window; with another model than before all is forgotten."""
         if self._process is None or not self._process.is_alive():
             self.close()

@@ -168,7 +168,7 @@ class LiveJointStates(Node):
                     *(values.tolist() for _, values in late[::step]), strict=True)]}
 
 
-class LiveSource:
+class LiveNodes:
     """The node in a thread of its own, for callers of other threads.
 
     Parameters

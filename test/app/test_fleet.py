@@ -24,9 +24,9 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.fleet import engine
 from pprs_dynamics.app.fleet.changes import find_changes
 from pprs_dynamics.app.fleet.engine import cluster, run_each, run_survey
-from pprs_dynamics.app.fleet.manifest import Entry, ManifestError, entries, find_recordings
+from pprs_dynamics.app.fleet.manifest import ManifestEntry, ManifestError, entries, find_recordings
 from pprs_dynamics.app.fleet.store import DONE, FAILED, Store, key_of, schema
-from pprs_dynamics.app.fleet.survey import Job, examine, identify
+from pprs_dynamics.app.fleet.survey import SurveyJob, examine, identify
 from pprs_dynamics.app.fleet.trend import FALSE_ALARMS, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.errors import UnreadableFileError
@@ -41,9 +41,10 @@ THRESHOLD = 1e-4
 RNG_SEEDS = range(40)
 
 
-def job(path: Path | str, robot: str = 'a') -> Job:
+def job(path: Path | str, robot: str = 'a') -> SurveyJob:
     model = load_model(MODEL)
-    return Job(Entry(str(path), robot, 1e9), model.values, fingerprint(model), EFFECTS)
+    entry = ManifestEntry(str(path), robot, 1e9)
+    return SurveyJob(entry, model.values, fingerprint(model), EFFECTS)
 
 
 def write_values(store: Store, robot: str, values: np.ndarray, parameter: str = 'force') -> None:
@@ -154,7 +155,8 @@ def test_a_manifest_says_whose_and_when(tmp_path: Path) -> None:
     manifest = tmp_path / 'robots.csv'
     manifest.write_text('path,robot,time,temperature\nx.csv,7,1970-01-02T00:00:00,21.5\n')
     (entry,) = entries((), str(manifest))
-    assert entry == Entry(str(tmp_path / 'x.csv'), '7', 86400.0, None, {'temperature': 21.5})
+    assert entry == ManifestEntry(str(tmp_path / 'x.csv'), '7', 86400.0, None,
+                                  {'temperature': 21.5})
 
 
 def test_a_quote_in_a_manifest_loses_no_recording_in_silence(tmp_path: Path) -> None:

@@ -15,14 +15,14 @@ import numpy as np
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, Samples, StreamWindows
+from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows
 
 SECOND = 1_000_000_000
 EPOCH = 1_700_000_000 * SECOND
 PATIENCE = 120.0  # [s] for one window on a busy machine
 
 
-def pushed(windows: StreamWindows, seconds: float, rate: float, start: int) -> list[Samples]:
+def pushed(windows: StreamWindows, seconds: float, rate: float, start: int) -> list[StreamWindow]:
     """Return the windows that are due while a stream runs."""
     found = []
     for k in range(round(seconds * rate)):
@@ -64,7 +64,7 @@ def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
     forces = model.drive_forces(motion)
     effort = forces.total + 0.05 * np.random.default_rng(0).standard_normal(forces.total.shape)
     stamp = EPOCH + np.arange(len(effort), dtype=np.int64) * SECOND // 100
-    samples = Samples(stamp, forces.mechanism.position, effort)
+    samples = StreamWindow(stamp, forces.mechanism.position, effort)
     worker = DiagnosisWorker()
     try:
         worker.submit(model.values, model.source, samples)

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.files.samples import Finding
+from pprs_dynamics.measurement.files.samples import Defect
 
 STORE = get_typestore(Stores.ROS2_KILTED)
 STATE = 'sensor_msgs/msg/JointState'
@@ -48,7 +48,7 @@ def kinds(recording: Recording) -> set[str]:
     return {finding.kind for finding in recording.findings}
 
 
-def the(recording: Recording, kind: str) -> Finding:
+def the(recording: Recording, kind: str) -> Defect:
     """Return the only finding, which must be of a kind."""
     assert kinds(recording) == {kind}
     (finding,) = recording.findings
@@ -105,7 +105,7 @@ def assert_same(recording: Recording, arrays: Arrays) -> None:
             np.testing.assert_array_equal(found, expected, strict=True)
 
 
-def the_one(recording: Recording, kind: str) -> Finding:
+def the_one(recording: Recording, kind: str) -> Defect:
     (finding,) = [finding for finding in recording.findings if finding.kind == kind]
     return finding
 

@@ -21,7 +21,7 @@ from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import entries
 from pprs_dynamics.app.fleet.store import Store, arrow
-from pprs_dynamics.app.fleet.survey import AUTO, Job, requests_of
+from pprs_dynamics.app.fleet.survey import AUTO, SurveyJob, requests_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page
@@ -73,10 +73,10 @@ def run(options: argparse.Namespace) -> int:
     if options.effects != AUTO and not requests_of(options.effects, base):
         raise SurveyError(f'--effects {options.effects!r}: must be auto or names of effects')
 
-    def jobs() -> Iterator[Job]:
+    def jobs() -> Iterator[SurveyJob]:
         for entry in entries(options.recordings, options.manifest):
             model, name = model_of(entry.model or options.model)
-            yield Job(entry, model.values, name, options.effects, options.topic)
+            yield SurveyJob(entry, model.values, name, options.effects, options.topic)
 
     total = sum(1 for _ in entries(options.recordings, options.manifest))
     if not total:
@@ -106,8 +106,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[Job], total: int, store: Store,
-         ) -> tuple[int, list[tuple[str, str]]]:
+def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[SurveyJob], total: int,
+         store: Store) -> tuple[int, list[tuple[str, str]]]:
     done, failures = 0, []
     with (cluster(options.workers, options.scheduler) as client,
           counting_bar(screen, 'recordings', total) as advance):

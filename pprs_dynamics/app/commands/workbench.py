@@ -84,9 +84,9 @@ def _ros_name(text: str) -> str:
 
 def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
     try:
-        from pprs_dynamics.ros.live_joint_states import LiveSource as JointStates
+        from pprs_dynamics.ros.live_joint_states import LiveNodes
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
-    source: LiveSource = JointStates(model, options.topic or 'joint_states', options.monitor,
+    source: LiveSource = LiveNodes(model, options.topic or 'joint_states', options.monitor,
                                      options.feedforward, options.namespace)
     return source

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import Any
 
 from pprs_dynamics.app.fleet.store import Store
-from pprs_dynamics.app.fleet.survey import Job, Result, examine, identify, lost
+from pprs_dynamics.app.fleet.survey import SurveyJob, SurveyResult, examine, identify, lost
 from pprs_dynamics.errors import MissingLibraryError, PprsError
 
 LOOPBACK = '127.0.0.1'
@@ -151,7 +151,8 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
         yield item, value, error
 
 
-def run_survey(client: Any, jobs: Iterable[Job], store: Store) -> Iterator[Result | None]:
+def run_survey(client: Any, jobs: Iterable[SurveyJob], store: Store,
+               ) -> Iterator[SurveyResult | None]:
     """Write the rows of every recording to a store; yield each, or None for one done already.
 
     Raises
@@ -159,10 +160,10 @@ def run_survey(client: Any, jobs: Iterable[Job], store: Store) -> Iterator[Resul
     SchedulerError
         Where the scheduler goes; what was written stays, and the same survey goes on from there.
     """
-    def begin(job: Job) -> Any:
+    def begin(job: SurveyJob) -> Any:
         return client.submit(identify, job.entry.path, pure=False)
 
-    def after(job: Job, content: str | None, error: str | None) -> Any:
+    def after(job: SurveyJob, content: str | None, error: str | None) -> Any:
         if error is not None:
             return None
         if content is not None and store.has(job.entry.robot, job.key(content)):

@@ -36,7 +36,7 @@ class ManifestError(PprsError, ValueError):
 
 
 @dataclass(frozen=True)
-class Entry:
+class ManifestEntry:
     """One recording.
 
     Parameters
@@ -59,7 +59,7 @@ class Entry:
     conditions: dict[str, float] = field(default_factory=dict)
 
 
-def read_manifest(path: str) -> Iterator[Entry]:
+def read_manifest(path: str) -> Iterator[ManifestEntry]:
     """Yield the recordings of a manifest; relative paths start at its folder.
 
     Raises
@@ -79,7 +79,7 @@ def read_manifest(path: str) -> Iterator[Entry]:
         yield _entry(path, line, dict(zip(header, cells, strict=False)))
 
 
-def _entry(path: str, line: int, row: dict[str, str]) -> Entry:
+def _entry(path: str, line: int, row: dict[str, str]) -> ManifestEntry:
     def given(name: str) -> str:
         return row.get(name, '').strip()
 
@@ -88,7 +88,7 @@ def _entry(path: str, line: int, row: dict[str, str]) -> Entry:
             raise ManifestError(path, line, f'{name} is empty', 'be given')
     conditions = {name: value for name, text in row.items()
                   if name and name not in KNOWN and (value := _number(text)) is not None}
-    return Entry(_beside(path, given('path')), given('robot'),
+    return ManifestEntry(_beside(path, given('path')), given('robot'),
                  read_time(path, line, given('time')) if given('time') else None,
                  _beside(path, given('model')) if given('model') else None, conditions)
 
@@ -165,7 +165,7 @@ def reached(path: str) -> Iterator[None]:
         raise UnreadableFileError(path, f'cannot be reached: {error}') from None
 
 
-def find_recordings(patterns: Sequence[str]) -> Iterator[Entry]:
+def find_recordings(patterns: Sequence[str]) -> Iterator[ManifestEntry]:
     """Yield what files, folders and globs hold; a robot is called as the folder is.
 
     Raises
@@ -177,7 +177,8 @@ def find_recordings(patterns: Sequence[str]) -> Iterator[Entry]:
         found = False
         for path in _matching(pattern):
             found = True
-            yield Entry(path, PurePosixPath(path.rpartition('://')[2]).parent.name or 'robot')
+            folder = PurePosixPath(path.rpartition('://')[2]).parent.name
+            yield ManifestEntry(path, folder or 'robot')
         if not found:
             raise UnreadableFileError(pattern or "''", 'there is no recording: no file, no '
                                       f'folder with {", ".join(ENDINGS)} or bags, and no match')
@@ -209,7 +210,7 @@ def _within(system: Any, folder: str) -> Iterator[str]:
                 yield f'{place.rstrip("/")}/{name}'
 
 
-def entries(patterns: Sequence[str], manifest: str | None) -> Iterator[Entry]:
+def entries(patterns: Sequence[str], manifest: str | None) -> Iterator[ManifestEntry]:
     """Yield the recordings of a survey: all of a manifest, or what patterns match.
 
     With both, the manifest describes what the patterns match; what it does not list is called as

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.fleet.manifest import Entry, filesystem, is_remote
+from pprs_dynamics.app.fleet.manifest import ManifestEntry, filesystem, is_remote
 from pprs_dynamics.app.fleet.named_effects import OWN, fit_named_effects
 from pprs_dynamics.app.fleet.store import key_of
 from pprs_dynamics.errors import PprsError, UnreadableFileError
@@ -47,12 +47,12 @@ MODELS_KEPT = 8  # built models that a worker remembers
 
 
 @dataclass(frozen=True)
-class Job:
+class SurveyJob:
     """A recording, the model to judge it by, and how.
 
     Parameters
     ----------
-    entry : Entry
+    entry : ManifestEntry
     values : mapping
         Flat keys and values of the model.
     model : str
@@ -62,7 +62,7 @@ class Job:
     topic : str, optional
     """
 
-    entry: Entry
+    entry: ManifestEntry
     values: Mapping[str, Any]
     model: str
     options: str = AUTO
@@ -74,7 +74,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Result:
+class SurveyResult:
     """Rows of a recording.
 
     Parameters
@@ -145,12 +145,12 @@ def local_copy(path: str) -> Iterator[str]:
         yield str(target)
 
 
-def examine(job: Job, content: str | None) -> Result:
+def examine(job: SurveyJob, content: str | None) -> SurveyResult:
     """Return the rows of a recording.
 
     Parameters
     ----------
-    job : Job
+    job : SurveyJob
     content : str or None
         The recording's SHA-256, of `identify`.
     """
@@ -165,22 +165,22 @@ def examine(job: Job, content: str | None) -> Result:
         # A copy's name says nothing to anybody.
         text = str(error).replace(path, job.entry.path)
         # What could not even be read may be there the next time.
-        return Result(key, [{**common, 'error': displayed(text),
+        return SurveyResult(key, [{**common, 'error': displayed(text),
                              'seconds': perf_counter() - began}], failed=content is None)
     except Exception as error:  # of the package itself, but no end of a survey
-        return Result(key, [{**common, 'seconds': perf_counter() - began,
+        return SurveyResult(key, [{**common, 'seconds': perf_counter() - began,
                              'error': f'unexpected {type(error).__name__}: {error}'}], failed=True)
     seconds = perf_counter() - began
-    return Result(key, [{**row, 'seconds': seconds} for row in rows])
+    return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows])
 
 
-def lost(job: Job, content: str | None, reason: str) -> Result:
+def lost(job: SurveyJob, content: str | None, reason: str) -> SurveyResult:
     """Return the row of a recording whose worker did not come back."""
-    return Result(job.key(content or job.entry.path),
+    return SurveyResult(job.key(content or job.entry.path),
                   [{**_common(job, content), 'error': reason}], failed=True)
 
 
-def _common(job: Job, content: str | None) -> dict[str, Any]:
+def _common(job: SurveyJob, content: str | None) -> dict[str, Any]:
     entry = job.entry
     return {'recording': displayed(PurePosixPath(entry.path.rstrip('/')).name),
             'path': displayed(entry.path), 'sha256': content,
@@ -194,7 +194,7 @@ def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
     return build_model(dict(values))
 
 
-def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
+def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
     model = _model(job.model, tuple(job.values.items()))
     recording = read_recording(path, model.recorded, job.topic)
     summary = describe(recording)
@@ -213,7 +213,7 @@ def _examined(job: Job, path: str, common: dict[str, Any]) -> list[dict[str, Any
 Examined = tuple[list[dict[str, Any]], Residuals, Mapping[str, float], str]
 
 
-def _judged(model: ForceModel, recording: Recording, job: Job) -> Examined:
+def _judged(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
     """Return what is found; a recording of other units, signs or drives is refused.
 
     The search for these takes longer than a fit, so that there only what fits badly is searched.
@@ -231,7 +231,7 @@ def _judged(model: ForceModel, recording: Recording, job: Job) -> Examined:
     return found
 
 
-def _refuse_mistakes(model: ForceModel, recording: Recording, job: Job) -> None:
+def _refuse_mistakes(model: ForceModel, recording: Recording, job: SurveyJob) -> None:
     for finding in find_mistakes(model, recording):
         raise UnreadableFileError(displayed(job.entry.path), finding.text)
 
@@ -249,7 +249,7 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
     return found
 
 
-def _fitted(model: ForceModel, recording: Recording, job: Job) -> Examined:
+def _fitted(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
     fit = fit_named_effects(model, recording, requests_of(job.options, model))
     drives = fit.design.drives
     return (fit.rows, fit.design.residuals, {drives[d]: one for d, one in fit.noise.items()},

@@ -33,7 +33,7 @@ from pprs_dynamics.inference.residuals.readings import (
 )
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Finding
+from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -62,7 +62,7 @@ ALIKE = 0.9  # least correlation of a recorded velocity with the derivative of p
 NEARLY = 0.2  # by how much a factor may be off, relatively
 
 
-class Mistake(Finding):
+class Mistake(Defect):
     """A finding about what a recording's numbers mean."""
 
     @property
@@ -87,7 +87,7 @@ class _Fit:
         return self.misfit * CLEARLY_BETTER ** self.cost
 
 
-def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Finding, ...]:
+def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]:
     """Return what the numbers of a recording rather mean than its names and units say.
 
     Parameters
@@ -98,13 +98,13 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Finding, ...
 
     Returns
     -------
-    tuple of Finding
+    tuple of Defect
         Empty where nothing fits clearly better, and where the recording cannot tell.
     """
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
                 if (excerpt := excerpt_of(recording, unit)) is not None}
     best = _Search(model, excerpts).best()
-    found: list[Finding] = []
+    found: list[Defect] = []
     if best is not None:
         found += [*_of_time(best), *_of_reading(model, best), *_of_efforts(model, best)]
     told = {finding.kind for finding in found}
@@ -248,20 +248,20 @@ def _time_units(recording: Recording) -> list[float]:
             if step > SLOW_STEP and SHORTEST_STEP <= step * unit <= SLOW_STEP]
 
 
-def _of_time(fit: _Fit) -> Iterator[Finding]:
+def _of_time(fit: _Fit) -> Iterator[Defect]:
     if fit.time_unit != 1.0:
         yield Mistake('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as seconds '
                       f'they make the motion {1 / fit.time_unit:.0f} times too slow for its '
                       'efforts')
 
 
-def _of_reading(model: ForceModel, fit: _Fit) -> Iterator[Finding]:
+def _of_reading(model: ForceModel, fit: _Fit) -> Iterator[Defect]:
     if fit.reading.kind:
         yield Mistake(fit.reading.kind, len(fit.reading.drives), fit.reading.what, (),
                       tuple(model.drives[k] for k in fit.reading.drives))
 
 
-def _of_efforts(model: ForceModel, fit: _Fit) -> Iterator[Finding]:
+def _of_efforts(model: ForceModel, fit: _Fit) -> Iterator[Defect]:
     drives = model.drives
     for factor in EFFORT_FACTORS[1:]:
         group = tuple(np.flatnonzero(fit.factors == factor).tolist())
@@ -278,7 +278,7 @@ def _of_efforts(model: ForceModel, fit: _Fit) -> Iterator[Finding]:
                       f'says{guess}{other}', (), tuple(drives[k] for k in group))
 
 
-def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Finding]:
+def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     """Yield what positions far outside of the strokes say without any effort."""
     if not isinstance(model, DriveModel):
         return
@@ -296,7 +296,7 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Finding]:
                   tuple(drives[k] for k in far))
 
 
-def _of_velocities(recording: Recording, excerpt: Excerpt | None) -> Iterator[Finding]:
+def _of_velocities(recording: Recording, excerpt: Excerpt | None) -> Iterator[Defect]:
     """Yield what recorded velocities are instead of the derivatives of positions."""
     if excerpt is None or excerpt.velocity is None:
         return

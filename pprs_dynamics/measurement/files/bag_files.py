@@ -23,7 +23,7 @@ from pprs_dynamics.measurement.files.merged_states import (
 )
 from pprs_dynamics.measurement.files.message_blocks import JointStateBlocks
 from pprs_dynamics.measurement.files.samples import (
-    Finding,
+    Defect,
     Indices,
     Progress,
     Samples,
@@ -100,7 +100,7 @@ def read_bag(
                 if np.any(np.isfinite(merged.effort)):
                     return merged
     if not np.any(stamps):
-        findings.append(Finding(
+        findings.append(Defect(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
         stamps = received
     findings += _ignored(name, done, drives, blocks)
@@ -112,7 +112,7 @@ def read_bag(
 
 
 def _merged(path: Path, reader: Reader, connections: list[Connection], drives: tuple[str, ...],
-            findings: list[Finding]) -> Samples:
+            findings: list[Defect]) -> Samples:
     """Read states that stand in several messages or in those of controllers."""
     try:
         merged = read_merged(reader, connections, drives)
@@ -191,7 +191,7 @@ def _require_rosbags(purpose: str) -> None:
         raise MissingLibraryError('rosbags', purpose, 'bags') from None
 
 
-def _storage_of(path: Path) -> tuple[Path, list[Finding]]:
+def _storage_of(path: Path) -> tuple[Path, list[Defect]]:
     """Return what rosbags can open: a directory with metadata, or a file with its suffix."""
     if not path.is_dir():
         suffix = storage_suffix(path)
@@ -206,7 +206,7 @@ def _storage_of(path: Path) -> tuple[Path, list[Finding]]:
         raise UnreadableFileError(
             path, 'not a rosbag2 directory: there is no metadata.yaml'
             + (f', and {len(found)} storage files without it have no order' if found else ''))
-    return found[0], [Finding('no_metadata', 1, 'the bag has no metadata.yaml')]
+    return found[0], [Defect('no_metadata', 1, 'the bag has no metadata.yaml')]
 
 
 def _check_lengths(path: Path, storage: Path) -> None:
@@ -307,15 +307,15 @@ def _tell_missing(
 
 def _ignored(
     topic: str, messages: int, drives: tuple[str, ...], blocks: JointStateBlocks,
-) -> list[Finding]:
+) -> list[Defect]:
     findings = []
     others = sorted(blocks.names - set(drives))
     if others:
-        findings.append(Finding('ignored_joints', len(others),
+        findings.append(Defect('ignored_joints', len(others),
                                 f'{topic} also holds {", ".join(others)}'))
     skipped = messages - blocks.samples
     if skipped:
-        findings.append(Finding(
+        findings.append(Defect(
             'incomplete_messages', skipped,
             f'{counted(skipped, "message")} of {messages} on {topic} '
             f'without positions of all of {", ".join(drives)}'))

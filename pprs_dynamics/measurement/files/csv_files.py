@@ -26,7 +26,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import RecordedColumns
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.samples import (
-    Finding,
+    Defect,
     Progress,
     Samples,
     counted,
@@ -299,7 +299,7 @@ def _samples(
     has_velocity = any(name == 'velocity' for _, name in columns)
     others = [name or '(no name)' for index, name in enumerate(table.header)
               if index not in table.used]
-    findings = (Finding(
+    findings = (Defect(
         'ignored_columns', len(others),
         f'the file also holds {counted(len(others), "column")}: '
         + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),) if others else ()

@@ -16,7 +16,7 @@ from pprs_dynamics.measurement.files.samples import (
     BEYOND_LIMIT,
     LARGEST_MEASURED,
     MOST_SPANS,
-    Finding,
+    Defect,
     Indices,
     Mask,
     Samples,
@@ -47,7 +47,7 @@ class Judgement:
         What is left.
     segments : tuple of slice
         Stretches without reset, jump, gap or change of rate, of at least 20 samples.
-    findings : list of Finding
+    findings : list of Defect
     """
 
     def __init__(self, samples: Samples) -> None:
@@ -75,7 +75,7 @@ class Judgement:
         spans = tuple((float(time[first]), float(time[last])) for first, last in places)
         where = f' {when(spans)}' if spans else ''
         self.findings.append(
-            Finding(kind, count, what + where, spans[:MOST_SPANS], tuple(drives)))
+            Defect(kind, count, what + where, spans[:MOST_SPANS], tuple(drives)))
 
     def _keep(self, mask: Mask) -> None:
         """Drop samples, and move the starts of stretches with them."""

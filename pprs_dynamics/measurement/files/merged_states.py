@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.samples import Finding, Indices
+from pprs_dynamics.measurement.files.samples import Defect, Indices
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -38,7 +38,7 @@ class MergedStates(NamedTuple):
     position: Array
     velocity: Array
     effort: Array
-    findings: list[Finding]
+    findings: list[Defect]
 
 
 def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str, ...],
@@ -70,9 +70,9 @@ def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str
         for quantity in QUANTITIES}
     kept = np.isfinite(arrays['position']).all(axis=1)
     topics = sorted({connection.topic for connection in connections})
-    findings = [Finding('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
+    findings = [Defect('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
     if commanded:
-        findings.append(Finding(
+        findings.append(Defect(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
     position, velocity, effort = (arrays[quantity][kept] for quantity in QUANTITIES)

@@ -19,7 +19,7 @@ from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
 from pprs_dynamics.measurement.files.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
-from pprs_dynamics.measurement.files.samples import Finding, Progress, Samples, counted
+from pprs_dynamics.measurement.files.samples import Defect, Progress, Samples, counted
 from pprs_dynamics.measurement.files.table_files import read_table
 from pprs_dynamics.system.plain_text import displayed
 
@@ -41,7 +41,7 @@ class Recording:
         As recorded [m/s], NaN where it is not; None where there is none at all.
     effort : (N, D) array
         What the drives applied [N]; NaN where it was not measured.
-    findings : tuple of Finding
+    findings : tuple of Defect
         Every defect, and what was done about it.
     segments : tuple of slice
         Stretches to be treated each for itself. Samples outside of them are not to be used.
@@ -65,7 +65,7 @@ class Recording:
     position: Array
     velocity: Array | None
     effort: Array
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Defect, ...] = ()
     segments: tuple[slice, ...] = field(default=())
     epoch: int = 0
     source: str = ''
@@ -117,7 +117,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class DriveRange:
+class DriveSummary:
     """What one drive did.
 
     Parameters
@@ -166,8 +166,8 @@ class Summary:
     rate : float
         Samples per second in the segments, from the median step; NaN without segments.
     segments : tuple of SegmentSummary
-    drives : dict of DriveRange
-    findings : tuple of Finding
+    drives : dict of DriveSummary
+    findings : tuple of Defect
     """
 
     name: str
@@ -180,8 +180,8 @@ class Summary:
     duration: float
     rate: float
     segments: tuple[SegmentSummary, ...]
-    drives: dict[str, DriveRange]
-    findings: tuple[Finding, ...]
+    drives: dict[str, DriveSummary]
+    findings: tuple[Defect, ...]
 
 
 def read_recording(
@@ -290,7 +290,7 @@ def describe(recording: Recording) -> Summary:
     for k, drive in enumerate(recording.drives):
         position, effort = _range(recording.position[:, k]), recording.effort[:, k]
         assert position is not None
-        ranges[drive] = DriveRange(
+        ranges[drive] = DriveSummary(
             position, None if recording.velocity is None else _range(recording.velocity[:, k]),
             _range(effort), float(np.mean(np.isfinite(effort))))
     return Summary(

@@ -67,7 +67,7 @@ POLICY = {
 
 
 @dataclass(frozen=True)
-class Finding:
+class Defect:
     """Something about a recording that its user should know.
 
     Parameters
@@ -121,7 +121,7 @@ class Samples:
         Whole seconds that `time` counts from.
     source : str
         Format and topic, for people.
-    findings : tuple of Finding
+    findings : tuple of Defect
         What the reader of the file has to tell.
     in_amperes : tuple of D bool
         Drives whose `effort` is a current [A]; () for none.
@@ -138,7 +138,7 @@ class Samples:
     effort: Array
     epoch: int = 0
     source: str = ''
-    findings: tuple[Finding, ...] = field(default=())
+    findings: tuple[Defect, ...] = field(default=())
     in_amperes: tuple[bool, ...] = ()
     units: tuple[DriveUnits, ...] = ()
     effort_limits: tuple[float, ...] = ()
