@@ -46,7 +46,7 @@ TESTS = {
     'physics/three_pprs/jacobians.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
     'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
     'physics/effects/laws/passive_friction.py': ('physics/test_dynamics.py',),
-    'physics/effects/foreign_effects.py': ('physics/test_user_effects.py',),
+    'physics/effects/foreign_effects.py': ('physics/test_foreign_effects.py',),
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
     'inference/residuals/noise.py': ('inference/test_noise.py',),

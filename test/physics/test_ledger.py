@@ -114,6 +114,16 @@ def test_a_damaged_ledger_is_one_sentence(stages: list[dict[str, Any]], key: str
         read_steps({**stages[2], key: value})
 
 
+def test_steps_are_read_wherever_they_stand(stages: list[dict[str, Any]]) -> None:
+    steps = read_steps(stages[2])
+    assert len(steps) == 2
+    ledger = {key: value for key, value in stages[2].items() if key.startswith('history.')}
+    rest = {key: value for key, value in stages[2].items() if key not in ledger}
+    assert rest
+    assert read_steps({'history': None, 'tool': None, **ledger, **rest}) == steps
+    assert read_steps({**rest, **dict(reversed(ledger.items())), 'history': {}}) == steps
+
+
 def test_a_step_whose_effect_was_removed_by_hand_is_not_taken_back(
     stages: list[dict[str, Any]],
 ) -> None:

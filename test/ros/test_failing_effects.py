@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from failing_effects import install, installed, model_file, parameters
+from failing_effects import FAULTS, install, installed, model_file, parameters
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from node_bench import Bench, bench
 from rclpy.parameter import Parameter
@@ -32,18 +32,6 @@ from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 MOTION = random_motion(np.random.default_rng(11), 3)
 ONE = MOTION[:1]
-# Fault of WornBrake.columns: what the sentence says of it.
-FAULTS = {
-    'raises': 'columns raised ZeroDivisionError: division by zero (',
-    'exits': 'columns raised SystemExit: 3 (',
-    'none': "columns raised TypeError: 'NoneType' object is not iterable",
-    'longer': 'columns returned an array of shape (2,), must be (1,)',
-    'fewer': 'columns returned 0 arrays, must be 1 (coefficient)',
-    'words': 'columns raised ValueError: could not convert string to float',
-    'nan': 'columns returned an array with nan, must be finite',
-}
-
-
 @pytest.fixture
 def package(tmp_path: Path) -> Iterator[ModuleType]:
     with installed(tmp_path) as module:
@@ -57,68 +45,6 @@ def fail(package: Any, place: str, fault: str = 'raises') -> None:
 
 def rest(motion: PlatformMotion) -> PlatformMotion:
     return PlatformMotion.at_rest(motion.position[-1:], motion.orientation[-1:])
-
-
-# --- the model ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(('fault', 'told'), FAULTS.items())
-def test_a_failing_drive_effect_is_one_error_with_its_name(
-    package: ModuleType, tmp_path: Path, fault: str, told: str,
-) -> None:
-    model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
-    fail(package, 'columns', fault)
-    with pytest.raises(EffectError) as raised:
-        model.drive_forces(ONE)
-    assert raised.value.effect == 'worn_brake'
-    assert str(raised.value).startswith(f'effect worn_brake: {told}')
-    if told.endswith('('):
-        assert 'worn_brake.py, line ' in str(raised.value)
-
-
-@pytest.mark.parametrize(('place', 'fault', 'told'), [
-    ('load', 'raises', 'load raised ZeroDivisionError'),
-    ('load', 'longer', 'must be (1, 6)'),
-    ('load', 'nan', 'load returned a wrench with nan, must be finite'),
-    ('changed', 'raises', 'changed raised ZeroDivisionError'),
-    ('changed', 'none', 'changed returned None, must be a Robot'),
-])
-def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
-    package: ModuleType, tmp_path: Path, place: str, fault: str, told: str,
-) -> None:
-    model = DriveModel.load(model_file(tmp_path, 'hose'))
-    fail(package, place, fault)
-    with pytest.raises(EffectError, match='effect hose: ') as raised:
-        model.drive_forces(ONE)
-    assert told in str(raised.value)
-
-
-def test_what_the_mechanism_refuses_is_not_put_down_to_the_effect(
-    package: ModuleType, tmp_path: Path,
-) -> None:
-    model = DriveModel.load(model_file(tmp_path, 'hose', 'worn_brake'))
-    absurd = PlatformMotion(ONE.position, ONE.orientation, np.full((1, 3), 1e200),
-                            *(np.zeros((1, 3)) for _ in range(3)))
-    assert not np.isfinite(model.drive_forces(absurd).total).all()
-
-
-def test_an_effect_whose_memory_cannot_be_copied_is_told(
-    package: Any, tmp_path: Path,
-) -> None:
-    package.WornBrake.drive_memory = classmethod(lambda cls: {'samples': 0, 'log': (x for x in ())})
-    model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
-    with pytest.raises(EffectError, match='effect worn_brake: its memory cannot be copied'):
-        model.initial_state().copy()
-
-
-@pytest.mark.parametrize('place', ['__init__', 'changed'])
-def test_a_model_file_with_an_effect_that_cannot_be_built_is_refused(
-    package: ModuleType, tmp_path: Path, place: str,
-) -> None:
-    fail(package, place)
-    name = 'hose' if place == 'changed' else 'worn_brake'
-    with pytest.raises(EffectError, match=f'effect {name}: {place} raised ZeroDivisionError'):
-        DriveModel.load(model_file(tmp_path, name))
 
 
 # --- feedforward ----------------------------------------------------------------------------------

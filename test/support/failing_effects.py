@@ -83,6 +83,16 @@ class Hose(BodyEffect):
     def changed(self, robot):
         return fault('changed', robot)
 '''
+# Fault of WornBrake.columns: what the sentence says of it.
+FAULTS = {
+    'raises': 'columns raised ZeroDivisionError: division by zero (',
+    'exits': 'columns raised SystemExit: 3 (',
+    'none': "columns raised TypeError: 'NoneType' object is not iterable",
+    'longer': 'columns returned an array of shape (2,), must be (1,)',
+    'fewer': 'columns returned 0 arrays, must be 1 (coefficient)',
+    'words': 'columns raised ValueError: could not convert string to float',
+    'nan': 'columns returned an array with nan, must be finite',
+}
 EFFECTS = {'worn_brake': 'WornBrake', 'hose': 'Hose'}
 BLOCKS = {'worn_brake': {'slide_2': {'coefficient': 3.0}}, 'hose': {'force': 2.0}}
 

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What effects of other packages do wrong is one error, which names effect, method and reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from failing_effects import FAULTS, installed, model_file
+from feedforward_bench import random_motion
+
+from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.errors import EffectError
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.foreign_effects import guard
+
+ONE = random_motion(np.random.default_rng(11), 3)[:1]
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Iterator[ModuleType]:
+    with installed(tmp_path) as module:
+        module.PLACE, module.FAULT = 'nowhere', 'none'
+        yield module
+
+
+def fail(package: Any, place: str, fault: str = 'raises') -> None:
+    package.PLACE, package.FAULT = place, fault
+
+
+@pytest.mark.parametrize(('fault', 'told'), FAULTS.items())
+def test_a_failing_drive_effect_is_one_error_with_its_name(
+    package: ModuleType, tmp_path: Path, fault: str, told: str,
+) -> None:
+    model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
+    fail(package, 'columns', fault)
+    with pytest.raises(EffectError) as raised:
+        model.drive_forces(ONE)
+    assert raised.value.effect == 'worn_brake'
+    assert str(raised.value).startswith(f'effect worn_brake: {told}')
+    if told.endswith('('):
+        assert 'worn_brake.py, line ' in str(raised.value)
+
+
+@pytest.mark.parametrize(('place', 'fault', 'told'), [
+    ('load', 'raises', 'load raised ZeroDivisionError'),
+    ('load', 'longer', 'must be (1, 6)'),
+    ('load', 'nan', 'load returned a wrench with nan, must be finite'),
+    ('changed', 'raises', 'changed raised ZeroDivisionError'),
+    ('changed', 'none', 'changed returned None, must be a Robot'),
+])
+def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
+    package: ModuleType, tmp_path: Path, place: str, fault: str, told: str,
+) -> None:
+    model = DriveModel.load(model_file(tmp_path, 'hose'))
+    fail(package, place, fault)
+    with pytest.raises(EffectError, match='effect hose: ') as raised:
+        model.drive_forces(ONE)
+    assert told in str(raised.value)
+
+
+def test_what_the_mechanism_refuses_is_not_put_down_to_the_effect(
+    package: ModuleType, tmp_path: Path,
+) -> None:
+    model = DriveModel.load(model_file(tmp_path, 'hose', 'worn_brake'))
+    absurd = PlatformMotion(ONE.position, ONE.orientation, np.full((1, 3), 1e200),
+                            *(np.zeros((1, 3)) for _ in range(3)))
+    assert not np.isfinite(model.drive_forces(absurd).total).all()
+
+
+def test_an_effect_whose_memory_cannot_be_copied_is_told(
+    package: Any, tmp_path: Path,
+) -> None:
+    package.WornBrake.drive_memory = classmethod(lambda cls: {'samples': 0, 'log': (x for x in ())})
+    model = DriveModel.load(model_file(tmp_path, 'worn_brake'))
+    with pytest.raises(EffectError, match='effect worn_brake: its memory cannot be copied'):
+        model.initial_state().copy()
+
+
+@pytest.mark.parametrize('place', ['__init__', 'changed'])
+def test_a_model_file_with_an_effect_that_cannot_be_built_is_refused(
+    package: ModuleType, tmp_path: Path, place: str,
+) -> None:
+    fail(package, place)
+    name = 'hose' if place == 'changed' else 'worn_brake'
+    with pytest.raises(EffectError, match=f'effect {name}: {place} raised ZeroDivisionError'):
+        DriveModel.load(model_file(tmp_path, name))
+
+
+class Stiction(DriveEffect):
+    """Methods answer what the test puts into `answers`; the class is guarded like a foreign one."""
+
+    name = 'stiction'
+    linear = (Parameter('force', 'F', 'N', 'of both directions', 0.0, 1e6),)
+    shape = (Parameter('width', 'v', 'm/s', 'of the reversal', 0.0, 1.0),)
+    card = Card('F', '', '', '', '')
+    answers: Mapping[str, Any] = {}
+
+    @classmethod
+    def trials(cls, *_: Any) -> Any:
+        return cls.answers['trials']
+
+    @classmethod
+    def from_coefficients(cls, *_: Any) -> Any:
+        return cls.answers['from_coefficients']
+
+
+@pytest.fixture(scope='module')
+def stiction() -> Any:
+    guard(Stiction)
+    return Stiction
+
+
+@pytest.mark.parametrize(('method', 'answer', 'told'), [
+    ('trials', [{'width': 0.1}, {}], 'trials returned {}, must map width'),
+    ('trials', [{'width': 0.1, 'height': 1.0}], "returned {'width': 0.1, 'height': 1.0}, must map"),
+    ('from_coefficients', {}, 'from_coefficients returned {}, must map force to finite numbers'),
+    ('from_coefficients', {'force': np.nan}, "{'force': nan}, must map force to finite numbers"),
+    ('from_coefficients', {'force': np.inf}, "{'force': inf}, must map force to finite numbers"),
+])
+def test_a_wrong_answer_is_shown_beside_what_it_must_be(
+    stiction: Any, method: str, answer: Any, told: str,
+) -> None:
+    stiction.answers = {method: answer}
+    with pytest.raises(EffectError) as raised:
+        getattr(stiction, method)(stiction)
+    assert told in str(raised.value)
+    assert str(raised.value).startswith('effect stiction: ')
+
+
+def test_right_answers_pass_unchanged(stiction: Any) -> None:
+    stiction.answers = {'trials': [{'width': 0.1}], 'from_coefficients': {'force': 2.0}}
+    assert stiction.trials(None) == [{'width': 0.1}]
+    assert stiction.from_coefficients(None) == {'force': 2.0}
