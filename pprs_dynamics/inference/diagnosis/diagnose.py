@@ -24,7 +24,7 @@ from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import rms
+from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -237,8 +237,15 @@ class _Answer:
                 candidate.effect, self._names(candidate), said.parameters,
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 search.library.force(self.kept, candidate, remaining.shape), said.at_bound,
-                self.ranking.shares[k]))
+                self.ranking.shares[k],
+                held_out[k + 1] >= held_out[k] and not self.validate and self._is_predicted(k)))
         return found
+
+    def _is_predicted(self, k: int) -> bool:
+        """Return whether held-out blocks are predicted better for certain with an effect more."""
+        before, after = (hold_out(self.search, self.search.at_noise_of(
+            self.kept, step.candidates)).losses for step in self.ranking.path[k:k + 2])
+        return certainty(before - after) > self.decisions.sure
 
     def _evidence(self, candidate: Candidate) -> float:
         return self.ranking.without[candidate].total - self.kept.total

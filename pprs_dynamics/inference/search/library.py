@@ -226,12 +226,16 @@ class Library:
         return price + sum(self._narrowed(one) for one in candidate.components)
 
     def _narrowed(self, component: Component) -> float:
-        """Return by how much what is usual narrows the prior of a component, in deviance."""
+        """Return what it costs that a component is not as usual, in deviance.
+
+        By how much that narrows its prior, and the odds that it is otherwise at all.
+        """
         usual = self._expected(component)
         if not np.any(usual):
             return 0.0
         both = self.block(component).precision
-        return float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
+        return float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1]
+                     - 2 * np.log(self.prices.decisions.unusual_odds))
 
     def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
         """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
