@@ -258,7 +258,7 @@ def tell(bench: Bench) -> dict[str, str]:
          f'{first} first; {value}'],
         [f'a hand of {HAND} kg in the model that is not there: first, within 5 %, no zeros', 'yes',
          without_hand if taken is None else
-         f'{taken["value"]:.3f} ± {2 * taken["std"]:.3f} kg, then {without_hand}'],
+         f'first; {taken["value"]:.3f} ± {2 * taken["std"]:.3f} kg; all: {without_hand}'],
         ['free run: payload or gain claimed', 'none', ', '.join(sorted(claimed)) or 'none'],
         ['base model on a run not fitted, joints within the goal', '6 of 6', f'{met} of 6'],
         ['the same after `--adopt-all --refit` on another free run, error over all joints',
@@ -275,9 +275,9 @@ def tell(bench: Bench) -> dict[str, str]:
     if not bench.as_far:
         arm_score.run(bench.folder / 'base.yaml', SEEDS, NOTHING, DURATION,
                       bench.folder / 'score.jsonl', cases_on_dask.here)
+    outcomes = cases_on_dask.read_outcomes(bench.folder / 'score.jsonl')
     return {
-        'SCORE': arm_score.table(cases_on_dask.read_outcomes(
-            bench.folder / 'score.jsonl')).rstrip(),
+        'SCORE': arm_score.table(outcomes).rstrip() if outcomes else 'Not measured; see below.',
         'MODEL': MODEL.rstrip(), 'PROOF': table(('figure', 'goal', 'found'), proof),
         'ERRORS': table(('joint', 'URDF', 'fitted to', 'not fitted to', 'goal'), errors),
         'LOAD': bench.said('load').split('\n\n')[0].rstrip(),
