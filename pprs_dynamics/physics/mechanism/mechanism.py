@@ -107,23 +107,6 @@ class Mechanism:
         return replace(self, bodies=np.append(self.bodies, row),
                        inertial=np.vstack((self.inertial, added)))
 
-    def with_payload(self, mass: float = 0.0, moment: tuple[float, ...] = (0.0,) * 3,
-                     inertia: tuple[float, ...] = (0.0,) * 6) -> Mechanism:
-        """Return the mechanism with more at the tool.
-
-        Parameters
-        ----------
-        mass : float
-            A point at the tool's origin [kg].
-        moment : (3,)
-            First moment about the tool's origin, in the tool's axes [kg m].
-        inertia : (6,)
-            xx yy zz xy xz yz about the tool's origin, in its axes [kg m^2].
-        """
-        xx, yy, zz, xy, xz, yz = inertia
-        return self.with_body(self.structure.tool,
-                              np.array([mass, *moment, xx, xy, yy, xz, yz, zz]))
-
     def at(self, position: Array, velocity: Array, acceleration: Array) -> Linkage:
         """Return the motion of all links for that of the drives, (N, D) each.
 
@@ -143,11 +126,6 @@ class Mechanism:
     def regressor(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Return the derivatives of the efforts by `inertial`, (N, D, 10 B)."""
         return self.at(position, velocity, acceleration).regressor(self)
-
-    def tool_positions(self, position: Array) -> Array:
-        """Return where the tool is in the base's frame, (N, 3) [m]."""
-        rest = np.zeros_like(position)
-        return self.at(position, rest, rest).frame_of(self.structure.tool).p
 
 
 @dataclass(frozen=True, eq=False)
