@@ -22,13 +22,13 @@ import numpy as np
 
 from benchmarks.scores.cases import Outcome, outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.robot import DRIVES
 
 DURATION, RATE, NOISE = 30.0, 100.0, 0.08  # [s, Hz, N]
 SIZES = 0.4, 1.2  # [N], smallest and largest of a hidden force
