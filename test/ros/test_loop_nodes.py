@@ -130,7 +130,7 @@ def test_the_simulated_robot_holds_moves_and_refuses() -> None:
         errors = running.listen(Float64MultiArray, '/monitor/error', 1000)
         running.follow_status('/simulated_robot/status')
         running.add(SimulatedRobotNode, parameter_overrides=given(
-            rate=50.0, command_timeout=0.0, effort_noise=0.001))
+            rate=100.0, command_timeout=0.0, effort_noise=0.001))
         running.add(MonitorNode, parameter_overrides=given())
         setpoint = running.probe.create_publisher(
             JointState, '/simulated_robot/joint_command', 10)
@@ -146,7 +146,7 @@ def test_the_simulated_robot_holds_moves_and_refuses() -> None:
         # Dry friction of 3 N, more with load, holds the PD loop of 4 N/mm off by up to 1 mm.
         assert running.spin_until(
             lambda: np.allclose(states[-1].position, goal, rtol=0, atol=1.2e-3), 20)
-        assert running.spin_until(lambda: errors)
+        assert running.spin_until(lambda: errors, 30)
         setpoint.publish(JointState(name=order[1:], position=[0.4] * 5, velocity=[0.0] * 5,
                                     effort=[0.0] * 5))
         assert running.spin_until(lambda: running.status[-1]['code'] == 'REFUSED')
