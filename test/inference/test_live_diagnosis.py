@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,24 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
     live = live.with_window(window(model, model, 4), 4 * LENGTH)
     assert live.claimed == ()
     assert [effect.found.name for effect in live.withdrawn] == ['payload_mass']
+
+
+def test_what_numbers_within_their_tolerance_explain_keeps_no_effect_alive() -> None:
+    """The fit moves masses that are known to 5 % only, which helps in every window."""
+    values = DriveModel.load().values
+    model = DriveModel.from_parameters({**values, 'tolerances.masses.payload': 0.05})
+    real = {**values, 'masses.payload': 1.04 * values['masses.payload']}
+    pushed = {'effects.active': ('effort_offset',), 'effects.effort_offset.slide_1.force': 0.3}
+    robot = DriveModel.from_parameters(real)
+    live = LiveDiagnosis(model)
+    live = live.with_window(window(robot, DriveModel.from_parameters({**real, **pushed}), 2), 0.0)
+    assert [effect.found.name for effect in live.effects] == ['effort_offset']
+    assert live.last is not None
+    assert 'effort_offset' not in [effect.name for effect in live.last.plain.effects]
+    live = replace(live, effects=tuple(replace(one, confirmed=True) for one in live.effects))
+    live = live.with_window(window(robot, robot, 3), LENGTH)
+    assert live.claimed == ()
+    assert [effect.found.name for effect in live.withdrawn] == ['effort_offset']
 
 
 def test_a_robot_that_stands_is_not_diagnosed(model: DriveModel, heavier: DriveModel) -> None:

@@ -119,7 +119,9 @@ class Window:
     diagnosis : dict
         JSON of `pprs diagnose`.
     adopted : ForceModel
-        The model with what was found.
+        The model with what was found, and its numbers as the fit moves them.
+    plain : ForceModel
+        The same without what was found.
     noise : mapping of str to NoiseSpectrum
         By drive.
     """
@@ -129,6 +131,7 @@ class Window:
     end: float
     diagnosis: Mapping[str, Any]
     adopted: ForceModel
+    plain: ForceModel
     noise: Mapping[str, NoiseSpectrum]
 
 
@@ -201,9 +204,13 @@ class LiveDiagnosis:
         answer = diagnose(self.model, [recording], decisions=decisions)
         noise = answer.noise
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
-                        answer.to_dict(), answer.adopted, noise)
-        holds = self.last is not None and self.effects and _certainty(
-            self.model, self.last.adopted, recording, noise) > live.certainty
+                        answer.to_dict(), answer.adopted,
+                        without_found(self.model, answer), noise)
+        # Numbers known to a tolerance move with the fit: what they alone explain is no effect's,
+        # and an effect may only make up for what they have moved too far.
+        holds = self.last is not None and self.effects and all(
+            _certainty(each, self.last.adopted, recording, noise) > live.certainty
+            for each in (self.model, self.last.plain))
         effects = []
         for found in answer.effects:
             effect = LiveEffect(found, None, False, _names(answer, found))
@@ -226,11 +233,22 @@ class LiveDiagnosis:
         """Return when the change that a window has came, in this or a recent one [s]."""
         gains, times = [], []
         for each, start in (*self.recent, (window.recording, window.start)):
-            before, _ = measure_residuals(self.model, [each])
-            after, _ = measure_residuals(answer.adopted, [each])
+            before, _ = measure_residuals(window.plain, [each])
+            after, _ = measure_residuals(window.adopted, [each])
             gains.append(sample_gains(before, after, answer.noise))
             times.append(start + before.time - before.time[0])
         return change_point(np.concatenate(times), np.concatenate(gains))
+
+
+def without_found(model: ForceModel, answer: Diagnosis) -> ForceModel:
+    """Return the model of a diagnosis without what it found, its other numbers as they are."""
+    found = {one.name for one in answer.effects}
+    given = {effect.name: effect for effect in model.effects}
+    plain: ForceModel = replace(answer.adopted, effects=tuple(
+        given.get(effect.name, effect) if effect.name in found else effect
+        for effect in answer.adopted.effects
+        if effect.name not in found or effect.name in given))
+    return plain
 
 
 def change_point(time: Array, gains: Array) -> float | None:
