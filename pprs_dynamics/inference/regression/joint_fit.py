@@ -41,7 +41,7 @@ LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less; rounds are bounded.
 CONVERGED, MOST_ROUNDS = 0.01, 40
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
-MOST_EQUATIONS = 300  # of drives that are kept: some 0.1 to 0.5 MB each
+MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +186,10 @@ class Regression:
                 self._equations.clear()
             self._equations[key] = DriveEquations(self, d, felt)
         return self._equations[key]
+
+    def release(self) -> None:
+        """Let go of equations; they are made again, of products that are kept."""
+        self._equations.clear()
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.

@@ -74,7 +74,6 @@ def _around_fitted(
                               and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
         starts = [kept] if kept is best else [kept, best]
-        search.release()
         search = Search(last.design, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES),
             patterns=search.patterns)
@@ -133,6 +132,7 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions,
         point = next_point(search, found)
         if point is None:
             break
+        search.release()
         search = Search(search.design.around(point), decisions, search.regression.error_scale,
                         with_unknown=False)
         search.evaluate(())

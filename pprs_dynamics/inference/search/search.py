@@ -87,8 +87,9 @@ class Search(ScannedSets):
         return self.best
 
     def release(self) -> None:
-        """Let go of what only further scans would need."""
+        """Let go of what only further scans and fits would need."""
         self.library.release()
+        self.regression.release()
         for patterns in self.patterns:
             patterns.release()
 
