@@ -73,11 +73,12 @@ def _around_fitted(
         if last is search or (not search.is_beyond_point
                               and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
-        starts = [kept] if kept is best else [kept, best]
-        search = Search(last.design, decisions, scale, _share_of(
-            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES),
-            patterns=search.patterns)
-        best = search.run(*(one.candidates for one in starts))
+        starts = [one.candidates for one in dict.fromkeys((kept, best))]
+        design, patterns = last.design, search.patterns
+        del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
+        search = Search(design, decisions, scale, _share_of(
+            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES), patterns=patterns)
+        best = search.run(*starts)
         if best.total > rival:
             break
     return search, best
