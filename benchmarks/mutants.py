@@ -54,7 +54,7 @@ TESTS = {
     'inference/regression/joint_fit.py': ('inference/test_joint_fit.py',
                                           'inference/test_noise.py'),
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
-    'inference/search/allowance.py': ('inference/test_gates.py',),
+    'inference/search/model_discrepancy.py': ('inference/test_gates.py',),
     'inference/search/search.py': ('inference/test_hypothesis_space.py',),
     'inference/adoption/objections.py': ('inference/test_gates.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),

@@ -14,8 +14,8 @@ from dataclasses import replace
 from typing import Any
 
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.expansion import linear_error
 from pprs_dynamics.inference.search.ranking import Ranking
+from pprs_dynamics.inference.search.relinearisation import linear_error
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import catalogue
 

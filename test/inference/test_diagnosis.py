@@ -15,7 +15,7 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.fourier_path import FourierFamily, FourierPath
-from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -142,7 +142,7 @@ def test_no_candidate_leaves_the_prediction_as_it_is(library: Library) -> None:
 
 def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design: Design) -> None:
     found = {column.number.label: column for column in design.base
-             if isinstance(column, KnownNumber)}
+             if isinstance(column, ModelNumber)}
     assert set(found) >= {'masses.payload', 'masses.slides[2]', 'friction.drives.coulomb[5]'}
     for label, key, element in (('masses.payload', 'masses.payload', None),
                                 ('masses.slides[2]', 'masses.slides', 1),

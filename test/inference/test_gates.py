@@ -33,10 +33,10 @@ from pprs_dynamics.inference.residuals.paired_errors import (
     rms_by_drive,
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.allowance import share_of_allowance
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.model_file import build_model
 
@@ -339,7 +339,7 @@ def share(found: Any, which: int, parts: dict[str, np.ndarray] | None = None,
           model: Any = PLAIN) -> tuple[float, tuple[str, ...]]:
     design: Any = SimpleNamespace(given=model)
     regression: Any = Rows(parts or {})
-    return share_of_allowance(design, regression, DECIDED, found, found.candidates[which])
+    return discrepancy_ratio(design, regression, DECIDED, found, found.candidates[which])
 
 
 def test_an_idealised_effect_may_leave_a_tenth_in_another_and_a_fiftieth_in_an_exact_one() -> None:

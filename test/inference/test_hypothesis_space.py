@@ -73,7 +73,7 @@ def catalogue_of_random_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(candidates_module, 'catalogue', lambda: every)
     monkeypatch.setattr(library_module, 'searched_in_drives', lambda design: list(ON_DRIVES))
     # Nothing of it knows loads or turns over.
-    monkeypatch.setattr(library_module, 'open_rows', lambda *_: np.zeros((0, SAMPLES)))
+    monkeypatch.setattr(library_module, 'nuisance_rows', lambda *_: np.zeros((0, SAMPLES)))
 
 
 def random_design(truth: Mapping[tuple[str, int | None], float], seed: int) -> RandomDesign:

@@ -34,7 +34,7 @@ from pprs_dynamics.inference.experiments.trajectory_search import (
     forces_of,
 )
 from pprs_dynamics.inference.regression.base_columns import (
-    KnownNumber,
+    ModelNumber,
     PresentCoefficient,
     PresentShape,
     ReversalShape,
@@ -152,7 +152,7 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
     assert {type(one) for one in plan.base} == {
-        KnownNumber, ReversalShape, PresentCoefficient, PresentShape}
+        ModelNumber, ReversalShape, PresentCoefficient, PresentShape}
 
 
 def test_a_drive_that_stood_may_turn_over_in_a_motion(

@@ -10,7 +10,7 @@ import pytest
 
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, Regression
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.scan import Entry, Scan
+from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 SAMPLES, DRIVES, PERIOD = 600, 3, 0.01
@@ -45,7 +45,7 @@ def test_gains_of_a_scan_are_those_of_single_blocks(
         for d in rows:
             rows[d].append(block.rows.get(d, np.zeros((size, SAMPLES))))
         first += size
-    scan = Scan(regression, {d: np.concatenate(parts).astype(np.float32)
+    scan = ScoreTest(regression, {d: np.concatenate(parts).astype(np.float32)
                              for d, parts in rows.items()}, entries)
     for chosen in ((), (beside,), (beside, fixed)):
         fit = regression.fit(chosen)
@@ -57,7 +57,7 @@ def test_gains_of_a_scan_are_those_of_single_blocks(
 def test_without_a_precision_entries_have_the_g_prior(
         regression: Regression, rng: np.random.Generator) -> None:
     block = regression.block({1: rng.normal(size=(2, SAMPLES))})
-    scan = Scan(regression, {1: block.rows[1].astype(np.float32)}, [Entry('both', (0, 1))])
+    scan = ScoreTest(regression, {1: block.rows[1].astype(np.float32)}, [Entry('both', (0, 1))])
     fit = regression.fit(())
     [(labels, gains)] = scan.gains(fit)
     assert labels == ['both']

@@ -19,13 +19,13 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search import search as search_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.expansion import (
+from pprs_dynamics.inference.search.ranking import select
+from pprs_dynamics.inference.search.relinearisation import (
     exact_forces,
     fitted_model,
     linear_prediction,
     squared,
 )
-from pprs_dynamics.inference.search.ranking import select
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -79,7 +79,7 @@ def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
         'stiffness': 20.0, 'position': -0.05}}, 4)])
 def test_the_search_ends_at_the_best_of_all_sets(
         hidden: dict, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    # All sets within one design, those that would be expanded around, too.
+    # All sets within one design, those that would be relinearised around, too.
     monkeypatch.setattr(Search, 'is_beyond_point', False)
     design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
     search = Search(design, DECISIONS, with_unknown=False)

@@ -93,7 +93,7 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
     assert selection is not None
     search = selection.last
     blocks = [block for candidate, one in tried for component in candidate.components
-              for block in (search.library.block(component), *one.doubtful.get(component, ()))]
+              for block in (search.library.block(component), *one.nuisance.get(component, ()))]
     fit = search.regression.at(blocks, selection.best.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
     price = sum(search.library.price(one) for one, _ in tried) + sum(

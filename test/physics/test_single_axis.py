@@ -17,7 +17,7 @@ from ros_processes import environment, executable
 from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
 from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
-from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
@@ -172,7 +172,7 @@ def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
                          **tolerances})
     design = Design.of(model, [bench(1)])
     for column in design.base:
-        if not isinstance(column, KnownNumber):
+        if not isinstance(column, ModelNumber):
             continue
         value, moved = column.number.value, 0.001
         # Away from 0 by a share of one standard deviation.
@@ -208,7 +208,7 @@ def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None
     design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
     found = Search(design, DECISIONS, with_unknown=False).evaluate(())
     place, number = next((k, column.number) for k, column in enumerate(design.base)
-                         if isinstance(column, KnownNumber))
+                         if isinstance(column, ModelNumber))
     assert OFFSET - found.fit.coefficients[place] * number.deviation == pytest.approx(
         -2.5, abs=0.02)
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -115,7 +115,7 @@ def _rows(design: Design, regression: Regression, fit: JointFit, term: Term, blo
 
 def _own_numbers(design: Design, fit: JointFit) -> Iterator[dict[str, Any]]:
     for k, column in enumerate(design.base):
-        if isinstance(column, KnownNumber):
+        if isinstance(column, ModelNumber):
             number = column.number
             label = number.key if number.element is None else f'{number.key}[{number.element + 1}]'
             yield {'effect': OWN, 'parameter': label,

@@ -22,11 +22,11 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.expansion import (
+from pprs_dynamics.inference.search.relinearisation import (
     exact_forces,
-    expanded,
     fitted_model,
     linear_residual,
+    relinearised,
 )
 from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
 from pprs_dynamics.inference.search.search import Search
@@ -296,7 +296,7 @@ class TickFits:
         """
         search, parameters = self.search, None
         if is_free and any(c.effect.bends_columns for c in found.effects):
-            search, found = expanded(search, found, self.decisions)
+            search, found = relinearised(search, found, self.decisions)
             parameters = {c.name: estimate(search, found, c).parameters for c in found.effects}
         model = fitted_model(search, found)
         return Exact(model, self.measured - exact_forces(search.design, model), parameters)

@@ -31,8 +31,8 @@ from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
-from pprs_dynamics.inference.search.expansion import fitted_model, linear_error
 from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.relinearisation import fitted_model, linear_error
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording

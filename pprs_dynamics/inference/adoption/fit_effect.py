@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, calibrations, estimate
-from pprs_dynamics.inference.search.expansion import expanded, fitted_model
 from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.relinearisation import fitted_model, relinearised
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
@@ -108,7 +108,7 @@ def fit_effect(
     plain_set = replace(without, fit=search.regression.at((), found.fit.amplitudes))
     plain_losses = hold_out(search, plain_set).losses
     evidence = without.cost - found.cost
-    last, found = expanded(search, found, decisions)
+    last, found = relinearised(search, found, decisions)
     report(0.8)
     candidate = found.effects[0]
     said = estimate(last, found, candidate)
@@ -151,7 +151,7 @@ def _require_motion(design: Design, request: EffectRequest) -> None:
 def _is_move(design: Design, one: Calibration) -> bool:
     """Return whether a number moves at all against what its tolerance allows."""
     deviations = {(column.number.key, column.number.element): column.number.deviation
-                  for column in design.base if isinstance(column, KnownNumber)}
+                  for column in design.base if isinstance(column, ModelNumber)}
     # Widths of reversal have no tolerance: they are told where they differ for certain.
     return abs(one.after - one.before) > LEAST_MOVE * deviations.get((one.key, one.element), 0.0)
 

@@ -29,14 +29,14 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, calibrations, estimate
-from pprs_dynamics.inference.search.expansion import (
+from pprs_dynamics.inference.search.form import Remainder
+from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.ranking import Ranking, select
+from pprs_dynamics.inference.search.relinearisation import (
     exact_forces,
     fitted_model,
     linear_error,
 )
-from pprs_dynamics.inference.search.form import Remainder
-from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.ranking import Ranking, select
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording

@@ -15,8 +15,12 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.expansion import fitted_model, linear_error, linear_residual
 from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.relinearisation import (
+    fitted_model,
+    linear_error,
+    linear_residual,
+)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect

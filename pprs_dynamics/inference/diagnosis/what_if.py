@@ -163,7 +163,7 @@ class _System:
         self.search: Search = selection.last
         self.first_choice: dict[str, set[int | None]] = {}
         self.placements: dict[tuple[str, int | None], Component] = {}
-        self.doubtful: dict[Component, tuple[Block, ...]] = {}
+        self.nuisance: dict[Component, tuple[Block, ...]] = {}
         for candidates, found in self._tried(selection):
             for candidate in candidates:
                 drives = {one.drive for one in candidate.components}
@@ -172,7 +172,7 @@ class _System:
                     key = (candidate.name, placement.drive)
                     if key not in self.placements:
                         self.placements[key] = placement
-                        self.doubtful[placement] = found.doubtful.get(placement, ())
+                        self.nuisance[placement] = found.nuisance.get(placement, ())
         self.unknown = [block for candidate in kept.unknowns for block in candidate.blocks]
         blocks = [*self.unknown, *(block for one in self.placements.values()
                                    for block in self._blocks(one))]
@@ -216,7 +216,7 @@ class _System:
             yield effects(proposal), self.kept
 
     def _blocks(self, placement: Component) -> list[Block]:
-        return [self.search.library.block(placement), *self.doubtful[placement]]
+        return [self.search.library.block(placement), *self.nuisance[placement]]
 
     def what_if(self) -> WhatIf:
         """Return what a page needs of it."""

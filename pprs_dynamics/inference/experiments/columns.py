@@ -18,7 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
-    KnownNumber,
+    ModelNumber,
     PresentCoefficient,
     PresentShape,
     ReversalShape,
@@ -163,7 +163,7 @@ class ColumnPlan:
     @property
     def numbers(self) -> tuple[int, ...]:
         """Places of the model's own numbers."""
-        return tuple(k for k, one in enumerate(self.base) if isinstance(one, KnownNumber))
+        return tuple(k for k, one in enumerate(self.base) if isinstance(one, ModelNumber))
 
     @property
     def others(self) -> tuple[int, ...]:
@@ -220,7 +220,7 @@ class ColumnPlan:
 
     def _whole_columns(self, forces: Any, samples: int) -> _WholeColumns:
         """Return the columns of all motions at full rate that do not need one motion alone."""
-        numbers = tuple(one.number for one in self.base if isinstance(one, KnownNumber))
+        numbers = tuple(one.number for one in self.base if isinstance(one, ModelNumber))
         wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
             one, (FittedTerm, PresentCoefficient, PresentShape))}
         structure = tuple(effect for effect in wanted if issubclass(effect, StructureEffect))

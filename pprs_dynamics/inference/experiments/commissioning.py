@@ -16,7 +16,7 @@ from pprs_dynamics.inference.experiments.information import Information
 from pprs_dynamics.inference.experiments.question import Question, subjects_of
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
-    KnownNumber,
+    ModelNumber,
     PresentCoefficient,
     PresentShape,
     ReversalShape,
@@ -24,7 +24,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import FREE, Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.platform_sensitivities import PASSIVE_WIDTHS
-from pprs_dynamics.inference.regression.sensitivities import known_numbers
+from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -61,7 +61,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
     noise : float
         Standard deviation of means of the effort over 0.01 s [N], where nothing is recorded.
     """
-    if not known_numbers(model):
+    if not model_numbers(model):
         tolerances = {f'tolerances.{key}': TOLERANCE for key in NUMBERS
                       if np.any(model.values[key])}
         model = DriveModel.from_parameters({**model.values, **tolerances})
@@ -98,7 +98,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
 
 def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:
     """Return what is fitted on any recording of a model, as columns without rows."""
-    base: list[BaseColumn] = [KnownNumber({}, 1.0, number) for number in known_numbers(model)]
+    base: list[BaseColumn] = [ModelNumber({}, 1.0, number) for number in model_numbers(model)]
     base += reversal_shapes(range(len(DRIVES)))
     base += [ReversalShape({}, 1.0, None, number) for number in range(len(PASSIVE_WIDTHS))]
     for effect in model.effects:

@@ -24,7 +24,7 @@ from pprs_dynamics.inference.experiments.criteria import Contest, Precision
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.question import Question, precision_of, question_of
 from pprs_dynamics.inference.experiments.trajectory_search import Found, TrajectorySearch
-from pprs_dynamics.inference.regression.base_columns import KnownNumber
+from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -287,7 +287,7 @@ def _accuracies(question: Question, known: Array, after: Array) -> list[Accuracy
         return []
     plan, found = question.plan, []
     if question.kind == 'commission' or not question.subjects:
-        numbers = [one.number for one in plan.base if isinstance(one, KnownNumber)]
+        numbers = [one.number for one in plan.base if isinstance(one, ModelNumber)]
         # Their columns are per standard deviation of what is known beforehand.
         found += _known_to([(one.label, one.unit, one.deviation) for one in numbers],
                            precision_of(plan, ()), known, after)

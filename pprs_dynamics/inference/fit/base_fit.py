@@ -16,7 +16,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.arm_columns import columns_of
 from pprs_dynamics.inference.fit.arm_fit import ArmFit, fit_arm
 from pprs_dynamics.inference.fit.open_numbers import fit_open_numbers
-from pprs_dynamics.inference.regression.sensitivities import known_numbers
+from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -120,7 +120,7 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
 
 def require_open_numbers(model: ForceModel) -> None:
     """Raise FitError where a model has nothing that a fit may move."""
-    if not isinstance(model, ArmModel) and not known_numbers(model):
+    if not isinstance(model, ArmModel) and not model_numbers(model):
         raise FitError('tolerances: the model gives none, must name the numbers that are to be '
                        'fitted, e.g. masses.payload: 0.05')
 

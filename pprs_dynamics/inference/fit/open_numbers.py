@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Calibration, calibrations
-from pprs_dynamics.inference.search.expansion import expanded, fitted_model
+from pprs_dynamics.inference.search.relinearisation import fitted_model, relinearised
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -28,5 +28,5 @@ def fit_open_numbers(model: ForceModel, recordings: Sequence[Recording],
         As `measure_residuals`.
     """
     search = Search(Design.of(model, recordings), DECISIONS, with_unknown=False)
-    search, found = expanded(search, search.evaluate(()), DECISIONS)
+    search, found = relinearised(search, search.evaluate(()), DECISIONS)
     return fitted_model(search, found), calibrations(search, found, {})

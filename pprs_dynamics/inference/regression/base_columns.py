@@ -44,7 +44,7 @@ class BaseColumn:
 
 
 @dataclass(frozen=True)
-class KnownNumber(BaseColumn):
+class ModelNumber(BaseColumn):
     """A number within its tolerance; the coefficient counts standard deviations away from 0."""
 
     number: Number
@@ -97,7 +97,7 @@ def within(parameter: Parameter, value: float) -> float:
 def move_numbers(values: dict[str, Any], base: Sequence[BaseColumn], coefficients: Array) -> None:
     """Put known numbers as coefficients have them into a model's values."""
     for column, c in zip(base, coefficients, strict=True):
-        if isinstance(column, KnownNumber):
+        if isinstance(column, ModelNumber):
             set_number(values, column.number.key, column.number.element, column.value(float(c)))
 
 

@@ -6,8 +6,8 @@
 Model and columns are computed at full rate from one motion and then averaged in blocks, as the
 measured effort is; were one side treated otherwise, each reversal would look like friction.
 
-Forces are linear around a point: the model as given at first, and later one that has what was
-found. There the error is extrapolated back to the given model (Gauss-Newton), so that
+Forces are linear around an operating point: the model as given at first, and later one that has
+what was found. There the error is extrapolated back to the given model (Gauss-Newton), so that
 coefficients, priors and costs always mean the same.
 """
 
@@ -24,7 +24,7 @@ from scipy.signal import correlate
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
-    KnownNumber,
+    ModelNumber,
     PresentCoefficient,
     PresentShape,
     ReversalShape,
@@ -43,7 +43,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_JOINTS,
     PRESENT,
 )
-from pprs_dynamics.inference.regression.terms import FullRate, Point, Term
+from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct, with_zeros
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -89,7 +89,7 @@ class Design:
     reconstructions : tuple of Reconstruction
     forces : (M, D) array
         Of `model`, exactly [N].
-    point : Point, optional
+    point : OperatingPoint, optional
         None: the given model.
     """
 
@@ -103,7 +103,7 @@ class Design:
     notes: tuple[str, ...]
     reconstructions: tuple[Reconstruction, ...] = field(repr=False)
     forces: Array = field(repr=False)
-    point: Point | None = None
+    point: OperatingPoint | None = None
     _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
 
@@ -121,8 +121,9 @@ class Design:
         reconstructions = tuple(reconstruct(model, recording) for recording in recordings)
         return cls._evaluated(model, model, reconstructions, progress)
 
-    def around(self, point: Point, progress: Callable[[float], None] | None = None) -> Design:
-        """Return the design of the same recordings around another point."""
+    def around(self, point: OperatingPoint,
+               progress: Callable[[float], None] | None = None) -> Design:
+        """Return the design of the same recordings around another operating point."""
         design = self._evaluated(point.model, self.given, self.reconstructed(point.model),
                                  progress)
         shift = np.zeros_like(design.residuals.model)
@@ -179,7 +180,7 @@ class Design:
         design = cls(given, model, residuals, tuple(full), (), structure, homing, tuple(notes),
                      reconstructions, residuals.model)
         base: list[BaseColumn] = [
-            KnownNumber(_rows(column), 1.0, number)
+            ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
         # Where a drive stands, friction that turns over otherwise is any constant force.
         base += [ReversalShape({d: column[d]}, 1.0, d, number)

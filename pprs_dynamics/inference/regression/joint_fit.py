@@ -159,9 +159,9 @@ class Regression:
 
     def g_prior(self, grams: Mapping[int, Array]) -> Array:
         """Return the precision of coefficients whose rows have these sums of products, (k, k)."""
-        felt = {d: gram for d, gram in grams.items() if np.any(gram)}
+        acting = {d: gram for d, gram in grams.items() if np.any(gram)}
         precision = sum(gram / (len(self.series[d]) * max(self.error_scale[d], 1e-12) ** 2)
-                        for d, gram in felt.items()) / max(len(felt), 1)
+                        for d, gram in acting.items()) / max(len(acting), 1)
         size = len(next(iter(grams.values()))) if grams else 1
         precision = np.zeros((size, size)) + precision
         scale = np.trace(precision) / size
@@ -178,13 +178,13 @@ class Regression:
             self._products[key] = self.series[d].products(a.rows[d], other)
         return self._products[key]
 
-    def equations(self, d: int, felt: tuple[Block, ...]) -> DriveEquations:
+    def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
-        key = (d, felt)
+        key = (d, acting)
         if key not in self._equations:
             if len(self._equations) >= MOST_EQUATIONS:
                 self._equations.clear()
-            self._equations[key] = DriveEquations(self, d, felt)
+            self._equations[key] = DriveEquations(self, d, acting)
         return self._equations[key]
 
     def release(self) -> None:
@@ -260,10 +260,10 @@ class Regression:
 
     def local(self, fit: JointFit, d: int) -> tuple[Array, list[Block]]:
         """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""
-        felt = [block for block in fit.blocks if d in block.rows]
+        acting = [block for block in fit.blocks if d in block.rows]
         index = [self.base_index[d]]
-        index += [np.arange(fit.places[block].start, fit.places[block].stop) for block in felt]
-        return np.concatenate(index), felt
+        index += [np.arange(fit.places[block].start, fit.places[block].stop) for block in acting]
+        return np.concatenate(index), acting
 
     def remaining(self, fit: JointFit, d: int) -> Array:
         """Return the DCT coefficients of what a fit leaves on a drive, (n,) [N]."""
@@ -335,7 +335,7 @@ class Columns:
         """
         taken, side = np.zeros((len(self), len(fit.coefficients))), np.zeros(len(self))
         for d, rows in self.rows.items():
-            index, felt = self.regression.local(fit, d)
+            index, acting = self.regression.local(fit, d)
             weights = self.regression.weights(fit, d).astype(rows.dtype)
 
             def weighted(block: Block | None, d: int = d, weights: Array = weights) -> Array:
@@ -345,7 +345,7 @@ class Columns:
                 return found
 
             with_base = weighted(None)
-            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in felt)], axis=1)
+            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in acting)], axis=1)
             side += with_base[:, -1] - known @ fit.coefficients[index]
             taken[:, index] += known
         return taken, side

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import BaseColumn, KnownNumber
+from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 
 # A tolerance is a limit: beyond it a number's prior is this many times as steep.
@@ -116,7 +116,7 @@ class Prior:
                 log_det += float(np.linalg.slogdet(part)[1])
             at += len(part)
         limited = np.zeros(count, dtype=bool)
-        limited[:len(columns)] = [isinstance(column, KnownNumber) for column in columns]
+        limited[:len(columns)] = [isinstance(column, ModelNumber) for column in columns]
         return cls(precision, mean, log_det, limited)
 
     def posterior(self, gram: Array, side: Array) -> Posterior:
@@ -165,7 +165,7 @@ class Fitted(Protocol):
     def products(self, a: Block, b: Block | None, d: int) -> Array:
         """Return band sums of products of two blocks' rows on a drive."""
 
-    def equations(self, d: int, felt: tuple[Block, ...]) -> DriveEquations:
+    def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return those of a drive and the blocks that it feels."""
 
 
@@ -178,21 +178,21 @@ class DriveEquations:
     ----------
     regression : Fitted
     d : int
-    felt : sequence of Block
+    acting : sequence of Block
         With rows on the drive.
     """
 
-    def __init__(self, regression: Fitted, d: int, felt: Sequence[Block]) -> None:
+    def __init__(self, regression: Fitted, d: int, acting: Sequence[Block]) -> None:
         base = regression.base_products[d]
         count, first = base.shape[0], base.shape[1] - 1
-        size = first + sum(block.size for block in felt)
+        size = first + sum(block.size for block in acting)
         gram = np.empty((count, size, size))
         side = np.empty((count, size))
         gram[:, :first, :first] = base[:, :-1, :-1]
         side[:, :first] = base[:, :-1, -1]
         at = first
         spots: list[tuple[Block, slice]] = []
-        for block in felt:
+        for block in acting:
             spot = slice(at, at + block.size)
             with_base = regression.products(block, None, d)
             gram[:, spot, :first] = with_base[:, :, :-1]
@@ -246,10 +246,10 @@ class NormalEquations:
         self.drives: list[DriveEquations] = []
         self.indices: list[np.typing.NDArray[np.int_]] = []
         for d in regression.drives:
-            felt = tuple(block for block in blocks if d in block.rows)
-            self.drives.append(regression.equations(d, felt))
+            acting = tuple(block for block in blocks if d in block.rows)
+            self.drives.append(regression.equations(d, acting))
             self.indices.append(np.concatenate([regression.base_index[d], *(
-                np.arange(self.places[one].start, self.places[one].stop) for one in felt)]))
+                np.arange(self.places[one].start, self.places[one].stop) for one in acting)]))
 
     def solve(self, spectra: Array, counts: Array) -> Solution:
         """Return the solution under noise spectra (D, B)."""

@@ -60,7 +60,7 @@ class Number:
         return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
 
 
-def known_numbers(model: ForceModel) -> tuple[Number, ...]:
+def model_numbers(model: ForceModel) -> tuple[Number, ...]:
     """Return the model's numbers that its `tolerances` leave open.
 
     A tolerance is a limit: 2.5 standard deviations.
@@ -104,7 +104,7 @@ class Sensitivities(ABC):
 
     def __init__(self, model: ForceModel, given: ForceModel) -> None:
         self.model, self.given = model, given
-        self.numbers = known_numbers(given)
+        self.numbers = model_numbers(given)
         present = {effect.name for effect in given.effects}
         self.searched: tuple[type[StructureEffect], ...] = tuple(
             bound for effect in catalogue().values() if issubclass(effect, StructureEffect)

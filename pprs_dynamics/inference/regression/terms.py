@@ -85,7 +85,7 @@ class PlacedEffect:
 
 
 @dataclass(frozen=True)
-class Point:
+class OperatingPoint:
     """Where forces are linear: a model, and what makes it differ from the given one.
 
     Parameters

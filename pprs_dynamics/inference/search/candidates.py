@@ -197,7 +197,7 @@ class CandidateSet:
         Penalised deviance with all prices.
     blocks : mapping of Component to Block
         Columns of the components.
-    doubtful : mapping of Component to tuple of Block
+    nuisance : mapping of Component to tuple of Block
         Columns for what the components leave open, fitted with them.
     is_admissible : bool
         False where a body cannot be, a value is beyond its bounds, or a pattern may be the lack
@@ -208,7 +208,7 @@ class CandidateSet:
     fit: JointFit
     total: float
     blocks: Mapping[Component, Block] = field(default_factory=dict, repr=False)
-    doubtful: Mapping[Component, tuple[Block, ...]] = field(default_factory=dict, repr=False)
+    nuisance: Mapping[Component, tuple[Block, ...]] = field(default_factory=dict, repr=False)
     is_admissible: bool = True
 
     @property

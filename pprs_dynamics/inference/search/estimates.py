@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import KnownNumber, PresentCoefficient, within
+from pprs_dynamics.inference.regression.base_columns import ModelNumber, PresentCoefficient, within
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.reversal_widths import place_of
@@ -209,7 +209,7 @@ def calibrations(search: Search, found: CandidateSet, widths: Mapping[int, float
     design = search.design
     calibrated = []
     for k, column in enumerate(design.base):
-        if isinstance(column, KnownNumber):
+        if isinstance(column, ModelNumber):
             number = column.number
             std = float(np.sqrt(found.fit.covariance[k, k])) * number.deviation
             calibrated.append(Calibration(

@@ -16,7 +16,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.allowance import share_of_allowance
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -28,6 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.library import Library
+from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -38,7 +38,7 @@ LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
 
 Candidates = tuple[Candidate, ...]
-Doubtful = Mapping[Component, tuple[Block, ...]]
+Nuisance = Mapping[Component, tuple[Block, ...]]
 
 
 class FittedSets:
@@ -59,7 +59,7 @@ class FittedSets:
         self.prices = Prices.of(self.regression, decisions)
         self.library = Library(design, self.regression, self.prices)
         self._evaluated: dict[Hashable, CandidateSet] = {}
-        self._doubtful: dict[Hashable, tuple[Block, ...]] = {}
+        self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 
     @property
     def sets(self) -> tuple[CandidateSet, ...]:
@@ -88,28 +88,28 @@ class FittedSets:
         start = self.evaluate(()).fit.amplitudes
         # The size of its forces, in proportion to which friction is in doubt, need not be
         # exact: the noise of the empty set does, and steps of it, whose columns are kept.
-        doubtful = self._doubtful_blocks(candidates, self.regression.at(
+        nuisance = self._nuisance_blocks(candidates, self.regression.at(
             self.blocks(candidates), start))
-        fit = self.regression.fit(self.blocks(candidates, doubtful), start)
-        found = self._set(candidates, fit, doubtful)
+        fit = self.regression.fit(self.blocks(candidates, nuisance), start)
+        found = self._set(candidates, fit, nuisance)
         bodies = {one: block for one, block in found.blocks.items()
                   if issubclass(one.effect, AddedBody)}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
         if possible is not fit:
-            found = self._set(candidates, possible or fit, doubtful)
+            found = self._set(candidates, possible or fit, nuisance)
         return replace(found, is_admissible=possible is not None and self._is_admissible(found))
 
-    def blocks(self, candidates: Candidates, doubtful: Doubtful = MappingProxyType({}),
+    def blocks(self, candidates: Candidates, nuisance: Nuisance = MappingProxyType({}),
                ) -> list[Block]:
         """Return the columns of candidates, then those of what they leave open."""
         return [*(block for c in candidates for block in (
             c.blocks if isinstance(c, UnknownCandidate) else map(self.library.block, c.components)
-        )), *chain(*doubtful.values())]
+        )), *chain(*nuisance.values())]
 
-    def _set(self, candidates: Candidates, fit: JointFit, doubtful: Doubtful) -> CandidateSet:
+    def _set(self, candidates: Candidates, fit: JointFit, nuisance: Nuisance) -> CandidateSet:
         blocks = {one: self.library.block(one) for candidate in candidates
                   if isinstance(candidate, EffectCandidate) for one in candidate.components}
-        found = CandidateSet(candidates, fit, fit.deviance, blocks, doubtful)
+        found = CandidateSet(candidates, fit, fit.deviance, blocks, nuisance)
         return replace(found, total=fit.deviance + self.price(found))
 
     def _is_admissible(self, found: CandidateSet) -> bool:
@@ -120,10 +120,10 @@ class FittedSets:
         """
         if not all(one.is_within(found.coefficients(one)) for one in found.blocks):
             return False
-        return all(share_of_allowance(self.design, self.regression, self.decisions, found,
+        return all(discrepancy_ratio(self.design, self.regression, self.decisions, found,
                                       candidate)[0] >= 1 for candidate in found.unknowns)
 
-    def _doubtful_blocks(self, candidates: Candidates, fit: JointFit) -> Doubtful:
+    def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:
         """Return columns for what effects leave open, in proportion to their fitted force.
 
         Whether friction follows the loads that an effect adds; how friction turns over; and how
@@ -134,19 +134,19 @@ class FittedSets:
             for one in candidate.components if isinstance(candidate, EffectCandidate) else ():
                 size = _stepped(fit.of(self.library.block(one)))
                 key = (one, tuple(size.tolist()))
-                if key not in self._doubtful:
-                    self._doubtful[key] = self._doubtful_of(one, size)
-                if self._doubtful[key]:
-                    found[one] = self._doubtful[key]
+                if key not in self._nuisance:
+                    self._nuisance[key] = self._nuisance_of(one, size)
+                if self._nuisance[key]:
+                    found[one] = self._nuisance[key]
         return found
 
-    def _doubtful_of(self, component: Component, c: Array) -> tuple[Block, ...]:
+    def _nuisance_of(self, component: Component, c: Array) -> tuple[Block, ...]:
         """Return the columns of one component, for its coefficients (k,)."""
         blocks = []
         unloaded = self.library.unloaded(component)
         if unloaded is not None:
             blocks.append(Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1)))
-        left_open = self.library.open_rows(component)
+        left_open = self.library.nuisance_rows(component)
         if left_open is not None:
             assert component.drive is not None
             blocks.append(Block({component.drive: np.tensordot(c, left_open, 1)},
@@ -157,9 +157,9 @@ class FittedSets:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
         kept = {one for candidate in candidates if isinstance(candidate, EffectCandidate)
                 for one in candidate.components}
-        doubtful = {one: blocks for one, blocks in found.doubtful.items() if one in kept}
-        fit = self.regression.at(self.blocks(candidates, doubtful), found.fit.amplitudes)
-        return self._set(candidates, fit, doubtful)
+        nuisance = {one: blocks for one, blocks in found.nuisance.items() if one in kept}
+        fit = self.regression.at(self.blocks(candidates, nuisance), found.fit.amplitudes)
+        return self._set(candidates, fit, nuisance)
 
     def price(self, found: CandidateSet) -> float:
         """Return the price of all that was chosen, and of signs that are unphysical."""

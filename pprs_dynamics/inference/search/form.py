@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pprs_dynamics.inference.search.allowance import share_of_allowance
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT
+from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
@@ -104,7 +104,7 @@ def _small(search: Search, found: CandidateSet) -> dict[Candidate, tuple[str, ..
     """Return the candidates within the model error of others, and of which."""
     small = {}
     for candidate in found.candidates:
-        share, names = share_of_allowance(
+        share, names = discrepancy_ratio(
             search.design, search.regression, search.decisions, found, candidate)
         if share < 1:
             small[candidate] = names

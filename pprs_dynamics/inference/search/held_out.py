@@ -48,8 +48,8 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
     white: dict[int, tuple[Array, Array, Array]] = {}
     for d in regression.drives:
         series = regression.series[d]
-        index, felt = regression.local(fit, d)
-        rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in felt)])
+        index, acting = regression.local(fit, d)
+        rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in acting)])
         y = regression.base[d][-1]
         root = np.sqrt(series.spread(regression.weights(fit, d)))
         stacked = series.inverse(np.concatenate((rows, y[None])) * root)
@@ -65,7 +65,7 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
     fits = np.stack([one.coefficients for one in others])
     reversals = [k for k, column in enumerate(search.design.base)
                  if isinstance(column, ReversalShape)]
-    reversals += [k for blocks in found.doubtful.values() for block in blocks
+    reversals += [k for blocks in found.nuisance.values() for block in blocks
                   for k in range(fit.places[block].start, fit.places[block].stop)]
     plain = fits.copy()
     plain[:, reversals] = 0.0

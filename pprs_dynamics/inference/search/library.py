@@ -15,7 +15,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.regression.open_form import open_rows
+from pprs_dynamics.inference.regression.nuisance_columns import nuisance_rows
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.search.candidates import (
@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.candidates import (
     Prices,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.scan import Entry, Scan
+from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 
 
@@ -44,12 +44,12 @@ class DriveLibrary:
         self.series = regression.series[d]
         self.design = design
         self.effects = [effect for effect in searched_in_drives(design)
-                        if design.acts_on(effect, d) and not _is_felt_everywhere(effect)]
+                        if design.acts_on(effect, d) and not _acts_everywhere(effect)]
         self.trials = {effect.name: len(effect.trials(design.covered[d]))
                        for effect in self.effects}
 
     @cached_property
-    def scan(self) -> Scan[Component]:
+    def score_test(self) -> ScoreTest[Component]:
         """All shapes in all variants that the rows of a scan suffice for; computed when asked for.
         """
         entries: list[Entry[Component]] = []
@@ -70,12 +70,12 @@ class DriveLibrary:
             # In single precision and in frequency alone: there are hundreds of them.
             parts.append(self.series.transform(np.concatenate(
                 [term.rows[self.d] for term in terms], dtype=np.float32, casting='same_kind')))
-        return Scan(self.regression, {self.d: np.concatenate(parts)}, entries)
+        return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
 
     def offers(self, fit: JointFit) -> dict[str, tuple[Component, float]]:
         """Return the best shape and variant of every effect, by name, with its gain at a noise."""
         best: dict[str, tuple[Component, float]] = {}
-        for labels, gains in self.scan.gains(fit):
+        for labels, gains in self.score_test.gains(fit):
             for at in np.argsort(-gains):
                 name = labels[at].effect.name
                 if name not in best or best[name][1] < gains[at]:
@@ -101,9 +101,9 @@ class Library:
         self._open: dict[Component, Array | None] = {}
         self._ranges: dict[Hashable, Mapping[str, tuple[float, float, int]]] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
-        felt = [effect for effect in searched_in_drives(design) if _is_felt_everywhere(effect)]
+        acting = [effect for effect in searched_in_drives(design) if _acts_everywhere(effect)]
         self.spanning = [Component.of(effect, d, {}, names)
-                         for effect in felt for d in regression.drives
+                         for effect in acting for d in regression.drives
                          if design.acts_on(effect, d) for names in effect.variants]
         self.structure = [Component.of(term.effect, None, {}, names) for term in design.structure
                           for names in term.effect.variants
@@ -111,7 +111,7 @@ class Library:
                                  for rows in term.rows.values())]
 
     @cached_property
-    def _scan(self) -> Scan[Component]:
+    def _scan(self) -> ScoreTest[Component]:
         """Of all that more than one drive feels."""
         series = self.regression.series
         entries, parts, first = [], [], 0
@@ -122,7 +122,7 @@ class Library:
             parts.append({d: block.rows[d] if d in block.rows
                           else np.zeros((block.size, len(series[d]))) for d in series})
             first += block.size
-        return Scan(self.regression, {
+        return ScoreTest(self.regression, {
             d: np.concatenate([part[d] for part in parts]).astype(np.float32) for d in series},
             entries)
 
@@ -193,20 +193,20 @@ class Library:
         return {d: self.regression.series[d].transform((values - term.rows[d])[chosen])
                 for d, values in term.bare.items() if d in self.regression.series}
 
-    def open_rows(self, component: Component) -> Array | None:
+    def nuisance_rows(self, component: Component) -> Array | None:
         """Return what its form leaves open, by its coefficients, (k, w, n); None for nothing.
 
         How friction turns over where it knows no past, and the effect's own deviations.
         """
         if component not in self._open:
-            self._open[component] = self._open_rows(component)
+            self._open[component] = self._nuisance_rows(component)
         return self._open[component]
 
-    def _open_rows(self, component: Component) -> Array | None:
+    def _nuisance_rows(self, component: Component) -> Array | None:
         d = component.drive
         if d is None or not component.names:
             return None
-        rows = np.stack([open_rows(self.design, self.term(component), component.every(unit))
+        rows = np.stack([nuisance_rows(self.design, self.term(component), component.every(unit))
                          for unit in np.eye(len(component.names))])
         return self.regression.series[d].transform(rows) if np.any(rows) else None
 
@@ -254,8 +254,8 @@ class Library:
         """Let go of what scans need; it is computed again if it is asked for."""
         vars(self).pop('_scan', None)
         for local in self.local.values():
-            vars(local).pop('scan', None)
+            vars(local).pop('score_test', None)
 
 
-def _is_felt_everywhere(effect: type[DriveEffect]) -> bool:
+def _acts_everywhere(effect: type[DriveEffect]) -> bool:
     return issubclass(effect, MeasurementEffect) and effect.shifts_positions()

@@ -22,8 +22,8 @@ from pprs_dynamics.inference.search.candidates import (
     bends,
 )
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.expansion import around_fitted, linear_residual
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
+from pprs_dynamics.inference.search.relinearisation import around_fitted, linear_residual
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel

@@ -65,7 +65,7 @@ def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
         rest = regression.remaining(found.fit, d)
         for k in columns:
             rest = rest + found.fit.coefficients[k] * series.transform(design.base[k].rows[d])
-        for blocks in found.doubtful.values():
+        for blocks in found.nuisance.values():
             for block in blocks:
                 if set(block.rows) == {d}:
                     rest = rest + found.fit.of(block) @ block.rows[d]

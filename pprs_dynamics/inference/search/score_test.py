@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What each of many terms would gain beside a fit, all at once at its noise."""
+"""Score tests: what each of many terms would gain beside a fit, all at once at its noise."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Label = TypeVar('Label')
 
 @dataclass(frozen=True)
 class Entry(Generic[Label]):
-    """Some of a scan's rows, which are fitted together.
+    """Some of the rows, which are fitted together.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class _Group(Generic[Label]):
     mean: Array
 
 
-class Scan(Generic[Label]):
+class ScoreTest(Generic[Label]):
     """Entries on some drives.
 
     Parameters

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the form of an effect on a drive leaves open, in proportion to its force.
+"""Nuisance columns: what the form of an effect on a drive leaves open, in proportion to its force.
 
 Friction turns over at reversals in a width that nobody knows, and real effects depart from the
 catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Each gives a column
@@ -21,7 +21,7 @@ from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
 
-def open_rows(design: Design, term: Term, coefficients: Array) -> Array:
+def nuisance_rows(design: Design, term: Term, coefficients: Array) -> Array:
     """Return what a term's form leaves open, (w, M) [N]; (0, M) for nothing.
 
     Parameters

@@ -26,7 +26,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     within,
 )
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.terms import PlacedEffect, Point
+from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
 from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.inference.search.candidates import CandidateSet, bends
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -36,7 +36,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 
 # What the exact model may differ from the linear one by, in whitened squares, and the cost of a set
-# after it was expanded around from before: less changes no cost by more than a rival's margin.
+# after it was relinearised around, from before: less changes no cost by more than a rival's margin.
 LEAST_DIFFERENCE, LEAST_CHANGE = 4.0, 2.0
 MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 5, 6, 4  # how often all of this is repeated
 
@@ -130,7 +130,7 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions,
         For values that no model may have.
     """
     for _ in range(MOST_STEPS):
-        point = next_point(search, found)
+        point = next_operating_point(search, found)
         if point is None:
             break
         search.release()
@@ -141,7 +141,7 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions,
     return search, found
 
 
-def next_point(search: Search, found: CandidateSet) -> Point | None:
+def next_operating_point(search: Search, found: CandidateSet) -> OperatingPoint | None:
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 
     None where the exact forces of the fitted model are those of the linear fit, and columns were
@@ -170,10 +170,10 @@ def next_point(search: Search, found: CandidateSet) -> Point | None:
             loss = squared(search, found, measured - exact_forces(design, target))
         else:
             return None
-    return Point(target, base, effects)
+    return OperatingPoint(target, base, effects)
 
 
-def _is_bent_by(point: Point | None, effects: Sequence[PlacedEffect]) -> bool:
+def _is_bent_by(point: OperatingPoint | None, effects: Sequence[PlacedEffect]) -> bool:
     """Return whether a point has the effects that bend columns, nearly of the same shapes."""
     known = {(one.effect, one.drive): one for one in point.effects} if point else {}
     return all((one.effect, one.drive) in known and all(
@@ -188,7 +188,7 @@ def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
         for name, value in b.coefficients.items()})
 
 
-def expanded(search: Search, found: CandidateSet, decisions: Decisions,
+def relinearised(search: Search, found: CandidateSet, decisions: Decisions,
              ) -> tuple[Search, CandidateSet]:
     """Return what `linearised` does, shapes refined until they stand still.
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much of the error the lack of fit of effects may be.
+"""Model discrepancy: how much of the error the lack of fit of effects may be.
 
 The catalogue's friction, springs and cords are only nearly of the form that real ones have, and so
 is the model's own friction: they may leave a small share of their force. Masses, gravity and
@@ -20,7 +20,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 
-def share_of_allowance(design: Design, regression: Regression, decisions: Decisions,
+def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisions,
                        found: CandidateSet, candidate: Candidate,
                        ) -> tuple[float, tuple[str, ...]]:
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
