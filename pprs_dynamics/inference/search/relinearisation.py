@@ -74,6 +74,7 @@ def _around_fitted(
                               and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
         starts = [one.candidates for one in dict.fromkeys((kept, best))]
+        search.release()
         design, patterns = last.design, search.patterns
         del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
         search = Search(design, decisions, scale, _share_of(
@@ -133,7 +134,6 @@ def linearised(search: Search, found: CandidateSet, decisions: Decisions,
         point = next_operating_point(search, found)
         if point is None:
             break
-        search.release()
         search = Search(search.design.around(point), decisions, search.regression.error_scale,
                         with_unknown=False)
         search.evaluate(())
