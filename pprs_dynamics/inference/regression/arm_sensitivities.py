@@ -75,13 +75,8 @@ class ArmSensitivities(Sensitivities):
         widths = np.stack([self.sensed(column, state) for column in reversal_columns(
             dry, state.velocity, state.direction, np.asarray(self.model.reversal.velocity))])
         columns = {NUMBERS: numbers, OF_DRIVES: widths, HOMING: self._homing(state, reference)}
-        own = {type(effect): effect for effect in self.model.effects
-               if isinstance(effect, StructureEffect)}
         for effect in self.searched:
-            # Around what the model has of it: a body's inertia depends on where it is.
-            around = own.get(effect)
-            values = {} if around is None else around.to_coefficients(around.values)
-            full, bare = self._of_structure(effect, state, reference, values)
+            full, bare = self._of_structure(effect, state, reference, {})
             columns[effect.name] = full
             if issubclass(effect, BodyEffect):
                 columns[BARE + effect.name] = bare

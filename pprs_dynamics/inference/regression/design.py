@@ -48,6 +48,7 @@ from pprs_dynamics.inference.residuals.measuring import join_tables, treated_tab
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct, with_zeros
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
@@ -133,6 +134,8 @@ class Design:
                     shift[:, d] += c * row
         for one in point.effects:
             term = design.find_term(one.effect, one.drive, one.shape)
+            if issubclass(one.effect, AddedBody):
+                term = replace(term, rows=one.effect.around(term.rows, one.coefficients))
             weights = np.array([one.coefficients[name] for name in term.names] or [1.0])
             for d, rows in term.rows.items():
                 shift[:, d] += weights @ rows

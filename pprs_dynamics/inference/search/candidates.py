@@ -37,12 +37,15 @@ class Component:
         Coefficients that are fitted; none where the shape says it all.
     shape : tuple of (str, float)
         Parameters of the shape, by name.
+    centre : tuple of float
+        Of an added body with a first moment: about where it is, from its place's centre [m].
     """
 
     effect: type[CatalogueEffect]
     drive: int | None
     names: tuple[str, ...]
     shape: tuple[tuple[str, float], ...] = ()
+    centre: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],

@@ -16,6 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -33,6 +34,7 @@ from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
+NEAR = 1e-3  # [m], within which a body is where its columns are
 LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 
 SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
@@ -199,11 +201,17 @@ class FittedSets:
         """Return candidates with shapes after one Gauss-Newton step, by `longest` reaches at most.
         """
         slopes = self.slopes(found)
-        if not slopes:
+        moved: dict[Component, Component] = {}
+        for component in found.blocks:
+            if component.centre:
+                centre = centre_of(component.effect, component.names,
+                                   found.coefficients(component), self.design.given)
+                if max(abs(a - b) for a, b in zip(centre, component.centre, strict=True)) > NEAR:
+                    moved[component] = replace(component, centre=centre)
+        if not slopes and not moved:
             return None
         fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
                                  found.fit.amplitudes)
-        moved: dict[Component, Component] = {}
         for component, block in slopes:
             effect, shape, reach = component.effect, component.parameters, self._reach(component)
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):

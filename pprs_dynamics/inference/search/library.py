@@ -18,6 +18,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.nuisance_columns import nuisance_rows
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.inference.search.body_centres import about_centre, find_centre, has_centre
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -97,6 +98,7 @@ class Library:
     def __init__(self, design: Design, regression: Regression, prices: Prices) -> None:
         self.design, self.regression, self.prices = design, regression, prices
         self._terms: dict[Hashable, Term] = {}
+        self._centres: dict[Hashable, tuple[float, ...]] = {}
         self._blocks: dict[Component, Block] = {}
         self._open: dict[Component, Array | None] = {}
         self._ranges: dict[Hashable, Mapping[str, tuple[float, float, int]]] = {}
@@ -105,10 +107,21 @@ class Library:
         self.spanning = [Component.of(effect, d, {}, names)
                          for effect in acting for d in regression.drives
                          if design.acts_on(effect, d) for names in effect.variants]
-        self.structure = [Component.of(term.effect, None, {}, names) for term in design.structure
+        self.structure = [self._placed(term, names) for term in design.structure
                           for names in term.effect.variants
                           if any(np.any(rows[[term.names.index(name) for name in names]])
                                  for rows in term.rows.values())]
+
+    def _placed(self, term: Term, names: tuple[str, ...]) -> Component:
+        """Return an effect in the structure, a body where it is most likely to be."""
+        found = Component.of(term.effect, None, {}, names)
+        if not has_centre(term.effect, names):
+            return found
+        key = (term.effect, names[0])
+        if key not in self._centres:
+            self._centres[key] = find_centre(term, names[0], self.design.residuals.error,
+                                             self.regression.error_scale, self.design.given)
+        return replace(found, centre=self._centres[key])
 
     @cached_property
     def _scan(self) -> ScoreTest[Component]:
@@ -135,10 +148,11 @@ class Library:
 
     def term(self, component: Component) -> Term:
         """Return the rows in time of a component, of all of its effect's coefficients."""
-        key = (component.effect, component.drive, component.shape)
+        key = (component.effect, component.drive, component.shape, component.centre)
         if key not in self._terms:
-            self._terms[key] = self.design.find_term(
-                component.effect, component.drive, component.parameters)
+            term = self.design.find_term(component.effect, component.drive, component.parameters)
+            self._terms[key] = (about_centre(term, component.names[0], component.centre)
+                                if component.centre else term)
         return self._terms[key]
 
     def block(self, component: Component) -> Block:

@@ -131,7 +131,8 @@ class Search(ScannedSets):
             new += [self.evaluate(more) for more in self.proposals(found, 1)
                     if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
-        shaped = [one for one in new if any(c.effect.shape for c in one.effects)]
+        shaped = [one for one in new if any(c.effect.shape or c.components[0].centre
+                                                for c in one.effects)]
         for number, found in enumerate(sorted(shaped, key=lambda one: one.cost)):
             # The first effect decides which way the search goes.
             if number < REFINED or len(found.candidates) == 1:

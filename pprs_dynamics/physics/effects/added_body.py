@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import body_at
@@ -17,6 +18,7 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
 AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 Place = tuple[str, str, tuple[float, float, float], float]
+OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS
 KEPT = 0.05  # of a body that cannot be taken off it
 
 
@@ -125,6 +127,45 @@ class AddedBody(BodyEffect):
         return {name: values.get(name, 0.0) for prefix, *_ in cls.places
                 for name in (f'{prefix}{one}' for one in ('mass', *MOMENTS, *PRODUCTS))}
 
+    @classmethod
+    def around(cls, rows: Mapping[int, Array], coefficients: Mapping[str, float],
+               ) -> dict[int, Array]:
+        """Return columns by drive, exact for the bodies of some coefficients."""
+        found = dict(rows)
+        for prefix, *_ in cls.places:
+            if mass := coefficients.get(f'{prefix}mass', 0.0):
+                away = np.array([coefficients.get(f'{prefix}moment_{axis}', 0.0) / mass
+                                 for axis in AXES])
+                found = {d: cls.rows_about(prefix, one, away) for d, one in found.items()}
+        return found
+
+    @classmethod
+    def rows_about(cls, prefix: str, rows: Array, away: Array) -> Array:
+        """Return the columns of a body's coefficients where its centre is elsewhere.
+
+        Efforts are linear in mass, first moment and inertia, but the inertia of a body grows with
+        the square of its distance: m [I(c)], homogeneous in m and m c. Its derivatives are
+        therefore columns without a constant, exact for a body whose centre is at `away`.
+
+        Parameters
+        ----------
+        prefix : str
+            Of the place.
+        rows : (k, ...) array
+            By coefficient, for a body at the place's centre.
+        away : (3,) array
+            From that centre [m].
+        """
+        known = [c.name for c in cls.coefficients]
+        turning = rows[[known.index(f'{prefix}{axes}') for axes in (*MOMENTS, *PRODUCTS)]]
+        found = rows.copy()
+        half = _turned(away, away)[OF_MOMENTS] / 2
+        found[known.index(f'{prefix}mass')] -= np.tensordot(half, turning, 1)
+        for k, axis in enumerate(AXES):
+            found[known.index(f'{prefix}moment_{axis}')] += np.tensordot(
+                _turned(away, np.eye(3)[k])[OF_MOMENTS], turning, 1)
+        return found
+
     def changed(self, robot: Mechanism) -> Mechanism:
         """Return the mechanism with the bodies."""
         for prefix, link, centre, _ in self.places:
@@ -138,7 +179,9 @@ class AddedBody(BodyEffect):
             if mass:
                 body = body_at(mass, tuple(np.array(centre) + moment / mass), inertia)
             else:
-                body = np.array([0.0, *moment, xx, xy, yy, xz, yz, zz])
+                # What a body of some mass changes by where its centre does.
+                inertia = inertia + _turned(np.array(centre), moment)
+                body = np.array([0.0, *moment, *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
             robot = robot.with_body(link, body)
         return robot
 
@@ -151,6 +194,13 @@ class AddedBody(BodyEffect):
         """Return the bodies that are there."""
         return nested({name: value for name, value in self.values.items()
                        if value or not name.count('.')})
+
+
+def _turned(centre: Array, moment: Array) -> Array:
+    """Return by how much an inertia about a point grows as a first moment is added, (3, 3)."""
+    both = np.outer(centre, moment)
+    grown: Array = 2 * np.trace(both) * np.eye(3) - both - both.T
+    return grown
 
 
 def flattened(values: Any) -> Any:

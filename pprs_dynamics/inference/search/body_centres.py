@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where an added body is, so that its columns hold its inertia.
+
+The inertia of a body about a joint grows with the square of its distance, which no column that is
+linear in its mass and first moment says. Columns are taken about the centre of the point mass that
+explains the error best, and moved with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.physics.effects.added_body import AXES, MOMENTS, PRODUCTS, AddedBody
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+
+if TYPE_CHECKING:
+    from pprs_dynamics.physics.model.force_model import ForceModel
+
+REACH = 4.0  # of the mechanism's size, the mean distance of its joints: what hangs on it is within
+STARTS = np.vstack((np.zeros(3), np.eye(3), -np.eye(3))) / 8  # of the reach
+PULL = 1e-3  # of the error, by which a body at that reach is pulled to its place
+
+
+def has_centre(effect: type[CatalogueEffect], names: tuple[str, ...]) -> bool:
+    """Return whether coefficients are of a body with a first moment."""
+    return issubclass(effect, AddedBody) and len(names) > 1
+
+
+def about_centre(term: Term, mass: str, centre: tuple[float, ...]) -> Term:
+    """Return the term with columns for a body at a centre; `mass` names its mass."""
+    assert issubclass(term.effect, AddedBody)
+    kind, prefix, away = term.effect, mass.removesuffix('mass'), np.array(centre)
+
+    def moved(rows: Mapping[int, Array]) -> dict[int, Array]:
+        return {d: kind.rows_about(prefix, one, away) for d, one in rows.items()}
+    return replace(term, rows=moved(term.rows),
+                   bare=None if term.bare is None else moved(term.bare))
+
+
+def centre_of(effect: type[CatalogueEffect], names: tuple[str, ...], c: Array,
+              model: ForceModel) -> tuple[float, ...]:
+    """Return where a body of these coefficients is, within the reach."""
+    size = reach_of(model)
+    known = dict(zip(names, c.tolist(), strict=True))
+    prefix = names[0].removesuffix('mass')
+    mass = known[names[0]]
+    away = np.array([known[f'{prefix}moment_{axis}'] for axis in AXES])
+    return tuple(np.clip(away / mass if mass else 0 * away, -size, size).tolist())
+
+
+def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
+                model: ForceModel) -> tuple[float, ...]:
+    """Return the centre of the point mass that explains an error best, from its place [m].
+
+    Parameters
+    ----------
+    term : Term
+        Of an `AddedBody`.
+    mass : str
+        Coefficient of its mass at the place.
+    error : (M, D) array
+    scale : mapping of drive to float
+        Of each drive's error.
+    model : ForceModel
+    """
+    prefix, size = mass.removesuffix('mass'), reach_of(model)
+    at = [term.names.index(prefix + name) for name in (
+        'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
+    stacked = np.concatenate([np.vstack((term.rows[d][at], error[:, d]))[:, known] / max(one, 1e-12)
+                              for d, one in scale.items() if d in term.rows
+                              for known in [np.isfinite(error[:, d])]], axis=1)
+    reduced: Array = np.asarray(np.linalg.qr(stacked.T, mode='r'), dtype=float)
+    weight = PULL * float(np.linalg.norm(reduced[:, -1]))
+
+    def columns(away: Array) -> Array:
+        d = size * away
+        C = d @ d * np.eye(3) - np.outer(d, d)
+        turned = C[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        found: Array = reduced[:, :-1] @ np.concatenate(([1.0], d, turned))
+        return found
+
+    def left(away: Array) -> Array:
+        column = columns(away)
+        m = column @ reduced[:, -1] / max(float(column @ column), 1e-300)
+        return np.concatenate((reduced[:, -1] - m * column, weight * away))
+
+    best = min((least_squares(left, start, bounds=(-1, 1), max_nfev=40) for start in STARTS),
+               key=lambda one: float(one.cost))
+    return tuple((size * best.x).tolist())
+
+
+def reach_of(model: ForceModel) -> float:
+    """Return how far from its place a body may be [m]."""
+    size: float = model.robot.structure.size  # type: ignore[attr-defined]
+    return REACH * size
