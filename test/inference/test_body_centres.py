@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A body far from its link's centre: its columns hold its inertia."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+
+from pprs_dynamics import ArmModel
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.body_centres import find_centre
+from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
+from pprs_dynamics.physics.mechanism.description import body_at
+
+MASS = 4.0
+
+
+def test_the_columns_about_a_centre_are_exact_for_a_body_there(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    kind = model.bound(LinkMass)
+    prefix, link, centre, _ = kind.places[0]
+    away = np.array([0.3, -0.2, 0.5])
+    rng = np.random.default_rng(2)
+    q, v, a = rng.uniform(-1, 1, (3, 25, 3))
+    none = model.robot.torques(q, v, a)
+    rows = np.stack([kind.at({c.name: 1.0}).changed(model.robot).torques(q, v, a) - none
+                     for c in kind.coefficients])
+    names = [c.name for c in kind.coefficients]
+    c = np.zeros(len(names))
+    c[names.index(f'{prefix}mass')] = MASS
+    for axis, d in zip('xyz', away, strict=True):
+        c[names.index(f'{prefix}moment_{axis}')] = MASS * d
+    heavier = model.robot.with_body(link, body_at(MASS, tuple(centre + away), np.zeros((3, 3))))
+    expected = heavier.torques(q, v, a) - none
+    about = kind.rows_about(prefix, rows, away)
+    assert np.tensordot(c, about, 1) == pytest.approx(expected, abs=1e-9)
+    # Without its inertia it would be another force.
+    assert np.abs(np.tensordot(c, rows, 1) - expected).max() > 0.1 * np.abs(expected).max()
+
+
+def test_the_centre_is_found_from_the_error(tmp_path: Path) -> None:
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    real = arm.real_arm(tmp_path)
+    kind = model.bound(LinkMass)
+    name = model.robot.body_names[1]
+    prefix, link, centre, _ = next(one for one in kind.places if one[1] == name)
+    away = np.array([0.1, 0.3, -0.2])
+    real = replace(real, robot=real.robot.with_body(
+        link, body_at(MASS, tuple(centre + away), np.zeros((3, 3)))))
+    design = Design.of(arm.real_arm(tmp_path), [arm.record(real, arm.motion(20.0), 0.01)])
+    term = next(one for one in design.structure if one.effect is kind)
+    found = find_centre(term, f'{prefix}mass', design.residuals.error,
+                        dict.fromkeys(range(3), 1.0), design.given)
+    assert found == pytest.approx(away, abs=0.02)
