@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A real closed chain with a weight that the model does not have. Its data is not in the package.
+
+A part of each run, and the base model fitted to that part: short enough to be run every time.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import ArmModel
+from pprs_dynamics.inference.fit.arm_columns import columns_of
+from pprs_dynamics.inference.fit.arm_fit import fit_arm
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
+
+sys.path.insert(0, str(Path(__file__).parents[2] / 'docs'))
+
+import closed_chain
+
+DATA = closed_chain.find_data()
+pytestmark = pytest.mark.skipif(
+    DATA is None, reason='no recordings in ../shared/data/dvrk or below PPRS_DATA')
+PART = 12.0  # [s], a period of the path
+LEVER = 0.105 * 0.535  # [kg m], the weight on the front link and its place above the pitch axis
+
+
+def part_of(model: ArmModel, name: str) -> Recording:
+    """Return the first seconds of a recording."""
+    assert DATA is not None
+    whole = read_recording(DATA / name, model.recorded)
+    end = int(np.searchsorted(whole.time, whole.time[0] + PART))
+    return replace(whole, segments=(slice(0, end),))
+
+
+@pytest.fixture(scope='module')
+def base(tmp_path_factory: pytest.TempPathFactory) -> ArmModel:
+    """Return the base model of a part of the free run."""
+    assert DATA is not None
+    folder = tmp_path_factory.mktemp('dvrk')
+    shutil.copyfile(DATA / 'psm.urdf', folder / 'psm.urdf')
+    (folder / 'psm.yaml').write_text(closed_chain.model_text())
+    model = ArmModel.load(folder / 'psm.yaml')
+    return fit_arm(model, columns_of(model, [part_of(model, closed_chain.FREE)])).model
+
+
+def test_friction_of_the_base_turns_over_within_the_motion(base: ArmModel) -> None:
+    """A width beyond the speeds would make a curve of dry friction, and drives that do not move."""
+    run = part_of(base, closed_chain.FREE)
+    design = Design.of(base, [run])
+    assert all(design.moves(d) for d in range(3))
+    error = closed_chain.share(closed_chain.relative_below(base, [run]))
+    assert np.all(np.array(error) < [0.093, 0.178, 0.191])  # published, on another path
+
+
+def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: ArmModel) -> None:
+    search = Search(Design.of(base, [part_of(base, 'load_insertion_105_fast.csv.gz')]), DECISIONS)
+    found = [search.refined(search.evaluate((EffectCandidate.of([component]),)))
+             for component in search.library.structure]
+    best = min(found, key=lambda one: one.cost)
+    (candidate,) = best.effects
+    assert candidate.claim == 'link_mass:back_link'
+    assert candidate.effect.places_of(candidate.components[0].names) == (
+        ('back_link', 'front_link', 'rocker'),)
+    values = candidate.components[0].values(best.coefficients(candidate.components[0]))
+    lever = values['back_link.mass'] * values['back_link.z']
+    assert lever == pytest.approx(LEVER, rel=0.15)  # of 12 s, with the base of 12 s
