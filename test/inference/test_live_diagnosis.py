@@ -75,7 +75,7 @@ def test_what_numbers_within_their_tolerance_explain_keeps_no_effect_alive() -> 
     values = DriveModel.load().values
     model = DriveModel.from_parameters({**values, 'tolerances.masses.payload': 0.05})
     real = {**values, 'masses.payload': 1.04 * values['masses.payload']}
-    pushed = {'effects.active': ('effort_offset',), 'effects.effort_offset.slide_1.force': 0.3}
+    pushed = {'effects.active': ('effort_offset',), 'effects.effort_offset.slide_1.force': 0.06}
     robot = DriveModel.from_parameters(real)
     live = LiveDiagnosis(model)
     live = live.with_window(window(robot, DriveModel.from_parameters({**real, **pushed}), 2), 0.0)
