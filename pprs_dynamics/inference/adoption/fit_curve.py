@@ -33,7 +33,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import (
 )
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-INTERVALS = (6, 12, 24, 48, 96)  # between knots, tried
+INTERVALS = (6, 12, 24, 48, 96, 192)  # between knots, tried
 # Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
 ROUGHNESS = np.geomspace(1e-3, 3.0, 15)
 WIDEST = 10.0  # prior standard deviation of the curve itself, as a multiple of the error's rms
