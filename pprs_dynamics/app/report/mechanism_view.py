@@ -91,14 +91,16 @@ def draw_mechanism(model: ArmModel, title: str) -> Any:
     home = s.home[None, s.tables.drives]
     drawn = Skeleton.of(model, JointMotion(home, np.zeros_like(home), np.zeros_like(home)))
     placed = drawn.points[0]
-    links = np.concatenate([[placed[line.start], placed[line.end], np.full(3, np.nan)]
-                            for line in drawn.lines])
+    around = zip(drawn.face, (*drawn.face[1:], *drawn.face[:1]), strict=True)
+    links = np.concatenate([
+        [placed[start], placed[end], np.full(3, np.nan)]
+        for start, end in (*((line.start, line.end) for line in drawn.lines), *around)])
     figure = make_subplots(1, 2, subplot_titles=('from the front', 'from above'))
     for column, (across, up) in enumerate(((0, 2), (0, 1)), 1):
         marks = [(f'{role} joints', colour, 'circle', {
             name: placed[at] for name, at in drawn.joints.items()
             if _role(model, name) == role})
-            for role, colour in COLOURS.items()]
+            for role, colour in reversed(COLOURS.items())]  # driven ones above passive ones
         marks.append(('loops', LOOP, 'diamond', {
             name: placed[at] for name, at in drawn.loops.items()}))
         figure.add_trace(go.Scatter(

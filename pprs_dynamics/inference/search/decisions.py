@@ -31,7 +31,7 @@ class Decisions:
         0.01, '1', 'prior odds of friction, mass or stiffness with the wrong sign',
         'physically impossible as such, but a model may have too much of it')
     unusual_odds: float = _number(
-        0.01, '1', "prior odds that a drive's zero or gain is not as stated",
+        0.1, '1', "prior odds that a drive's zero or gain is not as stated",
         'makers state gains, and zeros are set when a machine is put up')
     unknown_odds: float = _number(
         0.01, '1', 'prior odds of a form that is in no catalogue, against one that is',
