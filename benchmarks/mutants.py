@@ -55,7 +55,7 @@ TESTS = {
                                           'inference/test_noise.py'),
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
     'inference/search/model_discrepancy.py': ('inference/test_gates.py',),
-    'inference/search/search.py': ('inference/test_hypothesis_space.py',),
+    'inference/search/search.py': ('inference/test_search.py',),
     'inference/adoption/objections.py': ('inference/test_gates.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),
     'app/fleet/changes.py': ('app/test_changes.py',),

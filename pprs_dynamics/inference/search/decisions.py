@@ -30,9 +30,12 @@ class Decisions:
     wrong_sign_odds: float = _number(
         0.01, '1', 'prior odds of friction, mass or stiffness with the wrong sign',
         'physically impossible as such, but a model may have too much of it')
-    unusual_odds: float = _number(
-        0.1, '1', "prior odds that a drive's zero or gain is not as stated",
-        'makers state gains, and zeros are set when a machine is put up')
+    zero_odds: float = _number(
+        0.1, '1', "prior odds that a drive's zero is not as stated",
+        'zeros are set when a machine is put up, and lost with a count or a screw')
+    gain_odds: float = _number(
+        0.01, '1', "prior odds that a drive's gain is not as stated",
+        'makers calibrate gains; a free one takes on inertia and friction that forms leave over')
     unknown_odds: float = _number(
         0.01, '1', 'prior odds of a form that is in no catalogue, against one that is',
         'a free curve imitates effects; it has to be much better to be believed')

@@ -247,9 +247,12 @@ class Library:
         usual = self._expected(component)
         if not np.any(usual):
             return 0.0
-        both = self.block(component).precision
+        decisions, both = self.prices.decisions, self.block(component).precision
+        is_zero = (issubclass(component.effect, MeasurementEffect)
+                   and component.effect.shifts_positions())
+        odds = decisions.zero_odds if is_zero else decisions.gain_odds
         return float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1]
-                     - 2 * np.log(self.prices.decisions.unusual_odds))
+                     - 2 * np.log(odds))
 
     def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
         """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
