@@ -12,6 +12,7 @@ import pytest
 from made_up_arm import real_arm
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.search.body_centres import REACH
 from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.inference.search.possible_bodies import nearest_possible
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -81,5 +82,5 @@ def test_a_moment_has_a_mass_within_reach(robot: Mechanism, tmp_path: Path) -> N
     found = nearest_possible(robot, component, np.array([0.0, 0.5, 0.0, 0.0]),
                              np.diag([1.0, 0.01, 0.01, 0.01]) ** 2)
     assert found is not None
-    assert np.linalg.norm(found[1:]) <= robot.structure.size * found[0] * (1 + 1e-9)
+    assert np.linalg.norm(found[1:]) <= REACH * robot.structure.size * found[0] * (1 + 1e-9)
     assert found[0] > 0.1

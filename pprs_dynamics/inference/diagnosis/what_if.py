@@ -250,7 +250,7 @@ class _System:
                   for column in self.columns[block]),
             tuple((column, bounds[name]) for name, column in zip(
                 placement.names, self.columns[own[0]], strict=False) if name in bounds),
-            self.search.prices.of_component(effect, self.search.library.tried(placement))
+            self.search.library.component_price(placement)
             - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
             tuple(sorted(map(str, effect.hypotheses(placement.names)))))
 

@@ -292,18 +292,15 @@ class Prices:
         some = max(D - 2, 1) if 1 < count < D else 1
         return 2 * log(min(D, 3)) + 2 * log(some) + 2 * log(comb(D, count))
 
-    def of_candidate(self, candidate: Candidate, tried: Callable[[Component], int]) -> float:
-        """Return the price of what was chosen: hypotheses, drives, variants and shapes.
-
-        `tried` says how many shapes of a component there were.
-        """
+    def of_candidate(self, candidate: Candidate,
+                     component_price: Callable[[Component], float]) -> float:
+        """Return the price of what was chosen: hypotheses, drives, and each component."""
         if isinstance(candidate, UnknownCandidate):
             return candidate.price
         price = len(candidate.hypotheses) * self.of_name()
         if candidate.drives is not None:
             price += self.of_drives(len(candidate.components))
-        return price + sum(self.of_component(one.effect, tried(one))
-                           for one in candidate.components)
+        return price + sum(component_price(one) for one in candidate.components)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
         """Return the price of a variant and of a shape among those tried.

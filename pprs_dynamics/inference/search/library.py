@@ -230,14 +230,16 @@ class Library:
                 self.local[component.drive].trials.get(component.effect.name, 1))
 
     def price(self, candidate: Candidate) -> float:
-        """Return the price of everything that was chosen.
+        """Return the price of everything that was chosen."""
+        return self.prices.of_candidate(candidate, self.component_price)
+
+    def component_price(self, component: Component) -> float:
+        """Return the price of a component beside that of its candidate's hypotheses and drives.
 
         That an effect is usually small makes large values unlikely, and small ones no likelier.
         """
-        price = self.prices.of_candidate(candidate, self.tried)
-        if isinstance(candidate, UnknownCandidate):
-            return price
-        return price + sum(self._narrowed(one) for one in candidate.components)
+        return (self.prices.of_component(component.effect, self.tried(component))
+                + self._narrowed(component))
 
     def _narrowed(self, component: Component) -> float:
         """Return what it costs that a component is not as usual, in deviance.

@@ -69,7 +69,7 @@ class ScannedSets(FittedSets):
         best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Component]] = {}
         for one, gain in offers:
             key = (one.effect, one.drive)
-            net = gain - self.prices.of_component(one.effect, library.tried(one))
+            net = gain - library.component_price(one)
             if key not in taken and (key not in best or net > best[key][0]):
                 best[key] = (net, one)
         found: dict[type[CatalogueEffect], list[tuple[float, Component]]] = {}
