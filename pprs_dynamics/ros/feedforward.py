@@ -57,7 +57,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._current: Any = None
-        self._subscriptions: list[Any] = []
+        self._inputs: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
         self._failure: Exception | None = None
         parameters = parameters_for(drive_count(self))
@@ -143,7 +143,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self, lambda: self._settings.own['command_timeout'], self._on_stale)
         self._create_parts()
         # Raw: message objects of a long trajectory would take longer than the model.
-        self._subscriptions = [
+        self._inputs = [
             subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
                          raw=True, profile=UNANSWERED)
             for topic, reader in self._readers.items()]
@@ -167,7 +167,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 self._parts[name] = publisher(self, JointState, f'~/effort/{name}')
 
     def _destroy_topics(self) -> None:
-        for each in self._subscriptions:
+        for each in self._inputs:
             self.destroy_subscription(each)
         if self._watchdog is not None:
             self._watchdog.destroy()
@@ -175,7 +175,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             if each is not None:
                 self.destroy_publisher(each)
         self._watchdog = self._current = None
-        self._subscriptions, self._publishers_made, self._parts = [], [], {}
+        self._inputs, self._publishers_made, self._parts = [], [], {}
 
     def _use_settings(self) -> None:
         self._feedforward.use(self._settings.model, self._settings.own)

@@ -16,12 +16,14 @@ import numpy as np
 import pytest
 from feedforward_bench import EQUAL, message_of, random_motion
 from node_bench import bench
+from rclpy import node as rclpy_node
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from ros_processes import environment, node_process
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+import pprs_dynamics
 from pprs_dynamics.ros.node import rclpy_internals
 from pprs_dynamics.ros.node.provenance import names_given
 
@@ -179,3 +181,24 @@ def test_no_other_file_of_the_nodes_uses_names_that_are_not_public() -> None:
     assert found.pop('rclpy_internals.py')
     # The system's own way to end a process.
     assert {name for names in found.values() for name in names} <= {'_exit'}
+
+
+def test_no_attribute_of_a_node_takes_the_place_of_rclpys() -> None:
+    """A node of ours that had its own `_subscriptions` heard no /clock any more."""
+    def nodes(path: Path) -> dict[str, set[str]]:
+        """Return the private attributes that each class of nodes in a file sets."""
+        found = {}
+        for each in ast.walk(ast.parse(path.read_text())):
+            if isinstance(each, ast.ClassDef) and (each.name == 'Node' or any(
+                    'Node' in ast.unparse(base) for base in each.bases)):
+                found[each.name] = {
+                    one.attr for one in ast.walk(each)
+                    if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store)
+                    and ast.unparse(one.value) == 'self' and one.attr.startswith('_')}
+        return found
+    taken = nodes(Path(rclpy_node.__file__))['Node']
+    assert {'_subscriptions', '_publishers', '_timers'} <= taken
+    ours = {name: found for path in (Path(pprs_dynamics.__file__).parent / 'ros').rglob('*.py')
+            for name, found in nodes(path).items()}
+    assert len(ours) >= 5
+    assert {name: found & taken for name, found in ours.items() if found & taken} == {}
