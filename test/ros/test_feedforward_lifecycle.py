@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import time
 from collections.abc import Iterator
@@ -240,3 +241,15 @@ def test_a_publisher_that_disappears_and_returns_is_stale_and_then_recovered() -
         node.connect()
         assert node.answer(MESSAGE) == answer
         node.wait_for_status(code='OK')
+
+
+def test_a_destroyed_node_leaves_the_graph_also_where_nothing_is_collected() -> None:
+    """Of objects that are frozen, as a node freezes its own, no circle is ever found."""
+    with bench() as watching:
+        with feedforward_bench() as node:
+            def is_seen() -> bool:
+                return 'feedforward' in watching.probe.get_node_names()
+            gc.freeze()
+            assert watching.spin_until(is_seen, 20)
+            assert node.bench.spin_until(lambda: node.bench.status)
+        assert watching.spin_until(lambda: not is_seen(), 20)

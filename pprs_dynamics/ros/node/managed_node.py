@@ -10,6 +10,8 @@ from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from pprs_dynamics.ros.node.rclpy_internals import destroy_state_machine
+
 CHANGE_STATE = '/change_state'
 
 
@@ -60,6 +62,11 @@ class ManagedNode(LifecycleNode):
         self.state = ('unconfigured' if outcome == TransitionCallbackReturn.SUCCESS
                       else 'finalized')
         return outcome
+
+    def destroy_node(self) -> None:
+        """Leave the graph."""
+        super().destroy_node()
+        destroy_state_machine(self)
 
     def _refusing(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         """Return a service's callback that answers no instead of raising.

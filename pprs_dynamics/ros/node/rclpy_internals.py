@@ -17,6 +17,7 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
@@ -39,6 +40,7 @@ NAMES = {
     'GuardCondition': ('pointer',),
 }
 OVERRIDES = '_parameter_overrides'
+STATE_MACHINE = '_state_machine'
 _CHANGED = (AttributeError, TypeError)
 
 
@@ -130,6 +132,17 @@ def call_if_due(timer: Timer) -> bool:
     except _CHANGED as error:
         raise InternalsChangedError(f'Timer: {error}') from error
     return bool(due)
+
+
+def destroy_state_machine(node: LifecycleNode) -> None:
+    """Let go of what rclpy leaves of a destroyed managed node.
+
+    Its state machine holds the node, and with it the DDS participant, until Python's garbage
+    collection finds the circle; of frozen objects it never does.
+    """
+    machine = getattr(node, STATE_MACHINE, None)
+    if hasattr(machine, 'destroy_when_not_in_use'):
+        machine.destroy_when_not_in_use()
 
 
 def parameter_overrides(
