@@ -140,7 +140,7 @@ def destroy_state_machine(node: LifecycleNode) -> None:
     Its state machine holds the node, and with it the DDS participant, until Python's garbage
     collection finds the circle; of frozen objects it never does.
     """
-    machine = getattr(node, STATE_MACHINE, None)
+    machine: Any = getattr(node, STATE_MACHINE, None)
     if hasattr(machine, 'destroy_when_not_in_use'):
         machine.destroy_when_not_in_use()
 
