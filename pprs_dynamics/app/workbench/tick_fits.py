@@ -209,7 +209,7 @@ class TickFits:
         for one in tick.best.components:
             shape = {name: tick.chosen.get((one.drive, name), value)
                      for name, value in one.shape}
-            placements.append(Component.of(tick.effect, one.drive, shape, one.names))
+            placements.append(replace(one, shape=tuple(sorted(shape.items()))))
         return EffectCandidate.of(placements)
 
     # Fits

@@ -36,6 +36,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
 )
 from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.body_centres import about_centre
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
@@ -64,6 +65,8 @@ class FittedTerm:
         Coefficients that are fitted.
     values : (k,) array
         Theirs; 1 where the shape says it all.
+    centre : tuple of float
+        Of an added body, about which its columns are; see `Component`.
     """
 
     effect: type[CatalogueEffect]
@@ -71,6 +74,7 @@ class FittedTerm:
     shape: Mapping[str, float]
     names: tuple[str, ...]
     values: Array
+    centre: tuple[float, ...] = ()
 
     @classmethod
     def at_scale(cls, effect: type[CatalogueEffect], drive: int | None,
@@ -104,6 +108,8 @@ class FittedTerm:
     def rows(self, design: Design) -> Rows:
         """Return its columns on recordings or on a motion."""
         term = design.find_term(self.effect, self.drive, self.shape)
+        if self.centre:
+            term = about_centre(term, self.names[0], self.centre)
         chosen = [term.names.index(name) for name in self.names] or [0]
         rows = {d: values[chosen] for d, values in term.rows.items()}
         if self.shape:

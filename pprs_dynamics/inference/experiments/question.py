@@ -230,7 +230,8 @@ class _Terms:
         parts = []
         for one in candidate.components:
             values = found.coefficients(one)
-            term = FittedTerm(candidate.effect, one.drive, one.parameters, one.names, values)
+            term = FittedTerm(candidate.effect, one.drive, one.parameters, one.names, values,
+                              one.centre)
             parts.append((self._once(term), values))
         return parts
 
@@ -248,7 +249,8 @@ class _Terms:
         return more
 
     def _once(self, term: FittedTerm) -> FittedTerm:
-        key = (term.effect, term.drive, tuple(sorted(term.shape.items())), term.names)
+        key = (term.effect, term.drive, tuple(sorted(term.shape.items())), term.names,
+               term.centre)
         return self._found.setdefault(key, term)
 
 

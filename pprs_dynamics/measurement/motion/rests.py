@@ -11,6 +11,7 @@ from pprs_dynamics.arrays import Array
 
 SHORTEST_REST = 0.5  # [s]; reversals of a motion are over sooner
 GLANCE = 0.1  # [s] over which speeds are taken to tell motion from rest
+NORMAL_MEDIAN = 0.6745  # of standard deviations: median size of what is normally distributed
 RESOLVED = 4.0  # steps, or deviations of the noise, of a measured position, that are no motion
 
 
@@ -69,8 +70,9 @@ def resolution(position: Array) -> Array:
     """Return how finely positions (N, D) are measured, (D,): an encoder's step, or the noise."""
     steps = np.abs(np.diff(position, axis=0))
     finest = np.min(np.where(steps > 0, steps, np.inf), axis=0, initial=np.inf)
-    # Third differences of a motion are small, those of white noise have 20 times its variance.
-    noise = np.sqrt(np.mean(np.diff(position, 3, axis=0) ** 2, axis=0) / 20) if (
-        len(position) > 3) else np.zeros_like(finest)
+    # Third differences of a motion are small, those of white noise have 20 times its variance;
+    # their median, as a gap of the recording is a jump in it.
+    noise = (np.median(np.abs(np.diff(position, 3, axis=0)), axis=0) / (NORMAL_MEDIAN * 20 ** 0.5)
+             if len(position) > 3 else np.zeros_like(finest))
     found: Array = np.maximum(np.where(np.isfinite(finest), finest, 0.0), noise)
     return found

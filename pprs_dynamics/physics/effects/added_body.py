@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -62,8 +63,9 @@ class AddedBody(BodyEffect):
         self._linear = self.to_coefficients(self.values)
 
     @classmethod
+    @cache
     def on(cls, places: tuple[Place, ...],
-           alike: tuple[tuple[str, ...], ...] = ()) -> type[Self]:
+           alike: tuple[tuple[str, ...], ...]) -> type[Self]:
         """Return the effect with these places.
 
         Of links that are alike the first stands for all with a body anywhere; with a mass more
@@ -85,7 +87,8 @@ class AddedBody(BodyEffect):
                           (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
         made: type[Self] = type(cls.__name__, (cls,), {
             'places': places, 'linear': linear, 'coefficients': coefficients,
-            'variants': tuple(names), 'alike': others, '__module__': cls.__module__})
+            'variants': tuple(names), 'alike': others, '__module__': cls.__module__,
+            'made_by': (cls.on, (places, alike))})
         return made
 
     @classmethod

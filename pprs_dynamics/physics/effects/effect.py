@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
+import copyreg
 import math
-from abc import ABC, abstractmethod
+from abc import ABC, ABCMeta, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -147,7 +148,22 @@ class Card:
     reference: str
 
 
-class CatalogueEffect(Effect):
+class EffectType(ABCMeta):
+    """Type of the effects of the catalogue.
+
+    An effect with the parameters that it has on one robot is a class that no module holds: it is
+    pickled as the function that makes it and that function's arguments, in `made_by`.
+    """
+
+
+def _reduced(effect: EffectType) -> Any:
+    return vars(effect).get('made_by', effect.__qualname__)
+
+
+copyreg.pickle(EffectType, _reduced)
+
+
+class CatalogueEffect(Effect, metaclass=EffectType):
     """An effect that a model file may add under `effects`, with values for its parameters.
 
     What is fitted is linear in `coefficients`, which are the linear parameters unless a subclass

@@ -15,7 +15,7 @@ with Triangular Platform, 2007, on the friction of revolute and ball joints.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache, partial
+from functools import cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -148,7 +148,8 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
         bounds.update({f'{name}.{last}': 0.0 for last in ('viscous', 'torque', 'coulomb')})
     return type('JointFrictionEffect', (JointFrictionEffect,), {
         'linear': tuple(linear), 'variants': tuple(variants), 'radii': dict(joints),
-        'unphysical_below': bounds, 'alike': others, '__module__': __name__})
+        'unphysical_below': bounds, 'alike': others, '__module__': __name__,
+        'made_by': (_in_joints, (joints, alike))})
 
 
 class LinkageFriction(Effect):
@@ -165,9 +166,15 @@ class LinkageFriction(Effect):
 
     def __init__(self, structure: Structure, blocks: Mapping[str, Mapping[str, float]]) -> None:
         self.structure, self.blocks = structure, {name: dict(one) for name, one in blocks.items()}
-        self.table = cache(partial(friction_table, structure, self.blocks))
+        self._tables: dict[Reversal, JointFriction] = {}
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         assert isinstance(state, LinkageState)
         return state.against_friction(self.table(state.reversal))
+
+    def table(self, reversal: Reversal) -> JointFriction:
+        """Return the table of its friction; computed once for each way to turn over."""
+        if reversal not in self._tables:
+            self._tables[reversal] = friction_table(self.structure, self.blocks, reversal)
+        return self._tables[reversal]

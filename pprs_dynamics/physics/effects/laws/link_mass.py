@@ -11,7 +11,6 @@ parameters.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, ClassVar
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place
@@ -57,9 +56,4 @@ class LinkMass(AddedBody):
         # What the link that carries the tool does as well is a payload.
         groups = tuple(tuple(robot.body_names[k] for k in sorted(
             group, key=lambda k: k != robot.carrier)) for group in alike_bodies(robot))
-        return _on(tuple(places), groups)
-
-
-@cache
-def _on(places: tuple[Place, ...], alike: tuple[tuple[str, ...], ...]) -> type[LinkMass]:
-    return LinkMass.on(places, alike)
+        return cls.on(tuple(places), groups)

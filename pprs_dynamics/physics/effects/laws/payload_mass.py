@@ -11,7 +11,6 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, ClassVar
 
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -56,7 +55,7 @@ class PayloadMass(BodyEffect):
         if not isinstance(robot, Mechanism):
             return cls
         carried = float(robot.masses[robot.carrier]) if robot.carrier >= 0 else 0.0
-        return _payload_on(robot.structure.tool, carried)
+        return _ToolBody.on((('', robot.structure.tool, (0.0, 0.0, 0.0), carried),), ())
 
     def changed(self, robot: Robot) -> Robot:
         """Return the robot with the other payload."""
@@ -70,8 +69,3 @@ class _ToolBody(AddedBody):
     acts_in = frozenset({ARM})
     card = PayloadMass.card
     arm_card = PayloadMass.arm_card
-
-
-@cache
-def _payload_on(tool: str, mass: float) -> type[_ToolBody]:
-    return _ToolBody.on((('', tool, (0.0, 0.0, 0.0), mass),))
