@@ -151,6 +151,21 @@ def require_known(names: tuple[str, ...]) -> None:
                                     f'{", ".join(NAMES)}')
 
 
+def draw_form(name: str, random: np.random.Generator, moment: JointMoment, scale: float,
+              ) -> dict[str, float]:
+    """Return the parameters of a form, its size times a scale."""
+    drawn = FORMS[name].draw(random, moment)
+    drawn[next(iter(drawn))] *= scale
+    return drawn
+
+
+def tilted(gravity: Array, angle: float) -> Array:
+    """Return gravity as a base sees it that is turned about its x axis [rad], (3,)."""
+    x, y, z = gravity
+    sine, cosine = np.sin(angle), np.cos(angle)
+    return np.array([x, cosine * y - sine * z, sine * y + cosine * z])
+
+
 def truth(name: str, drives: list[str] | None, parameters: Mapping[str, Any], form: str,
           ) -> dict[str, Any]:
     """Return what was hidden, as data for JSON."""

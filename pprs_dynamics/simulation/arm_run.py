@@ -32,7 +32,9 @@ from pprs_dynamics.simulation.arm_forms import (
     SIZE,
     STEEPNESS,
     JointMoment,
+    draw_form,
     require_known,
+    tilted,
     truth,
 )
 from pprs_dynamics.simulation.engine_model import load_engine
@@ -327,7 +329,7 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
                             'T w / sqrt(w^2 + w_0^2)'))
     if 'base_tilt' in chosen:
         angle = scale * float(random.uniform(0.01, 0.03))
-        gravity = 9.81 * np.array([0.0, np.sin(angle), -np.cos(angle)])
+        gravity = tilted(engine.gravity, angle)
         hidden.append(truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x'))
     bodies = engine.torques(motion, gravity, passive) if hidden else plain
     if progress is not None:
@@ -415,9 +417,7 @@ def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: 
             motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
             load[:, j], float(largest[j]), float(np.abs(motion.velocity[:, j]).max()),
             float(model.gear_ratios[j]))
-        drawn = form.draw(random, moment)
-        first = next(iter(drawn))
-        drawn[first] *= scale
+        drawn = draw_form(name, random, moment, scale)
         efforts[:, j] += form.force(drawn, moment)
         parameters[drives[j]] = drawn
     return truth(name, [drives[j] for j in chosen], parameters, form.form)

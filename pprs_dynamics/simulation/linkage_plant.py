@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,8 +29,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.limits import JointLimits
-from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, truth
+from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, tilted, truth
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
@@ -138,6 +137,8 @@ class LinkagePlant:
             return truth(name, None, {'mass': mass}, 'a point at the tool\'s origin')
         if name == 'link_mass':
             links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier]
+            if not links:
+                raise HiddenEffectError('link_mass needs a link beside that of the tool')
             body = int(random.choice(links))
             mass = scale * float(random.uniform(0.1, 0.3) * model.robot.masses[body])
             self.engine.add_to_link(body, mass)
@@ -145,8 +146,7 @@ class LinkagePlant:
                          'a point at its centre')
         if name == 'base_tilt':
             angle = scale * float(random.uniform(0.01, 0.03))
-            size = float(np.linalg.norm(self.engine.gravity))
-            self.engine.gravity = size * np.array([0.0, np.sin(angle), -np.cos(angle)])
+            self.engine.gravity = tilted(self.engine.gravity, angle)
             return truth(name, None, {'x': angle, 'y': 0.0}, 'about x')
         j = int(random.integers(len(model.drives)))
         assert motion.time is not None
@@ -154,17 +154,9 @@ class LinkagePlant:
             motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
             np.abs(efforts[:, j]), float(self.largest[j]),
             float(np.abs(motion.velocity[:, j]).max()), float(model.gear_ratios[j]))
-        drawn = FORMS[name].draw(random, moment)
-        drawn[next(iter(drawn))] *= scale
+        drawn = draw_form(name, random, moment, scale)
         self._pushes.append((j, name, drawn, moment))
         return truth(name, [model.drives[j]], drawn, FORMS[name].form)
-
-    @property
-    def limits(self) -> JointLimits:
-        """What the drives can do, in N and N m."""
-        model = self.model
-        return replace(model.limits, effort=self.structure.effort,
-                       effort_units=tuple(one.effort for one in model.units))
 
     def gains(self, frequency: float, damping: float, **settings: Any) -> ControlSettings:
         """Return a PD loop of a frequency [Hz] and a damping ratio for what the drives move."""
@@ -270,7 +262,9 @@ class LinkagePlant:
         T = state.rates(linkage)
         needed, M = engine.inverse(linkage.motion)
         mass = T.T @ M @ T
-        bias = T.T @ needed - mass @ acceleration
+        pushed = T.T @ needed
+        self._load = np.abs(pushed)
+        bias = pushed - mass @ acceleration
         return mass + np.diag(self.model.robot.armature), bias, linkage
 
     def _joints(self, linkage: Linkage) -> tuple[Array, Any]:
@@ -303,10 +297,10 @@ class LinkagePlant:
         for j, name, drawn, nominal in self._pushes:
             moment = JointMoment(
                 np.array([self.time]), position[j:j + 1], velocity[j:j + 1],
-                self._acceleration[j:j + 1], np.abs(self._held[j:j + 1]), nominal.effort,
-                nominal.speed, nominal.gear_ratio)
+                self._acceleration[j:j + 1], self._load[j:j + 1], nominal.effort, nominal.speed,
+                nominal.gear_ratio)
             pushed = float(FORMS[name].force(drawn, moment)[0])
-            if pushed * velocity[j] > 0 and name.endswith('friction'):
+            if pushed * velocity[j] > 0 and 'friction' in name:
                 slope[j] += pushed / velocity[j]
             else:
                 force[j] += pushed

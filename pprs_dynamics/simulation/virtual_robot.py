@@ -70,7 +70,7 @@ class SimulatedRobot:
         noise = None
         if isinstance(values, LinkagePlant):
             self.plant = weight = values
-            limits: DriveLimits = values.limits
+            limits: DriveLimits = values.model.limits
             noise = values.largest
         else:
             self.plant, weight = Plant(values, effects, plant), WeightModel(values)

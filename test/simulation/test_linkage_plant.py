@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +15,8 @@ import pytest
 import robots_with_loops as robots
 
 from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
+from pprs_dynamics.simulation.arm_forms import tilted
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
@@ -111,5 +114,37 @@ def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) 
     # The tool's origin is an elbow: one drive moves it.
     assert np.diag(weight[1]) / np.diag(weight[0]) == pytest.approx([1.0, 1.167], abs=1e-3)
     assert loaded.hidden[0]['name'] == 'payload_mass'
+
+
+def test_what_cannot_be_hidden_is_told(tmp_path: Path) -> None:
+    model = ArmModel.load(robots.five_bar().write(tmp_path))
     with pytest.raises(HiddenEffectError, match='rod_mass cannot be hidden'):
         LinkagePlant(model, ['rod_mass'])
+
+
+def test_hidden_friction_by_load_follows_the_effort_of_the_moment(tmp_path: Path) -> None:
+    model = models(tmp_path)['arm']
+    plain, hidden = LinkagePlant(model), LinkagePlant(model, ['load_friction'], seed=4)
+    (truth,) = hidden.hidden
+    j = model.drives.index(truth['drives'][0])
+    coefficient, reference = (truth['parameters'][key] for key in ('coefficient', 'reference'))
+    q, v = plain.position, np.full(len(plain.position), 1.0)
+    for lean in (0.0, 0.8):  # of the arm, by which other weights act
+        p = q + lean
+        # Friction by load is of the acceleration of the step before, which is held here.
+        load = abs(plain.engine.torques(JointMotion(p[None], v[None], 0 * v[None]))[0, j])
+        needed = [one.acceleration(p, v, np.zeros(len(q)), v, 0.0) for one in (plain, hidden)]
+        M = plain._equations(p, v, 0 * v)[0]
+        extra = (M @ (needed[0] - needed[1]))[j]
+        assert extra == pytest.approx(coefficient * np.cbrt(load ** 2 * reference), rel=1e-3)
+
+
+@pytest.mark.parametrize('gravity', [[0.0, 0.0, -9.81], [0.0, 9.81, 0.0]])
+def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
+    tmp_path: Path, gravity: list[float],
+) -> None:
+    angle = 0.02
+    model = ArmModel.load(made_up_arm.write_arm(tmp_path))
+    tilt = BaseTilt({'x': angle, 'y': 0.0})
+    robot = replace(model.robot, gravity=tuple(gravity))
+    assert tilted(np.array(gravity), angle) == pytest.approx(tilt.changed(robot).gravity)
