@@ -148,11 +148,6 @@ def diagnosis(content: dict[str, Any]) -> Iterator[None]:
     context.try_shutdown()
 
 
-def rms(page: Page, key: str) -> float:
-    values: list[Any] = page.tab.evaluate(f'bench.live.{key}')
-    return float(np.sqrt(np.mean(np.square(np.array(values, dtype=float)))))
-
-
 def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench) -> None:
     with chromium() as browser:
         page = Page(browser, bench)
@@ -160,9 +155,11 @@ def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench
         page.tick('payload_mass')
         page.tick('coulomb_friction')
         page.tab.locator('#live-tab').click()
-        page.tab.wait_for_function('bench.live && bench.live.monitor_error && bench.live.kept > 6')
-        assert rms(page, 'error') > 0.3
-        assert rms(page, 'monitor_error') > 0.3
+        page.tab.wait_for_function('bench.live && bench.live.kept > 6')
+        # Errors are of the last seconds, and grow and fall with the motion.
+        for key in ('error', 'monitor_error'):
+            page.tab.wait_for_function(
+                f'bench.live.{key} && Math.max(...bench.live.{key}) > {6 * NOISE}')
         page.tab.locator('#live-set').click()
         page.tab.locator('#live-nodes li').nth(1).wait_for()
         assert page.tab.locator('#live-nodes').inner_text().splitlines() == [
