@@ -14,7 +14,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import shutil
 import sys
 import time
@@ -24,6 +23,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from recorded_data import need_data
 
 from pprs_dynamics import ArmModel
 from pprs_dynamics.app.commands.pprs import main
@@ -57,15 +57,6 @@ MODEL = '''/**:
       gain: [11.976, 11.976, 9.839, 10.763, 10.763, 10.763]       # [N m/A]
       gear_ratio: [101.0, 101.0, 101.0, 101.0, 101.0, 101.0]
 '''
-
-
-def find_data() -> Path | None:
-    """Return the folder of the recordings, None where there is none."""
-    places = [Path(__file__).resolve().parents[2] / 'shared/data/ur10e']
-    if 'PPRS_DATA' in os.environ:
-        given = Path(os.environ['PPRS_DATA'])
-        places = [given / 'ur10e', given, *places]
-    return next((place for place in places if (place / f'{LOADED}.csv.gz').is_file()), None)
 
 
 class Bench:
@@ -290,10 +281,7 @@ def tell(bench: Bench) -> dict[str, str]:
 
 def make(folder: Path, as_far: bool = False) -> None:
     """Write docs/arms.md."""
-    data = find_data()
-    if data is None:
-        sys.exit('no recordings of the UR10e: ../shared/data/ur10e does not hold them, and '
-                 'PPRS_DATA names no folder that does')
+    data = need_data('ur10e', file(LOADED))
     folder.mkdir(parents=True, exist_ok=True)
     for name in (*map(file, {*FITTED, HELD_OUT, LOADED}), 'ur10e.urdf'):
         if not (folder / name).exists():

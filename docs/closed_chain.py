@@ -18,11 +18,11 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from recorded_data import need_data
 from scipy.signal import butter, filtfilt
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.fit.base_fit import fit_base, halves
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -36,15 +36,6 @@ FREE = 'free_one_b.csv.gz'
 LOADED = ('load_insertion_105_fast', 'load_insertion_105_slow', 'load_parallel_105_fast',
           'load_parallel_105_slow')
 BELOW = 6.0  # [Hz]: the insertion shakes at 11 Hz, and published errors are low-passed
-
-
-def find_data() -> Path | None:
-    """Return the folder of the recordings, None where there is none."""
-    folders = [Path(__file__).resolve().parents[2] / 'shared/data/dvrk']
-    if 'PPRS_DATA' in os.environ:
-        given = Path(os.environ['PPRS_DATA'])
-        folders = [given / 'dvrk', given, *folders]
-    return next((one for one in folders if (one / FREE).is_file()), None)
 
 
 def model_text() -> str:
@@ -74,9 +65,7 @@ def share(pairs: list[tuple[Array, Array]]) -> list[float]:
 
 def run(folder: Path) -> None:
     """Run the commands in a folder, and print the figures of the page."""
-    data = find_data()
-    if data is None:
-        sys.exit('no recordings: neither ../shared/data/dvrk nor PPRS_DATA holds them')
+    data = need_data('dvrk', FREE)
     folder.mkdir(parents=True, exist_ok=True)
     os.chdir(folder)
     for name in ('psm.urdf', FREE, *(f'{one}.csv.gz' for one in LOADED)):
@@ -91,12 +80,7 @@ def run(folder: Path) -> None:
     for name in LOADED:
         if not Path(f'{name}.json').exists():
             main(['diagnose', f'{name}.csv.gz', '--model', 'full.yaml', '--json', f'{name}.json'])
-    described = load_model('psm.yaml')
-    free = read_recording(FREE, described.recorded)
-    first, second = halves(free)
-    held_out = [pair for fitted, left in ((first, second), (second, first))
-                for pair in relative_below(fit_base(described, [fitted], [left]).model, [left])]
-    print('held out, halves, below 6 Hz:', share(held_out))
+    free = read_recording(FREE, load_model('psm.yaml').recorded)
     for name in ('psm', 'base', 'full'):
         print(name, 'below 6 Hz:', share(relative_below(load_model(f'{name}.yaml'), [free])))
     for name in LOADED:

@@ -10,25 +10,16 @@ Workshop on Nonlinear System Identification Benchmarks, 2019.
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
+from recorded_data import need_data
 from scipy.io import loadmat
 
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.three_pprs.robot import AXIS
 
 IDENTIFICATION, PULSES = 'DATA_EMPS.mat', 'DATA_EMPS_PULSES.mat'
-
-
-def find_data() -> Path | None:
-    """Return the folder of the MAT files, None where there is none."""
-    places = [Path(__file__).resolve().parents[2] / 'shared/data/emps']
-    if 'PPRS_DATA' in os.environ:
-        given = Path(os.environ['PPRS_DATA'])
-        places = [given / 'emps', given, *places]
-    return next((place for place in places if (place / IDENTIFICATION).is_file()), None)
 
 
 def read_emps(path: Path) -> Recording:
@@ -41,11 +32,8 @@ def read_emps(path: Path) -> Recording:
     return Recording.from_arrays(path.stem, content['t'][:, 0], content['qm'], None, force, (AXIS,))
 
 
-def main(folder: Path | None, output: Path) -> None:
+def main(folder: Path, output: Path) -> None:
     """Write both files as CSV."""
-    if folder is None:
-        sys.exit('no EMPS data: ../shared/data/emps does not hold it, and PPRS_DATA names no '
-                 'folder that does')
     for name in (IDENTIFICATION, PULSES):
         recording = read_emps(folder / name)
         write_recording(output / f'{recording.name}.csv', recording)
@@ -54,5 +42,5 @@ def main(folder: Path | None, output: Path) -> None:
 
 if __name__ == '__main__':
     arguments = [Path(argument) for argument in sys.argv[1:]]
-    main(arguments[0] if arguments else find_data(),
+    main(arguments[0] if arguments else need_data('emps', IDENTIFICATION),
          arguments[1] if len(arguments) > 1 else Path())

@@ -9,14 +9,14 @@ Here their procedure is repeated, and then `pprs` is let loose on the same files
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-from emps import IDENTIFICATION, PULSES, find_data, read_emps
+from emps import IDENTIFICATION, PULSES, read_emps
+from recorded_data import need_data
 from scipy.signal import butter, decimate, filtfilt
 
 from pprs_dynamics import AxisModel, AxisMotion, PprsError
@@ -208,10 +208,7 @@ def draw(story: Story, path: Path) -> None:
 
 def main() -> None:
     """Write the document and its picture."""
-    folder = find_data()
-    if folder is None:
-        sys.exit('no EMPS data: ../shared/data/emps does not hold it, and PPRS_DATA names no '
-                 'folder that does')
+    folder = need_data('emps', IDENTIFICATION)
     story = tell(read_emps(folder / IDENTIFICATION), read_emps(folder / PULSES), print)
     draw(story, DOCS / 'images' / 'real_drive.png')
     (DOCS / 'real_drive.md').write_text(document(story))

@@ -28,10 +28,10 @@ from pprs_dynamics.measurement.files.recording import Recording, read_recording
 sys.path.insert(0, str(Path(__file__).parents[2] / 'docs'))
 
 import closed_chain
+from recorded_data import find_data, missing
 
-DATA = closed_chain.find_data()
-pytestmark = pytest.mark.skipif(
-    DATA is None, reason='no recordings in ../shared/data/dvrk or below PPRS_DATA')
+DATA = find_data('dvrk', closed_chain.FREE)
+pytestmark = pytest.mark.skipif(DATA is None, reason=missing('dvrk'))
 PART = 12.0  # [s], a period of the path
 LEVER = 0.105 * 0.535  # [kg m], the weight on the front link and its place above the pitch axis
 

@@ -236,10 +236,11 @@ def test_a_single_axis_tells_the_same(mistake: str) -> None:
 def test_a_real_drive_is_called_right() -> None:
     sys.path.insert(0, str(DOCS))
     import emps
+    from recorded_data import find_data, missing
 
-    data = emps.find_data()
+    data = find_data('emps', emps.IDENTIFICATION)
     if data is None:
-        pytest.skip('no EMPS data in ../shared/data/emps or below PPRS_DATA')
+        pytest.skip(missing('emps'))
     for name in (emps.IDENTIFICATION, emps.PULSES):
         run = emps.read_emps(data / name)
         assert find_mistakes(AXIS, run) == ()

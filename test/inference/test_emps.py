@@ -23,10 +23,10 @@ sys.path.insert(0, str(DOCS))
 
 import emps  # noqa: E402
 import real_drive  # noqa: E402
+from recorded_data import find_data, missing  # noqa: E402
 
-DATA = emps.find_data()
-pytestmark = pytest.mark.skipif(
-    DATA is None, reason='no EMPS data in ../shared/data/emps or below PPRS_DATA')
+DATA = find_data('emps', emps.IDENTIFICATION)
+pytestmark = pytest.mark.skipif(DATA is None, reason=missing('emps'))
 MODEL = DOCS.parent / 'config' / 'single_axis.yaml'
 
 
