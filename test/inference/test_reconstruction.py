@@ -184,6 +184,15 @@ def test_the_branch_is_followed_where_solving_at_once_goes_wrong(monkeypatch, fa
     assert_allclose(followed.rotation, expected.rotation, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize('far', [1e9, 1e300])
+def test_a_position_that_none_can_be_is_refused_whatever_its_size(far):
+    q = truth().drives.position[:200].copy()
+    q[100, 0] = far
+    still = np.zeros_like(q)
+    with pytest.raises(ConvergenceError, match='no pose'):
+        solve_forward_motion(MODEL.robot.geometry, q, still, still)
+
+
 def test_drives_that_cannot_close_are_named_with_sample_and_time():
     real = truth()
     q = real.drives.position.copy()

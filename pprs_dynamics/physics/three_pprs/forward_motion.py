@@ -226,8 +226,9 @@ def find_pose_jumps(motion: PlatformMotion) -> np.ndarray:
 def _marks(position: Array) -> np.ndarray:
     """Return the first sample, the last, and those `LONGEST_MOVE` of travel apart between."""
     travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(position, axis=0)).max(axis=1))))
-    steps = np.arange(0.0, travel[-1], LONGEST_MOVE)
-    return np.unique(np.append(np.searchsorted(travel, steps), len(position) - 1))
+    # Counted by sample: a position that none can be, 10^9 m, has no list of steps in memory.
+    first = np.flatnonzero(np.diff(np.floor(travel / LONGEST_MOVE))) + 1
+    return np.unique([0, *first, len(position) - 1])
 
 
 def _follow_marks(
