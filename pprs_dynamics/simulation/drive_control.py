@@ -46,7 +46,7 @@ class ControlSettings:
     actuation_delay: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Setpoint:
     """Setpoint of one command; arrays (D,) in drive order.
 
