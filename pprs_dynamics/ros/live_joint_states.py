@@ -34,6 +34,7 @@ from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
@@ -76,8 +77,11 @@ class LiveJointStates(Node):
         self._diagnosis: dict[str, Any] | None = None
         self._heard = 0.0
         self.create_subscription(JointState, topic, self._on_state, UNANSWERED, raw=True)
-        self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, UNANSWERED)
-        self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED)
+        # Raw, as what is no message of the kind would end the executor.
+        self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, UNANSWERED,
+                                 raw=True)
+        self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED,
+                                 raw=True)
         self.create_timer(JUDGED, self._judge)
         self.clients_of = {name: AsyncParameterClient(self, name)
                            for name in (monitor, feedforward)}
@@ -105,12 +109,16 @@ class LiveJointStates(Node):
             self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
                                   effort)
 
-    def _on_error(self, message: Float64MultiArray) -> None:
-        self._monitor, self._heard = list(message.data), time.monotonic()
+    def _on_error(self, data: bytes) -> None:
+        with suppress(Rejection):
+            self._monitor = list(message_in(data, Float64MultiArray).data)
+            self._heard = time.monotonic()
 
-    def _on_diagnosis(self, message: String) -> None:
-        with suppress(ValueError):  # no JSON: not of our monitor
-            self._diagnosis = json.loads(message.data)
+    def _on_diagnosis(self, data: bytes) -> None:
+        with suppress(Rejection, ValueError):  # no JSON: not of our monitor
+            found = json.loads(message_in(data, String).data, parse_constant=lambda _: None)
+            if isinstance(found, dict):
+                self._diagnosis = found
 
     def _judge(self) -> None:
         with self._lock:
@@ -125,7 +133,8 @@ class LiveJointStates(Node):
                 return
             self._trouble = ''
             self._residuals.extend(zip(compared.time.tolist(), compared.residual, strict=True))
-            while self._residuals[0][0] < self._residuals[-1][0] - SHOWN:
+            last = self._residuals[-1][0]
+            while not last - SHOWN <= self._residuals[0][0] <= last:  # stamps may go back, too
                 self._residuals.popleft()
 
     def taken(self) -> Recording:

@@ -133,7 +133,8 @@ class LiveComparison:
             residual = np.where(moving, residual, np.nan)
         for moment, error in zip(time, residual, strict=True):
             self._recent.append((moment, error))
-        while self._recent and self._recent[0][0] < time[-1] - self._span:
+        # Stamps may go back, too: then what came before them is of another stream.
+        while not time[-1] - self._span <= self._recent[0][0] <= time[-1]:
             self._recent.popleft()
         return Compared(time, model, residual)
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.ros.messages.rejection import Rejection
@@ -32,7 +32,7 @@ def message_in(data: bytes, kind: type) -> Any:
     data : bytes
         As a raw subscription gives them.
     kind : type
-        MultiDOFJointTrajectory, JointTrajectory, JointState or Float64MultiArray.
+        MultiDOFJointTrajectory, JointTrajectory, JointState, Float64MultiArray or String.
 
     Raises
     ------
@@ -142,4 +142,4 @@ def _array(walk: _Walk) -> None:
 
 _WALKS: dict[type, Callable[[_Walk], None]] = {
     MultiDOFJointTrajectory: _trajectory, JointTrajectory: _joint_trajectory,
-    JointState: _joint_state, Float64MultiArray: _array}
+    JointState: _joint_state, Float64MultiArray: _array, String: _Walk.text}
