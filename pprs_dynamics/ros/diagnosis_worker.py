@@ -74,8 +74,8 @@ class StreamWindows:
         rows = list(self._ring)
         self._ring.clear()
         return StreamWindow(np.array([stamp for stamp, _, _ in rows]),
-                       np.stack([position for _, position, _ in rows]),
-                       np.stack([effort for _, _, effort in rows]))
+                            np.stack([position for _, position, _ in rows]),
+                            np.stack([effort for _, _, effort in rows]))
 
 
 class DiagnosisWorker:

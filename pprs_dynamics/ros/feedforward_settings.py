@@ -13,11 +13,12 @@ from pprs_dynamics.ros.node.parameters import NodeParameter
 CLAMP = 'clamp'
 HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
 
-FRAME = NodeParameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform')
+FRAME = NodeParameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform',
+                      stays=True)
 
 _PARAMETERS = (
     NodeParameter('autostart', True, 'true: active at once; false: a supervisor configures and '
-                  'activates the node'),
+                  'activates the node', stays=True),
     FRAME,
     NodeParameter('max_age', 0.0, 'oldest header stamp that is accepted [s]; 0: any', lower=0),
     NodeParameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '

@@ -42,15 +42,15 @@ from pprs_dynamics.simulation.export.tree_positions import TreePositions
 PARAMETERS = (
     FRAME,
     NodeParameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
-                  'answers lag by half of it [s]', lower=0.01, upper=2.0),
+                  'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
     NodeParameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
-                  upper=600.0),
+                  upper=600.0, stays=True),
     NodeParameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
-                  lower=1.0, upper=1000.0),
+                  lower=1.0, upper=1000.0, stays=True),
     NodeParameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
-                  'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0),
+                  'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     NodeParameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
-                  upper=3600.0),
+                  upper=3600.0, stays=True),
 )
 
 LOOK = 0.2  # [s] between looks for an answer of the diagnosis
@@ -181,7 +181,7 @@ class MonitorNode(ExplainsRefusals):
 
     def _publish(self, compared: Compared) -> None:
         for topic, efforts in ((self._model_effort, compared.model),
-                                   (self._residual, compared.residual)):
+                               (self._residual, compared.residual)):
             if topic.get_subscription_count():
                 for time, effort in zip(compared.time, efforts, strict=True):
                     stamp = self._origin + round(time * conversions.NANOSECONDS)

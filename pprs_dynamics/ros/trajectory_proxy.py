@@ -40,7 +40,7 @@ from pprs_dynamics.ros.node.status import StatusReporter
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
 ACTION = NodeParameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
-                       'of the controller that the goals are passed on to')
+                       'of the controller that the goals are passed on to', stays=True)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
 

@@ -268,3 +268,21 @@ def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(
         assert running.spin_until(lambda: 'reliability' in log.read_text(), 20), log.read_text()
     assert '/effort/commands: a listener asks for another reliability' in log.read_text()
     assert '~/' not in log.read_text()
+
+
+@pytest.mark.parametrize(('node', 'name', 'value'), [
+    (FeedforwardNode, 'frame_id', 'world'), (FeedforwardNode, 'autostart', False),
+    (FeedforwardNode, 'joint_prefix', 'left_'), (FeedforwardNode, 'joint_map.lift_3', 'z_axis'),
+    (MonitorNode, 'window', 0.3), (MonitorNode, 'update_rate', 10.0),
+    (MonitorNode, 'diagnose_every', 5.0)])
+def test_what_only_counts_at_the_start_is_refused_while_the_node_runs(
+    node: Any, name: str, value: Any,
+) -> None:
+    with bench() as running:
+        made = running.add(node)
+        result, = made.set_parameters([Parameter(name, value=value)])
+        assert not result.successful
+        assert name.partition('.')[0] in result.reason
+        assert 'stay as it was when the node started' in result.reason
+        if made.has_parameter(name):  # the same value again is no change
+            assert made.set_parameters([made.get_parameter(name)])[0].successful

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from rcl_interfaces.msg import SetParametersResult
@@ -101,9 +101,9 @@ class ModelParameters:
             declare_arm(node)
         else:
             taken_from_paper = declare_model(node)
-        self._drives: tuple[str, ...] | None = None
+        self._stays: dict[str, Any] = {}
         self.model, self.own = self._validated()
-        self._drives = self.model.drives
+        self._stays = self._staying(self.model, self.own)
         # A status entry, and a line in the log: another robot would get wrong forces.
         self.taken_from_paper = taken_from_paper
         if taken_from_paper:
@@ -119,12 +119,19 @@ class ModelParameters:
         values = current_values(self._node, changes)
         own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
         model = self._kind.from_parameters(values)
-        if self._drives not in (None, model.drives):
-            raise ModelError(drives_key(mechanism_block(values)), model.drives,
-                             'stay as it was when the node started: '
-                             f'{", ".join(self._drives or ())}')
+        now = self._staying(model, own)
+        for name, before in self._stays.items():
+            if now[name] != before:
+                raise ModelError(name, now[name], f'stay as it was when the node started: {before}')
         model.initial_state()  # an effect that cannot even begin is refused
         return model, own
+
+    def _staying(self, model: NodeModel, own: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what holds as long as the node runs, its topics were made by it."""
+        names = {drives_key(mechanism_block(model.values)): model.drives,
+                 'joint_prefix and joint_map': model.recorded.joints}
+        return {**{name: ', '.join(value) for name, value in names.items()},
+                **{each.name: own[each.name] for each in self._declared if each.stays}}
 
     def check(self, changes: list[Parameter]) -> SetParametersResult:
         """Return whether the parameters would be valid with some of them changed, and why not."""

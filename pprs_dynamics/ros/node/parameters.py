@@ -62,6 +62,8 @@ class NodeParameter:
         Words that are allowed; () for any.
     size : int
         Of a list of numbers that may also be empty; its default is ().
+    stays : bool
+        Read once, at the start: a running node refuses another value.
     """
 
     name: str
@@ -71,6 +73,7 @@ class NodeParameter:
     upper: float = math.inf
     choices: tuple[str, ...] = ()
     size: int = 0
+    stays: bool = False
 
     @property
     def rule(self) -> str:
