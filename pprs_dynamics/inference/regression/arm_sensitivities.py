@@ -23,12 +23,14 @@ from pprs_dynamics.inference.regression.sensitivities import (
     Sensitivities,
     reversal_columns,
 )
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState
 from pprs_dynamics.physics.model.arm_model import ArmForces, ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import is_gain
+from pprs_dynamics.system.parallel import each
 
 HOMING_STEP = 1e-4  # [rad, m]
 
@@ -113,13 +115,13 @@ class ArmSensitivities(Sensitivities):
 
     def _homing(self, state: LinkageState, reference: Array) -> Array:
         """Return the change per radian, or metre, that each joint is measured too far."""
-        columns = np.empty((len(self.model.drives), *state.velocity.shape))
-        for k in range(len(columns)):
+        def column(k: int) -> Array:
             position = state.position.copy()
             position[:, k] -= HOMING_STEP
             moved = replace(state, position=position)
-            columns[k] = (self._efforts(self.model, moved) - reference) / HOMING_STEP
-        return columns
+            return (self._efforts(self.model, moved) - reference) / HOMING_STEP
+
+        return np.stack(each(column, range(len(self.model.drives))))
 
     def _of_structure(self, effect: type[StructureEffect], state: LinkageState, reference: Array,
                       values: Mapping[str, float]) -> tuple[Array, Array]:
@@ -128,24 +130,22 @@ class ArmSensitivities(Sensitivities):
         As the model says, and as they would be if friction did not follow the loads that the
         effect adds.
         """
-        full: list[Array] = []
-        bare: list[Array] = []
-        for coefficient in effect.coefficients:
+        def columns(coefficient: Parameter) -> tuple[Array, Array]:
             step = coefficient.scale
             moved: Any = effect.at({**values, coefficient.name:
                                     values.get(coefficient.name, 0.0) + step})
             if not isinstance(moved, BodyEffect):
                 at: Any = state
-                change = (moved.force(at) - effect.at(values).force(at)) / step
-                for columns in (full, bare):
-                    columns.append(self.sensed(change, state))
-                continue
+                change = self.sensed((moved.force(at) - effect.at(values).force(at)) / step, state)
+                return change, change
             if values:
                 model = replace(self.model, effects=tuple(
                     moved if type(one) is effect else one for one in self.model.effects))
                 found = self._state(model, state)
             else:
                 found = moved.apply(state)
-            full.append(self.sensed((self._efforts(self.model, found) - reference) / step, state))
-            bare.append(self.sensed((found.rigid_force - state.rigid_force) / step, state))
+            return (self.sensed((self._efforts(self.model, found) - reference) / step, state),
+                    self.sensed((found.rigid_force - state.rigid_force) / step, state))
+
+        full, bare = zip(*each(columns, effect.coefficients), strict=True)
         return np.stack(full), np.stack(bare)

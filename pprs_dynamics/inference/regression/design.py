@@ -19,7 +19,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.signal import correlate
+from scipy import fft
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
@@ -363,9 +363,11 @@ def _delay(recording: FullRate, drive: int) -> float:
         return 0.0
     model, seen = (np.interp(even, t, values) for t, values in (
         (time, recording.effort[part, drive]), (time[known], measured[known])))
-    alike = correlate(seen - seen.mean(), model - model.mean(), 'same', 'fft')
-    near = alike[len(even) // 2 - most:len(even) // 2 + most + 1]
-    return float((np.argmax(near) - most) * step)
+    size = fft.next_fast_len(len(even) + most, real=True)
+    alike = fft.irfft(fft.rfft(seen - seen.mean(), size)
+                      * fft.rfft(model - model.mean(), size).conj(), size)
+    lags = np.arange(-most, most + 1)
+    return float(lags[np.argmax(alike[lags])] * step)
 
 
 def _rows(column: Array) -> dict[int, Array]:

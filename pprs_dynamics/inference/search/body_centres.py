@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.force_model import ForceModel
 
 REACH = 4.0  # of the mechanism's size, the mean distance of its joints: what hangs on it is within
+CLOSE = 1e-4  # of the reach, at which a search for a centre ends: columns move with it afterwards
 STARTS = np.vstack((np.zeros(3), np.eye(3), -np.eye(3))) / 8  # of the reach
 PULL = 1e-3  # of the error, by which a body at that reach is pulled to its place
 
@@ -93,7 +94,8 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
         m = column @ reduced[:, -1] / max(float(column @ column), 1e-300)
         return np.concatenate((reduced[:, -1] - m * column, weight * away))
 
-    best = min((least_squares(left, start, bounds=(-1, 1), max_nfev=40) for start in STARTS),
+    best = min((least_squares(left, start, bounds=(-1, 1), max_nfev=40, xtol=CLOSE,
+                              ftol=CLOSE / 10, gtol=CLOSE / 10) for start in STARTS),
                key=lambda one: float(one.cost))
     return tuple((size * best.x).tolist())
 

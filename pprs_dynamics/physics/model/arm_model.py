@@ -97,7 +97,7 @@ class ArmModel(ForceModel):
         """Block of its file: `arm` or `robot`."""
         return mechanism_block(self.values)
 
-    @property
+    @cached_property
     def keys(self) -> dict[str, Key]:
         """Keys of its files, by name."""
         return keys_of(self.values)

@@ -294,11 +294,12 @@ def named_keys(parameters: Mapping[str, Any]) -> dict[str, Key]:
             found[name] = (Key(name, 'x y z qx qy qz qw in the base near which the loops close',
                                'm', size=7) if name.endswith(POSE) else
                            Key(name, 'position near which the loops close', 'rad, m'))
-        for prefix, keys in NAMED_BLOCKS.items():
-            own = name.removeprefix(prefix).partition('.')[0]
-            if name.startswith(prefix) and name != prefix + own:
-                for last, key in keys.items():
-                    found[f'{prefix}{own}.{last}'] = replace(key, name=f'{prefix}{own}.{last}')
+    for prefix, keys in NAMED_BLOCKS.items():
+        of_blocks = (name.removeprefix(prefix).partition('.')
+                     for name in parameters if name.startswith(prefix))
+        for own in dict.fromkeys(own for own, dot, _ in of_blocks if dot):
+            for last, key in keys.items():
+                found[f'{prefix}{own}.{last}'] = replace(key, name=f'{prefix}{own}.{last}')
     return found
 
 
