@@ -23,7 +23,12 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.errors import MissingLibraryError
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.files.recording import (
+    Recording,
+    read_recording,
+    write_bag,
+    write_recording,
+)
 
 AXIS = 'config/single_axis.yaml'
 SPRING = 60.0  # [N/m]
@@ -62,6 +67,29 @@ def test_without_a_recording_it_waits_for_one(folder: Path) -> None:
         assert bench.get('/api/curves').status == 400
         assert bench.post('/api/open', name='0/run.csv').status == 200
         assert not bench.settled().get('is_empty')
+
+
+def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> None:
+    bags = folder / 'bags'
+    bags.mkdir()
+    write_hidden(bags / 'plain.csv', 4, 8.0)
+    for seed, name in ((1, 'first.mcap'), (2, '../other.mcap')):
+        samples = read_recording(write_hidden(folder / 'spare.csv', seed, 8.0)).samples
+        write_bag(bags / name, {'/left/joint_states': samples, '/right/joint_states': samples})
+    with workbench(bags, '--topic', '/right/joint_states', '--validate', folder / 'other.mcap',
+                   folder=folder) as bench:
+        bench.enter()
+        bench.wait(lambda screen: not screen['is_beginning'])
+        refused = bench.post('/api/open', name='0/first.mcap', is_held_out=True)
+        assert refused.status == 400
+        assert 'nothing to fit yet' in refused.json['error']
+        assert bench.screen()['is_empty']
+        for name in ('first.mcap', 'plain.csv'):
+            answer = bench.post('/api/open', name=f'0/{name}')
+            assert answer.status == 200, answer.body
+        screen = bench.screen()
+        assert [one['name'] for one in screen['recordings']] == ['first.mcap', 'plain.csv']
+        assert screen['held_out'] == ['other.mcap']
 
 
 def test_a_motion_that_the_model_cannot_follow_is_a_sentence_on_the_page(folder: Path) -> None:

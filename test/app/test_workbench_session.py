@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -19,14 +21,20 @@ import pytest
 from workbench_bench import HIDDEN, write_hidden
 
 from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench import Session
+from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
+from pprs_dynamics.app.workbench.server.folders import Folders
+from pprs_dynamics.app.workbench.server.hub import Hub
+from pprs_dynamics.app.workbench.server.surveys import Surveys
+from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.app.workbench.worker_process import EndedError, run_in_process
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
 MASS = HIDDEN['effects.payload_mass.mass']
@@ -224,6 +232,87 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(
         assert error.before == pytest.approx(found['drives'][name]['rms'], rel=5e-5)
     session.undo()
     assert dict(session.model.values) == given
+
+
+def short_session(folder: Path) -> tuple[Session, Path]:
+    """Return a session of one recording, and another recording."""
+    return (Session.open([write_hidden(folder / 'one.csv', 1, 4.0)]),
+            write_hidden(folder / 'two.csv', 2, 4.0))
+
+
+def names_of(session: Session) -> list[str]:
+    return [one['name'] for one in session.to_dict()['recordings']]
+
+
+def test_a_model_that_changes_while_a_recording_is_added_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session, other = short_session(tmp_path)
+    changed = build_model({**session.model.values, 'masses.payload': 0.1})
+    began: list[None] = []
+
+    def overtaken(model: Any, recordings: Any) -> TickFits:
+        if not began:
+            began.append(None)
+            session._use(TickFits(changed, session.fits.recordings))  # as an adoption ends
+        return TickFits(model, recordings)
+
+    monkeypatch.setattr(session_module, 'TickFits', overtaken)
+    session.add(other)
+    assert session.model is changed
+    assert names_of(session) == ['one.csv', 'two.csv']
+
+
+def test_a_recording_that_is_added_while_others_are_looked_at_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session, other = short_session(tmp_path)
+    looks, checked = threading.Event(), Inputs.checked
+
+    def slow(inputs: Inputs) -> Inputs:
+        found = checked(inputs)
+        if threading.current_thread() is looking:
+            looks.set()
+            time.sleep(2.0)
+        return found
+
+    monkeypatch.setattr(Inputs, 'checked', slow)
+    looking = threading.Thread(target=session.find_mistakes)
+    looking.start()
+    assert looks.wait(60)
+    session.add(other)
+    looking.join()
+    assert names_of(session) == ['one.csv', 'two.csv']
+
+
+def test_a_recording_that_is_opened_while_the_first_are_read_comes_on_top(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session, other = short_session(tmp_path)
+    begins, goes_on = threading.Event(), threading.Event()
+
+    def slow(inputs: Inputs) -> Session:
+        begins.set()
+        assert goes_on.wait(60)
+        return session
+
+    monkeypatch.setattr(Session, 'of', slow)
+    hub = Hub(session.inputs, Folders.of([]), Surveys.of([]))
+    loop = asyncio.new_event_loop()
+    hub.start(loop)
+    try:
+        assert begins.wait(60)
+        opening = threading.Thread(target=hub.open, args=(other,))
+        opening.start()
+        opening.join(2.0)
+        goes_on.set()
+        opening.join(60)
+        assert hub.session is session
+        assert names_of(session) == ['one.csv', 'two.csv']
+    finally:
+        goes_on.set()
+        hub.stop()
+        loop.close()
 
 
 def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:

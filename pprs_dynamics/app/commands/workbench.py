@@ -17,7 +17,6 @@ from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.app.workbench.server.surveys import Surveys
-from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.plain_text import displayed
@@ -56,12 +55,8 @@ def run(options: argparse.Namespace) -> int:
     given = [path for path in options.recordings if not is_folder(path)]
     # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
     inputs = Inputs.read(options.model, given, options.validate, options.topic)
-
-    def begin() -> Session | None:
-        return Session.of(inputs) if inputs.recordings else None
     live = _live(options, inputs.model) if options.live else None
-    hub = Hub(begin, inputs.model, options.model, Folders.of(options.recordings),
-              Surveys.of(options.recordings), live)
+    hub = Hub(inputs, Folders.of(options.recordings), Surveys.of(options.recordings), live)
     serve(hub, options.host, options.port, not options.no_browser)
     return 0
 
@@ -88,5 +83,5 @@ def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
     source: LiveSource = LiveNodes(model, options.topic or 'joint_states', options.monitor,
-                                     options.feedforward, options.namespace)
+                                   options.feedforward, options.namespace)
     return source

@@ -117,7 +117,12 @@ class Inputs:
 
     def with_more(self, path: File, is_held_out: bool = False) -> Inputs:
         """Return this with one more file; errors as `of`."""
-        more = Inputs.of(self.model, path)
+        try:
+            more = Inputs.of(self.model, path)
+        except UnreadableFileError:
+            if not self.topic:
+                raise
+            more = Inputs.of(self.model, path, topic=self.topic)  # of several that it may hold
         _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
                         [_Read(name, one, True) for name, one in
                          {**self.recordings, **self.validation}.items()], ONCE)

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from threading import RLock
+from threading import Lock, RLock
 from typing import Any
 
 import numpy as np
@@ -102,7 +102,7 @@ class Session:
         self.experiment: DesignedMotion | None = None
         self.jobs: dict[str, Job[Any]] = {}
         self.revision = self.version = 0
-        self._lock, self._settling = RLock(), RLock()
+        self._lock, self._settling, self._reading = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
         self._use(TickFits(model, list(recordings.values())))
 
@@ -159,14 +159,23 @@ class Session:
         PprsError
             Where it cannot be read, holds the samples of another, or the model cannot follow it.
         """
-        more = self.inputs.with_more(path, is_held_out)
-        fits = self.fits if is_held_out else TickFits(self.model, more.fitted)
+        with self._reading:
+            more = self.inputs.with_more(path, is_held_out)
+            while not self._take(more, self.fits if is_held_out
+                                 else TickFits(self.model, more.fitted)):
+                pass  # the model was changed meanwhile
+        self.notify()
+
+    def _take(self, inputs: Inputs, fits: TickFits) -> bool:
+        """Go on with more recordings; False where their fits are of another model than this."""
         with self._lock:
-            self.inputs = more
+            if fits.model is not self.model:
+                return False
+            self.inputs = inputs
             if fits is not self.fits:
                 self.diagnosis = None
                 self._use(fits, self.view_state.ticks)
-        self.notify()
+            return True
 
     def find_mistakes(self) -> None:
         """Look for units, signs and orders that are not SI's, and add them to the findings.
@@ -176,7 +185,8 @@ class Session:
         UnreadableFileError
             For positions that are no metres.
         """
-        self.inputs = self.inputs.checked()
+        with self._reading:
+            self.inputs = self.inputs.checked()
         self.notify()
 
     # Those who look on
@@ -432,20 +442,20 @@ class Session:
             request.require_place(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
                 raise SessionError(f'{self.jobs["adopt"].what} is being adopted, must end first')
-            fits = self.fits
+            fits, inputs = self.fits, self.inputs
 
             def work(report: Callable[[float], None]) -> Adoption:
-                return self._adopted(fits, request, force, report)
+                return self._adopted(fits, inputs, request, force, report)
             return self._begin('adopt', effect, work)
 
-    def _adopted(self, fits: TickFits, request: EffectRequest, force: bool,
+    def _adopted(self, fits: TickFits, inputs: Inputs, request: EffectRequest, force: bool,
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
         answer: Adoption = run_in_process(
-            judged, fits.model, request, fits.recordings, self.inputs.held_out,
+            judged, fits.model, request, fits.recordings, inputs.held_out,
             force, self.diagnosis, report=lambda share: report(0.9 * share))
         if answer.adopted:
-            after = TickFits(self.inputs.ledger.entered(answer), fits.recordings)
+            after = TickFits(inputs.ledger.entered(answer), fits.recordings)
             report(0.95)
             with self._lock:
                 if fits is not self.fits:
@@ -491,9 +501,10 @@ class Session:
 
     def _begin(self, kind: str, of: str,
                work: Callable[[Callable[[float], None]], Any]) -> Job[Any]:
-        self.cancel(kind)
-        self.jobs[kind] = Job(kind, of, work, lambda job: self.notify())
-        return self.jobs[kind].start()
+        with self._lock:
+            self.cancel(kind)
+            job = self.jobs[kind] = Job(kind, of, work, lambda job: self.notify())
+        return job.start()
 
     def undo(self, revision: int | None = None) -> Step:
         """Take the last step of the ledger back, and return it.

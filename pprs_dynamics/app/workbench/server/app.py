@@ -142,7 +142,7 @@ class Api:
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
                      'has_folders': bool(hub.folders.roots or hub.surveys.recordings),
                      'is_empty': session is None,
-                     **(session.to_dict() if session else units_to_dict(hub.model))}
+                     **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
             state['drawn'] = [state.get(key) for key in ('generation', 'revision', 'stage')]
             hub.log.update(state)
             known = index_of(str((query or {}).get('since', '')), hub.log.version + 1)
@@ -271,8 +271,7 @@ class Api:
 
     def open(self, body: Any) -> Response:
         """Open a recording of the folders and surveys that were given."""
-        self.hub.open([str(self.hub.offered(text_of(body, 'name')))],
-                      body.get('is_held_out') is True)
+        self.hub.open(self.hub.offered(text_of(body, 'name')), body.get('is_held_out') is True)
         return self.screen(body)
 
     async def upload(self, request: Request) -> Response:
@@ -283,7 +282,7 @@ class Api:
                 async for part in request.stream():
                     await run_in_threadpool(file.write, part)
             held_out = request.query_params.get('held_out') == '1'
-            await run_in_threadpool(self.hub.open, [str(path)], held_out)
+            await run_in_threadpool(self.hub.open, path, held_out)
         except (PprsError, TooLongError, ClientDisconnect, OSError):
             path.unlink(missing_ok=True)
             raise
@@ -305,7 +304,7 @@ class Api:
         """Make what came in last a recording of the session."""
         path = self.hub.save_upload('live.csv')
         self._live.take(path)
-        self.hub.open([str(path)])
+        self.hub.open(path)
         return self.screen(body)
 
     @property

@@ -9,13 +9,14 @@ import asyncio
 import logging
 import re
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Lock, Thread
 from typing import Any, Protocol
 
+from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 from pprs_dynamics.app.workbench.server.folders import ENDINGS, Folders
@@ -52,11 +53,8 @@ class Hub:
 
     Parameters
     ----------
-    begin : callable
-        Makes the session, or returns None where no recording was given; may take seconds.
-    model : ForceModel
-    path : str
-        The model file, for recordings that are opened later.
+    inputs : Inputs
+        Of the command line; a session begins with its recordings, or with the first that is opened.
     folders : Folders
         In which browsers may choose recordings.
     surveys : Surveys
@@ -64,20 +62,20 @@ class Hub:
     live : LiveSource, optional
     """
 
-    def __init__(self, begin: Callable[[], Session | None], model: ForceModel, path: str,
-                 folders: Folders, surveys: Surveys, live: LiveSource | None = None) -> None:
-        self.model, self.path, self.live = model, path, live
+    def __init__(self, inputs: Inputs, folders: Folders, surveys: Surveys,
+                 live: LiveSource | None = None) -> None:
+        self.inputs, self.live = inputs, live
         self.folders, self.surveys = folders, surveys
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
         self.generation = self.count = 0
-        self._begin, self._is_unjudged = begin, False
+        self._is_unjudged = False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
         self.log = ChangeLog()
         self._count, self._lock, self._opening, self._steady = 0, Lock(), Lock(), Lock()
         self._work = Event()
-        self._ends = self.is_over = False
+        self.is_over = False
         self._waiting: set[asyncio.Queue[None]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._fits: object = None
@@ -96,10 +94,10 @@ class Hub:
 
     def stop(self) -> None:
         """Call all work off."""
-        self._ends = True
+        self.is_over = True
         self._work.set()
         if self.session is not None:
-            for job in self.session.jobs.values():
+            for job in list(self.session.jobs.values()):
                 job.cancel()
                 with suppress(Exception):  # whatever it ended with
                     job.result(LAST_WORDS)
@@ -147,20 +145,22 @@ class Hub:
             raise SessionError('no recording is open, must be one')
         return self.session
 
-    def open(self, paths: Sequence[str], is_held_out: bool = False) -> None:
-        """Add recordings to the session, or begin one with them.
+    def open(self, path: Path, is_held_out: bool = False) -> None:
+        """Add a recording to the session, or begin one with it.
 
         Raises
         ------
         PprsError
-            As `Session.open` and `Session.add`.
+            As `Session.add`.
         """
         with self._opening:
             if self.session is None:
-                self._use(Session.open(paths, self.path))
+                if is_held_out:
+                    raise SessionError('there is nothing to fit yet: the first recording must '
+                                       'not be held out')
+                self._use(Session.of(self.inputs.with_more(path)))
             else:
-                for path in paths:
-                    self.session.add(path, is_held_out)
+                self.session.add(path, is_held_out)
         self._changed()
 
     def offered(self, name: str) -> Path:
@@ -211,15 +211,15 @@ class Hub:
     def _run(self) -> None:
         """Settle after every change; look for what is missing once nothing happens."""
         try:
-            session = self._begin()
-            self._is_unjudged = session is not None
-            if session is not None:
-                self._use(session)
+            with self._opening:  # what a browser opens meanwhile comes on top
+                if self.inputs.recordings:
+                    self._use(Session.of(self.inputs))
+                    self._is_unjudged = True
         except Exception as error:
             self._fail(error)
         self.is_beginning = False
         self._changed()
-        while not self._ends:
+        while not self.is_over:
             if not self._work.wait(IDLE):
                 self._find_mistakes()
                 self._diagnose()
@@ -227,7 +227,7 @@ class Hub:
             self._work.clear()
             time.sleep(BREATH)
             session = self.session
-            if session is None or self._ends:
+            if session is None or self.is_over:
                 continue
             if not session.view_state.is_settled:
                 try:
