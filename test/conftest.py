@@ -9,6 +9,8 @@ import gc
 import os
 import tempfile
 from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
 
 import pytest
 from hypothesis import settings
@@ -36,6 +38,15 @@ def ros_domain() -> Iterator[int]:
     """Domain id of this session."""
     yield _DOMAIN
     _HOLDER.close()
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Iterator[ModuleType]:
+    """Module of a package whose effects fail on demand, installed for this process."""
+    from failing_effects import installed  # with NumPy, which threads are set before
+
+    with installed(tmp_path) as module:
+        yield module
 
 
 @pytest.fixture(autouse=True)

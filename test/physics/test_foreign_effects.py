@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from failing_effects import FAULTS, installed, model_file
+from failing_effects import FAULTS, fail, model_file
 from feedforward_bench import random_motion
 
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -22,17 +22,6 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.foreign_effects import guard
 
 ONE = random_motion(np.random.default_rng(11), 3)[:1]
-
-
-@pytest.fixture
-def package(tmp_path: Path) -> Iterator[ModuleType]:
-    with installed(tmp_path) as module:
-        module.PLACE, module.FAULT = 'nowhere', 'none'
-        yield module
-
-
-def fail(package: Any, place: str, fault: str = 'raises') -> None:
-    package.PLACE, package.FAULT = place, fault
 
 
 @pytest.mark.parametrize(('fault', 'told'), FAULTS.items())

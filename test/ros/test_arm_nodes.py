@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench
-from node_bench import Bench, bench
+from node_bench import Bench, bench, overrides
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_processes import environment, executable, node_process
@@ -303,8 +303,7 @@ def test_the_monitor_tells_what_the_model_of_an_arm_lacks(
 ) -> None:
     gain = np.array([10.0, 5.0, 40.0])
     values = parameters(file, arm__gain=gain.tolist(), arm__effort_unit='A', error_span=1.0)
-    node = running.add(MonitorNode, parameter_overrides=[
-        Parameter(name.replace('__', '.'), value=value) for name, value in values.items()])
+    node = running.add(MonitorNode, parameter_overrides=overrides(**values))
     residual = running.listen(JointState, '/monitor/residual', 1000)
     error = running.listen(Float64MultiArray, '/monitor/error', 1000)
     running.follow_status('/monitor/status')

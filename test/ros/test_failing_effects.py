@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from failing_effects import FAULTS, install, installed, model_file, parameters
+from failing_effects import FAULTS, fail, install, model_file, parameters
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
-from node_bench import Bench, bench
+from node_bench import Bench, bench, overrides
 from rclpy.parameter import Parameter
 from ros_processes import environment, executable, node_process
 from std_msgs.msg import Float64MultiArray
@@ -32,15 +31,6 @@ from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 MOTION = random_motion(np.random.default_rng(11), 3)
 ONE = MOTION[:1]
-@pytest.fixture
-def package(tmp_path: Path) -> Iterator[ModuleType]:
-    with installed(tmp_path) as module:
-        module.PLACE, module.FAULT = 'nowhere', 'none'
-        yield module
-
-
-def fail(package: Any, place: str, fault: str = 'raises') -> None:
-    package.PLACE, package.FAULT = place, fault
 
 
 def rest(motion: PlatformMotion) -> PlatformMotion:
@@ -208,9 +198,8 @@ def test_the_process_lives_on_and_ends_as_ever(ros_domain: int, tmp_path: Path) 
 
 @pytest.mark.nodes
 def test_the_monitor_counts_tells_and_goes_on(package: ModuleType) -> None:
-    values = {name.replace('__', '.'): value for name, value in parameters('worn_brake').items()}
     with bench() as running:
-        monitor = MonitorBench(running, **values)
+        monitor = MonitorBench(running, **parameters('worn_brake'))
         monitor.send(300)
         assert len(monitor.residual) > 100
         fail(package, 'columns')
@@ -235,8 +224,7 @@ def test_the_monitor_counts_tells_and_goes_on(package: ModuleType) -> None:
 def test_the_simulated_robot_asks_no_effect_and_refuses_one_that_cannot_be_built(
     package: ModuleType,
 ) -> None:
-    values = [Parameter(name.replace('__', '.'), value=value)
-              for name, value in parameters('worn_brake', 'hose').items()]
+    values = overrides(**parameters('worn_brake', 'hose'))
     fail(package, 'columns')
 
     def cycles(running: Bench) -> int:

@@ -17,7 +17,7 @@ import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from node_bench import Bench, bench
+from node_bench import Bench, bench, overrides
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from std_msgs.msg import Float64MultiArray
@@ -60,9 +60,9 @@ class Supervisor:
 @pytest.fixture
 def supervised() -> Iterator[tuple[FeedforwardBench, Supervisor]]:
     """Give a node that waits for its supervisor."""
-    overrides = [Parameter('autostart', value=False), Parameter('command_timeout', value=0.0)]
+    given = overrides(autostart=False, command_timeout=0.0)
     with bench() as running:
-        node = FeedforwardBench(running, parameter_overrides=overrides)
+        node = FeedforwardBench(running, parameter_overrides=given)
         yield node, Supervisor(running)
 
 
@@ -207,9 +207,8 @@ def test_killed_and_started_again_it_answers_from_the_first_message_it_gets(
 def test_two_namespaces_do_not_disturb_each_other() -> None:
     with bench() as running:
         nodes = [running.add(
-            FeedforwardNode, namespace=name, parameter_overrides=[
-                Parameter('masses.payload', value=payload),
-                Parameter('command_timeout', value=0.0)])
+            FeedforwardNode, namespace=name, parameter_overrides=overrides(
+                masses__payload=payload, command_timeout=0.0))
             for name, payload in (('left', 0.5), ('right', 3.0))]
         answers = [running.listen(Float64MultiArray, f'/{name}/feedforward/commands')
                    for name in ('left', 'right')]

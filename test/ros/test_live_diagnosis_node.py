@@ -10,8 +10,7 @@ import os
 
 import numpy as np
 import pytest
-from node_bench import LATCHED, bench
-from rclpy.parameter import Parameter
+from node_bench import LATCHED, bench, overrides
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -36,8 +35,8 @@ def test_a_change_is_told_within_two_windows() -> None:
     effort = effort + NOISE * np.random.default_rng(0).standard_normal(effort.shape)
     effort[round(1.05 * SPAN * RATE):, 3] += OFFSET  # with the second window
     with bench() as running:
-        node = running.add(MonitorNode, parameter_overrides=[
-            Parameter('diagnose_every', value=SPAN), Parameter('diagnose_span', value=SPAN)])
+        node = running.add(MonitorNode, parameter_overrides=overrides(
+            diagnose_every=SPAN, diagnose_span=SPAN))
         told = running.listen(String, '/monitor/diagnosis', LATCHED)
         running.follow_status('/monitor/status')
         states = running.probe.create_publisher(JointState, '/joint_states', 1000)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of
-from node_bench import bench
+from node_bench import bench, overrides
 from rclpy.parameter import Parameter
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
@@ -117,8 +117,7 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
 
 def given(**own: Any) -> list[Parameter]:
     """Return the file's parameters, and a node's own, as a node takes them."""
-    return [Parameter(name.replace('__', '.'), value=value)
-            for name, value in {**parameters(), **own}.items()]
+    return overrides(**{**parameters(), **own})
 
 
 def test_the_simulated_robot_holds_moves_and_refuses() -> None:

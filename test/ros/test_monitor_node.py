@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from node_bench import Bench, bench
+from node_bench import Bench, bench, overrides
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
@@ -38,8 +38,8 @@ class MonitorBench:
 
     def __init__(self, running: Bench, **values: object) -> None:
         self.bench = running
-        self.node = running.add(MonitorNode, parameter_overrides=[
-            Parameter(name, value=value) for name, value in {'error_span': 0.5, **values}.items()])
+        self.node = running.add(MonitorNode, parameter_overrides=overrides(
+            **{'error_span': 0.5, **values}))
         self.model_effort = running.listen(JointState, '/monitor/model_effort', 1000)
         self.residual = running.listen(JointState, '/monitor/residual', 1000)
         self.error = running.listen(Float64MultiArray, '/monitor/error', 1000)

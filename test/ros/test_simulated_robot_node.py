@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from closed_loop import CASES, RATE, Case, Tracking, execute, run_case
-from node_bench import Bench, bench
+from node_bench import Bench, bench, overrides
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -40,8 +40,7 @@ class RobotBench:
 
     def __init__(self, running: Bench, **values: object) -> None:
         self.bench = running
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        self.node = running.add(SimulatedRobotNode, parameter_overrides=overrides)
+        self.node = running.add(SimulatedRobotNode, parameter_overrides=overrides(**values))
         self.states = running.listen(JointState, '/joint_states', 1000)
         running.follow_status('/simulated_robot/status')
         self.setpoint = running.probe.create_publisher(

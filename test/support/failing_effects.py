@@ -128,14 +128,21 @@ def parameters(*effects: str) -> dict[str, Any]:
     return values
 
 
+def fail(package: Any, place: str, fault: str = 'raises') -> None:
+    """Make a method fail from now on."""
+    package.PLACE, package.FAULT = place, fault
+
+
 @contextmanager
 def installed(folder: Path) -> Iterator[ModuleType]:
-    """Give the package's module, installed for this process; PLACE and FAULT say what fails."""
+    """Give the package's module, installed for this process; nothing fails until `fail`."""
     sys.path.insert(0, str(install(folder)))
     catalogue.cache_clear()
     try:
         assert set(EFFECTS) <= set(catalogue())
-        yield sys.modules[PACKAGE]
+        module = sys.modules[PACKAGE]
+        fail(module, 'nowhere', 'none')
+        yield module
     finally:
         sys.path.remove(str(folder))
         sys.modules.pop(PACKAGE, None)

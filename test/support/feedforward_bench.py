@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from node_bench import Bench, bench
-from rclpy.parameter import Parameter
+from node_bench import Bench, bench, overrides
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -94,11 +93,9 @@ def feedforward_bench(
     Keywords are parameters with `__` for the dot, `message` on `topic` what asks the node for
     forces.
     """
-    values = {'command_timeout': 0.0, **parameters}
-    overrides = [Parameter(name.replace('__', '.'), value=value)
-                 for name, value in values.items()]
+    given = overrides(**{'command_timeout': 0.0, **parameters})
     with bench() as running:
-        yield FeedforwardBench(running, message, topic, parameter_overrides=overrides).connect()
+        yield FeedforwardBench(running, message, topic, parameter_overrides=given).connect()
 
 
 def random_motion(rng: np.random.Generator, points: int) -> PlatformMotion:

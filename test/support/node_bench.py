@@ -17,6 +17,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
@@ -81,6 +82,11 @@ def checked_status(data: str) -> dict[str, Any]:
     status: dict[str, Any] = json.loads(data)
     jsonschema.validate(status, STATUS)
     return status
+
+
+def overrides(**values: Any) -> list[Parameter]:
+    """Return parameters as a node takes them when it starts, `__` in a name for the dot."""
+    return [Parameter(name.replace('__', '.'), value=value) for name, value in values.items()]
 
 
 @contextmanager
