@@ -206,20 +206,17 @@ class LiveDiagnosis:
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
                         answer.to_dict(), answer.adopted,
                         without_found(self.model, answer), noise)
-        # Numbers known to a tolerance move with the fit: what they alone explain is no effect's,
-        # and an effect may only make up for what they have moved too far.
-        holds = self.last is not None and self.effects and all(
-            _certainty(each, self.last.adopted, recording, noise) > live.certainty
-            for each in (self.model, self.last.plain))
-        effects = []
-        for found in answer.effects:
-            effect = LiveEffect(found, None, False, _names(answer, found))
-            before = next((one for one in self.effects if one.is_same(effect)), None)
-            if before is not None and before.confirmed:
-                effect = replace(effect, since=before.since, confirmed=True)
-            elif before is not None and holds:
-                effect = replace(effect, since=self._beginning(answer, window), confirmed=True)
-            effects.append(effect)
+        holds = self._holds(recording, noise, live.certainty)
+        effects = [LiveEffect(found, None, False, _names(answer, found))
+                   for found in answer.effects]
+        known = [next((one for one in self.effects if one.is_same(effect)), None)
+                 for effect in effects]
+        began = (self._beginning(window) if holds and any(
+            one is not None and not one.confirmed for one in known) else None)
+        effects = [
+            effect if one is None or not (one.confirmed or holds)
+            else replace(effect, since=one.since if one.confirmed else began, confirmed=True)
+            for effect, one in zip(effects, known, strict=True)]
         missed = [one for one in self.effects if one.confirmed
                   and not any(one.is_same(effect) for effect in effects)]
         # A window in which a change happens to be weak does not end it while it still helps.
@@ -229,13 +226,28 @@ class LiveDiagnosis:
                        recent=(*self.recent, (recording, start))[-live.recent:],
                        withdrawn=() if holds else tuple(missed))
 
-    def _beginning(self, answer: Diagnosis, window: Window) -> float | None:
+    def _holds(self, recording: Recording, noise: Mapping[str, NoiseSpectrum], least: float,
+               ) -> bool:
+        """Return whether what the last window found predicts a recording better than without it.
+
+        By more than some standard errors. Numbers known to a tolerance move with the fit: what
+        they alone explain is no effect's, and an effect may only make up for what they have moved
+        too far.
+        """
+        if self.last is None or not self.effects:
+            return False
+        after, _ = measure_residuals(self.last.adopted, [recording])
+        return all(
+            certainty(block_gains(measure_residuals(model, [recording])[0], after, noise)) > least
+            for model in (self.model, self.last.plain))
+
+    def _beginning(self, window: Window) -> float | None:
         """Return when the change that a window has came, in this or a recent one [s]."""
         gains, times = [], []
         for each, start in (*self.recent, (window.recording, window.start)):
             before, _ = measure_residuals(window.plain, [each])
             after, _ = measure_residuals(window.adopted, [each])
-            gains.append(sample_gains(before, after, answer.noise))
+            gains.append(sample_gains(before, after, window.noise))
             times.append(start + before.time - before.time[0])
         return change_point(np.concatenate(times), np.concatenate(gains))
 
@@ -268,14 +280,6 @@ def change_point(time: Array, gains: Array) -> float | None:
     cumulated = np.concatenate(([0.0], np.cumsum(gains)))
     first = int(np.argmin(cumulated))
     return None if first == 0 else float(time[min(first, len(time) - 1)])
-
-
-def _certainty(without: ForceModel, with_effects: ForceModel, recording: Recording,
-               noise: Mapping[str, NoiseSpectrum]) -> float:
-    """Return by how many standard errors a model predicts a recording better than another."""
-    before, _ = measure_residuals(without, [recording])
-    after, _ = measure_residuals(with_effects, [recording])
-    return certainty(block_gains(before, after, noise))
 
 
 def _names(answer: Diagnosis, found: FoundEffect) -> frozenset[str]:
