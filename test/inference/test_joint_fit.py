@@ -177,3 +177,35 @@ def test_what_remains_is_the_error_less_all_that_is_fitted() -> None:
             if d in block.rows:
                 rest = rest - fit.coefficients[fit.places[block]] @ block.rows[d]
         assert regression.remaining(fit, d) == pytest.approx(rest, abs=1e-9)
+
+
+def test_coefficients_that_are_held_leave_the_others_where_they_fit_best() -> None:
+    regression, blocks = made_up()
+    fit = regression.fit(blocks)
+    index = [fit.places[blocks[0]].start, fit.places[blocks[1]].start]
+    held = regression.held(fit, index, fit.coefficients[index] + [0.3, -0.2])
+    np.testing.assert_allclose(held.coefficients[index] - fit.coefficients[index], [0.3, -0.2])
+    for k, d in enumerate(regression.drives):
+        left = regression.remaining(held, d)
+        assert held.squares[k].sum() == pytest.approx(left @ left, rel=1e-6)
+
+    def penalised(coefficients: np.ndarray) -> float:
+        """Return what of the deviance depends on coefficients, under the noise of the fit."""
+        moved = replace(held, coefficients=coefficients)
+        mean = np.concatenate([np.zeros(len(regression.columns))] + [
+            np.zeros(block.size) if block.mean is None else block.mean for block in blocks])
+        prior = block_diag(np.diag([column.precision for column in regression.columns]),
+                           *(block.precision for block in blocks))
+        away = coefficients - mean
+        return float(away @ prior @ away) + sum(
+            float(regression.remaining(moved, d) ** 2
+                  @ regression.series[d].spread(regression.weights(fit, d)))
+            for d in regression.drives)
+
+    lowest = penalised(held.coefficients)
+    assert held.deviance - fit.deviance == pytest.approx(
+        lowest - penalised(fit.coefficients), rel=1e-4)
+    certain = range(*fit.places[blocks[2]].indices(len(fit.coefficients)))
+    for k in set(range(len(fit.coefficients))) - {*index, *certain}:
+        for step in (-0.01, 0.01):
+            assert penalised(held.coefficients + step * np.eye(len(fit.coefficients))[k]) > lowest

@@ -227,13 +227,9 @@ class TickFits:
         return self.search.refined(found)
 
     def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
-        """Return a set with the linear parameters that somebody chose; all else follows.
-
-        The rest of a Gaussian posterior moves along with what is held; its density there is
-        what the departure costs.
-        """
+        """Return a set with the linear parameters that somebody chose; all else follows."""
         index: list[int] = []
-        delta: list[float] = []
+        values: list[float] = []
         by_effect = {tick.effect: tick for tick in ticks}
         for candidate in found.effects:
             chosen = by_effect[candidate.effect].chosen
@@ -247,15 +243,11 @@ class TickFits:
                 wanted = candidate.effect.to_coefficients({**placement.values(c), **mine})
                 place = found.fit.places[found.blocks[placement]]
                 index += range(place.start, place.stop)
-                delta += [wanted[name] - old for name, old in zip(placement.names, c, strict=True)]
+                values += [wanted[name] for name in placement.names]
         if not index:
             return found
-        covariance = found.fit.covariance
-        moved = np.linalg.solve(covariance[np.ix_(index, index)], np.array(delta))
-        coefficients = found.fit.coefficients + covariance[:, index] @ moved
-        cost = float(np.array(delta) @ moved)
-        fit = replace(found.fit, coefficients=coefficients, deviance=found.fit.deviance + cost)
-        return replace(found, fit=fit, total=found.total + cost)
+        fit = self.search.regression.held(found.fit, index, np.array(values))
+        return replace(found, fit=fit, total=found.total + fit.deviance - found.fit.deviance)
 
     # What a set says
 

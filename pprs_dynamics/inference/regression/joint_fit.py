@@ -18,7 +18,7 @@ constant. Coefficients and noise are fitted in turn until it stands still.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -224,6 +224,22 @@ class Regression:
         solution = system.solve(spectra, self.counts)
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
+
+    def held(self, fit: JointFit, index: Sequence[int], values: Array) -> JointFit:
+        """Return a fit with some coefficients (k,) as given, the others fitted beside them.
+
+        The rest of a Gaussian posterior moves along with what is held; its density there is what
+        the departure costs. The noise stays.
+        """
+        away = values - fit.coefficients[index]
+        pull = np.linalg.solve(fit.covariance[np.ix_(index, index)], away)
+        coefficients = fit.coefficients + fit.covariance[:, index] @ pull
+        squares = np.empty_like(fit.squares)
+        for k, d in enumerate(self.drives):
+            place, felt = self.local(fit, d)
+            squares[k] = self.equations(d, tuple(felt)).left(coefficients[place])
+        return replace(fit, coefficients=coefficients, squares=squares,
+                       deviance=fit.deviance + float(away @ pull))
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""

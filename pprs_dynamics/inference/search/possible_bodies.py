@@ -16,7 +16,6 @@ inertial parameter identification, IEEE Robotics and Automation Letters 3 (2018)
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +27,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import REACH
 from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.physics.effects.added_body import AXES, KEPT, MOMENTS, AddedBody
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.effects.structure_effect import with_bodies
 from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 
@@ -58,23 +57,13 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
     """
     for component, block in bodies.items():
         place = fit.places[block]
-        found = nearest_possible(robot_of(model), component, fit.of(block),
-                                 fit.covariance[place, place])
+        robot = with_bodies(model.robot, model.effects)  # type: ignore[attr-defined]
+        found = nearest_possible(robot, component, fit.of(block), fit.covariance[place, place])
         if found is None:
             return None
         if not np.array_equal(found, fit.of(block)):
-            fit = held(regression, fit, block, found)
+            fit = regression.held(fit, range(place.start, place.stop), found)
     return fit
-
-
-def robot_of(model: ForceModel) -> Mechanism:
-    """Return the mechanism of a model with the bodies that its effects add."""
-    robot = model.robot  # type: ignore[attr-defined]
-    for effect in model.effects:
-        if isinstance(effect, BodyEffect):
-            robot = effect.changed(robot)
-    assert isinstance(robot, Mechanism)
-    return robot
 
 
 def nearest_possible(robot: Mechanism, component: Component, c: Array, covariance: Array,
@@ -168,17 +157,3 @@ def _margins(robot: Mechanism, component: Component, sign: float) -> Callable[[A
             found.append(np.asarray(np.linalg.eigvalsh(taken), dtype=float) + 1 - KEPT)
         return np.concatenate(found)
     return margins
-
-
-def held(regression: Regression, fit: JointFit, block: Block, values: Array) -> JointFit:
-    """Return a fit with a block's coefficients as given, the others fitted beside them."""
-    place = fit.places[block]
-    away = values - fit.of(block)
-    pull = np.linalg.solve(fit.covariance[place, place], away)
-    coefficients = fit.coefficients + fit.covariance[:, place] @ pull
-    squares = fit.squares.copy()
-    for k, d in enumerate(regression.drives):
-        index, felt = regression.local(fit, d)
-        squares[k] = regression.equations(d, tuple(felt)).left(coefficients[index])
-    return replace(fit, coefficients=coefficients, squares=squares,
-                   deviance=fit.deviance + float(away @ pull))

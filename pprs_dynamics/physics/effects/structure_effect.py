@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
 from pprs_dynamics.arrays import Array
@@ -66,6 +66,14 @@ class BodyEffect(StructureEffect):
         """Return the change of the rigid body's drive forces [N, N m], (N, D)."""
         added: Array = self.apply(state).rigid_force - state.rigid_force
         return added
+
+
+def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
+    """Return a robot with what those of some effects that act on bodies make of it."""
+    for effect in effects:
+        if isinstance(effect, BodyEffect):
+            robot = effect.changed(robot)
+    return robot
 
 
 class PassiveJointEffect(StructureEffect):

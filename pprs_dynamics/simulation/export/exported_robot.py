@@ -13,14 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError, SingularityError
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.effects.structure_effect import with_bodies
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -141,21 +140,13 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     """
     model = expressed.model
     if isinstance(model, DriveModel):
-        name, mechanism = 'three_pprs', _platform(_loaded(model), model, kind)
+        robot = with_bodies(model.robot, model.effects)
+        name, mechanism = 'three_pprs', _platform(robot, model, kind)
     elif isinstance(model, ArmModel):
-        name, mechanism = model.block, _loaded(model)
+        name, mechanism = model.block, with_bodies(model.robot, model.effects)
     else:
         name, mechanism = 'single_axis', _axis(model)
     return ExportedRobot(name, mechanism, expressed.joints, tuple(_bodies(mechanism)))
-
-
-def _loaded(model: DriveModel | ArmModel) -> Any:
-    """Return the robot with the effects on its bodies in them."""
-    robot: Any = model.robot
-    for effect in model.effects:
-        if isinstance(effect, BodyEffect):
-            robot = effect.changed(robot)
-    return robot
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
