@@ -38,7 +38,6 @@ from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.body_centres import about_centre
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -230,8 +229,7 @@ class ColumnPlan:
         wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
             one, (FittedTerm, PresentCoefficient, PresentShape))}
         structure = tuple(effect for effect in wanted if issubclass(effect, StructureEffect))
-        shifts = any(issubclass(effect, MeasurementEffect) and effect.shifts_positions()
-                     for effect in wanted)
+        shifts = any(effect.shifts_positions() for effect in wanted)
         none = np.zeros((0, *forces.total.shape))
         if isinstance(self.model, DriveModel):
             found = ChunkSensitivities(self.model, forces)

@@ -266,7 +266,8 @@ class Design:
 
     def term(self, effect: type[DriveEffect], drive: int, shape: Mapping[str, float]) -> Term:
         """Return an effect on one drive, of one shape."""
-        if issubclass(effect, MeasurementEffect) and effect.shifts_positions():
+        if effect.shifts_positions():
+            assert issubclass(effect, MeasurementEffect)
             units = [effect({self.drives[drive]: effect.from_coefficients(
                 {c.name: float(c is unit) for c in effect.coefficients})}).position_error(
                     self.drives) for unit in effect.coefficients]

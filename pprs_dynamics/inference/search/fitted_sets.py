@@ -31,7 +31,6 @@ from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.physics.effects.added_body import AddedBody
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 NEAR = 1e-3  # [m], within which a body is where its columns are
@@ -237,19 +236,15 @@ class FittedSets:
 
     def _reach(self, component: Component) -> dict[str, float]:
         """Return how far each shape parameter may move at once: half the way between trials."""
-        effect, d = component.effect, component.drive
-        assert d is not None
-        assert issubclass(effect, DriveEffect)
-        trials = effect.trials(self.design.covered[d])
         reach = {}
-        for parameter in effect.shape:
+        for parameter in component.effect.shape:
             value = component.parameters[parameter.name]
-            known = np.array(sorted({trial[parameter.name] for trial in trials}))
+            known = self.library.tried(component, parameter.name)
             if len(known) < 2:
                 reach[parameter.name] = 0.5
                 continue
             at = int(np.clip(np.searchsorted(known, value), 1, len(known) - 1))
-            gap = float(known[at] - known[at - 1])
+            gap = known[at] - known[at - 1]
             reach[parameter.name] = max(0.5 * parameter.amount(gap, value), 1e-3)
         return reach
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -27,7 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
 
 class DriveLibrary:
@@ -45,9 +45,7 @@ class DriveLibrary:
         self.series = regression.series[d]
         self.design = design
         self.effects = [effect for effect in searched_in_drives(design)
-                        if design.acts_on(effect, d) and not _acts_everywhere(effect)]
-        self.trials = {effect.name: len(effect.trials(design.covered[d]))
-                       for effect in self.effects}
+                        if design.acts_on(effect, d) and not effect.shifts_positions()]
 
     @cached_property
     def score_test(self) -> ScoreTest[Component]:
@@ -100,13 +98,13 @@ class Library:
         self._terms: dict[Hashable, Term] = {}
         self._centres: dict[Hashable, tuple[float, ...]] = {}
         self._blocks: dict[Component, Block] = {}
-        self._open: dict[Component, Array | None] = {}
-        self._ranges: dict[Hashable, Mapping[str, tuple[float, float, int]]] = {}
+        self._nuisance: dict[Component, Array | None] = {}
+        self._prices: dict[Component, float] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
-        acting = [effect for effect in searched_in_drives(design) if _acts_everywhere(effect)]
         self.spanning = [Component.of(effect, d, {}, names)
-                         for effect in acting for d in regression.drives
-                         if design.acts_on(effect, d) for names in effect.variants]
+                         for effect in searched_in_drives(design) if effect.shifts_positions()
+                         for d in regression.drives if design.acts_on(effect, d)
+                         for names in effect.variants]
         self.structure = [self._placed(term, names) for term in design.structure
                           for names in term.effect.variants
                           if any(np.any(rows[[term.names.index(name) for name in names]])
@@ -124,8 +122,8 @@ class Library:
         return replace(found, centre=self._centres[key])
 
     @cached_property
-    def _scan(self) -> ScoreTest[Component]:
-        """Of all that more than one drive feels."""
+    def score_test(self) -> ScoreTest[Component]:
+        """All that more than one drive feels; computed when asked for."""
         series = self.regression.series
         entries, parts, first = [], [], 0
         for one in (*self.structure, *self.spanning):
@@ -143,7 +141,7 @@ class Library:
         """Return what more than one drive feels, with its gains at the noise of a fit."""
         if not self.structure and not self.spanning:
             return []
-        return [(one, float(gain)) for components, gains in self._scan.gains(fit)
+        return [(one, float(gain)) for components, gains in self.score_test.gains(fit)
                 for one, gain in zip(components, gains, strict=True)]
 
     def term(self, component: Component) -> Term:
@@ -180,23 +178,22 @@ class Library:
         """Return the shape parameters at the edge of what is tried, `share` of it or nearer."""
         found = []
         for name, value in component.shape:
-            lowest, highest, count = self._tried_shapes(component)[name]
-            if count > 2 and not (lowest + share * abs(lowest) < value
-                                  < highest - share * abs(highest)):
+            tried = self.tried(component, name)
+            lowest, highest = tried[0], tried[-1]
+            if len(tried) > 2 and not (lowest + share * abs(lowest) < value
+                                       < highest - share * abs(highest)):
                 found.append(name)
         return found
 
-    def _tried_shapes(self, component: Component) -> Mapping[str, tuple[float, float, int]]:
-        """Return the lowest, the highest and the number of values of each shape parameter."""
+    def trials(self, component: Component) -> Sequence[Mapping[str, float]]:
+        """Return the shapes in which a component is tried."""
         effect, d = component.effect, component.drive
-        if (effect, d) not in self._ranges:
-            assert d is not None
-            assert issubclass(effect, DriveEffect)
-            trials = effect.trials(self.design.covered[d])
-            values = {p.name: {trial[p.name] for trial in trials} for p in effect.shape}
-            self._ranges[effect, d] = {name: (min(some), max(some), len(some))
-                                       for name, some in values.items()}
-        return self._ranges[effect, d]
+        return (effect.trials(self.design.covered[d])
+                if d is not None and issubclass(effect, DriveEffect) else ({},))
+
+    def tried(self, component: Component, name: str) -> list[float]:
+        """Return the values of a shape parameter that are tried, in order."""
+        return sorted({trial[name] for trial in self.trials(component)})
 
     def unloaded(self, component: Component) -> dict[int, Array] | None:
         """Return what its columns change by if friction did not follow its loads, (k, n)."""
@@ -212,22 +209,16 @@ class Library:
 
         How friction turns over where it knows no past, and the effect's own deviations.
         """
-        if component not in self._open:
-            self._open[component] = self._nuisance_rows(component)
-        return self._open[component]
-
-    def _nuisance_rows(self, component: Component) -> Array | None:
         d = component.drive
         if d is None or not component.names:
             return None
-        rows = np.stack([nuisance_rows(self.design, self.term(component), component.every(unit))
-                         for unit in np.eye(len(component.names))])
-        return self.regression.series[d].transform(rows) if np.any(rows) else None
-
-    def tried(self, component: Component) -> int:
-        """Return how many shapes of a component are tried."""
-        return (1 if component.drive is None else
-                self.local[component.drive].trials.get(component.effect.name, 1))
+        if component not in self._nuisance:
+            rows = np.stack([
+                nuisance_rows(self.design, self.term(component), component.every(unit))
+                for unit in np.eye(len(component.names))])
+            self._nuisance[component] = (
+                self.regression.series[d].transform(rows) if np.any(rows) else None)
+        return self._nuisance[component]
 
     def price(self, candidate: Candidate) -> float:
         """Return the price of everything that was chosen."""
@@ -236,25 +227,20 @@ class Library:
     def component_price(self, component: Component) -> float:
         """Return the price of a component beside that of its candidate's hypotheses and drives.
 
-        That an effect is usually small makes large values unlikely, and small ones no likelier.
+        That an effect is usually small makes large values unlikely, and small ones no likelier:
+        it costs by how much that narrows the prior, and the odds that it is otherwise at all.
         """
-        return (self.prices.of_component(component.effect, self.tried(component))
-                + self._narrowed(component))
-
-    def _narrowed(self, component: Component) -> float:
-        """Return what it costs that a component is not as usual, in deviance.
-
-        By how much that narrows its prior, and the odds that it is otherwise at all.
-        """
-        usual = self._expected(component)
-        if not np.any(usual):
-            return 0.0
-        decisions, both = self.prices.decisions, self.block(component).precision
-        is_zero = (issubclass(component.effect, MeasurementEffect)
-                   and component.effect.shifts_positions())
-        odds = decisions.zero_odds if is_zero else decisions.gain_odds
-        return float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1]
-                     - 2 * np.log(odds))
+        if component not in self._prices:
+            price = self.prices.of_component(component.effect, len(self.trials(component)))
+            usual = self._expected(component)
+            if np.any(usual):
+                decisions, both = self.prices.decisions, self.block(component).precision
+                odds = (decisions.zero_odds if component.effect.shifts_positions()
+                        else decisions.gain_odds)
+                price += float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1]
+                               - 2 * np.log(odds))
+            self._prices[component] = price
+        return self._prices[component]
 
     def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
         """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
@@ -271,10 +257,5 @@ class Library:
 
     def release(self) -> None:
         """Let go of what scans need; it is computed again if it is asked for."""
-        vars(self).pop('_scan', None)
-        for local in self.local.values():
-            vars(local).pop('score_test', None)
-
-
-def _acts_everywhere(effect: type[DriveEffect]) -> bool:
-    return issubclass(effect, MeasurementEffect) and effect.shifts_positions()
+        for one in (self, *self.local.values()):
+            vars(one).pop('score_test', None)

@@ -4,7 +4,7 @@
 """Which effects, on which drives, would lower the cost of a set: proposals by a scan.
 
 A scan takes all terms in all shapes at the noise of a set's fit, where the gain of each is a matter
-of sums that are known. It proposes; a fit with its own noise decides (`selection.search`).
+of sums that are known. It proposes; a fit with its own noise decides (`search.search`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class ScannedSets(FittedSets):
             Only these.
         """
         scored: list[tuple[float, Candidates]] = []
-        for effect, found in self._scan(base, drive).items():
+        for effect, found in self._offers(base, drive).items():
             if effects is not None and effect not in effects:
                 continue
             old = next((c for c in base.effects if c.effect is effect), None)
@@ -57,8 +57,8 @@ class ScannedSets(FittedSets):
         scored.sort(key=lambda one: -one[0])
         return [candidates for _, candidates in scored[:count]]
 
-    def _scan(self, base: CandidateSet, drive: int | None = None,
-              ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
+    def _offers(self, base: CandidateSet, drive: int | None = None,
+                ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
         """Return gains less prices of components, by effect; one for each drive."""
         library, fit = self.library, base.fit
         taken = {(c.effect, one.drive) for c in base.effects for one in c.components}

@@ -185,7 +185,7 @@ class Search(ScannedSets):
         base = self._evaluated[frozenset()]
         fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
         for near in (base, fast):
-            found = self._scan(near).get(effect, [])
+            found = self._offers(near).get(effect, [])
             if drives is None:
                 chosen = self._best_drives(effect, found, None)[1] if found else []
             else:

@@ -71,8 +71,6 @@ class AddedBody(BodyEffect):
         Of links that are alike the first stands for all with a body anywhere; with a mass more
         at its own centre each of them is a hypothesis of its own.
         """
-        others = {name: tuple(one for one in group if one != name)
-                  for group in alike for name in group if len(group) > 1}
         stand_ins = {name for group in alike for name in group[1:]}
         linear = tuple(one for place in places for one in body_parameters(*place))
         coefficients = tuple(one for prefix, link, _, _ in places
@@ -87,7 +85,7 @@ class AddedBody(BodyEffect):
                           (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
         made: type[Self] = type(cls.__name__, (cls,), {
             'places': places, 'linear': linear, 'coefficients': coefficients,
-            'variants': tuple(names), 'alike': others, '__module__': cls.__module__,
+            'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
             'made_by': (cls.on, (places, alike))})
         return made
 

@@ -55,7 +55,8 @@ GROUP = 'pprs_dynamics.effects'
 # Parts of the drive forces and keys of the block `effects` that have these names already.
 RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
 
-EFFECTS: dict[str, type[CatalogueEffect]] = {
+# What a diagnosis may name.
+CATALOGUE: dict[str, type[CatalogueEffect]] = {
     effect.name: effect
     for effect in (
         AsymmetricFriction,
@@ -73,7 +74,6 @@ EFFECTS: dict[str, type[CatalogueEffect]] = {
         JointFrictionEffect,
         LinkMass,
         LoadFriction,
-        MeasuredCurve,
         PayloadMass,
         PayloadOffset,
         PlatformDrag,
@@ -89,8 +89,8 @@ EFFECTS: dict[str, type[CatalogueEffect]] = {
     )
 }
 
-# What a diagnosis may name: a measured curve, e.g., is in models like any effect but no cause.
-CATALOGUE = {name: effect for name, effect in EFFECTS.items() if effect.is_cause}
+# A measured curve is in models like any of them, but no cause.
+EFFECTS: dict[str, type[CatalogueEffect]] = {**CATALOGUE, MeasuredCurve.name: MeasuredCurve}
 
 
 def find_effect(name: str) -> type[CatalogueEffect] | None:

@@ -203,10 +203,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_of_one_place : bool
         True where each variant is at a place of its own, a link or a joint: that a motion does
         not show every one of them is not worth telling.
-    is_cause : bool
-        False where a model may have it, but a diagnosis never names it.
-    alike : mapping of str to tuple of str
-        By place, other places at which the effect does the same in every motion.
+    alike : tuple of tuple of str
+        Groups of places at which the effect does the same in every motion.
     """
 
     card: ClassVar[Card]
@@ -225,8 +223,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
-    is_cause: ClassVar[bool] = True
-    alike: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    alike: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):
@@ -267,7 +264,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         if not cls.is_of_one_place:
             return ()
         places = dict.fromkeys(name.rpartition('.')[0] for name in names)
-        return tuple(tuple(sorted((one, *cls.alike.get(one, ())))) for one in places)
+        return tuple(next((tuple(sorted(group)) for group in cls.alike if one in group), (one,))
+                     for one in places)
 
     @classmethod
     def bound(cls, robot: Any) -> type[Self]:
@@ -278,6 +276,11 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         robot : Mechanism
         """
         return cls
+
+    @classmethod
+    def shifts_positions(cls) -> bool:
+        """Return whether measured positions are not the true ones: all drives feel that."""
+        return False
 
     @classmethod
     @abstractmethod

@@ -130,8 +130,6 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
     of its own.
     """
     linear, variants, bounds = [], [], {}
-    others = {name: tuple(one for one in group if one != name)
-              for group in alike for name in group}
     stand_ins = {name for group in alike for name in group[1:]}
     for name, _ in joints:
         linear += [
@@ -148,7 +146,7 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
         bounds.update({f'{name}.{last}': 0.0 for last in ('viscous', 'torque', 'coulomb')})
     return type('JointFrictionEffect', (JointFrictionEffect,), {
         'linear': tuple(linear), 'variants': tuple(variants), 'radii': dict(joints),
-        'unphysical_below': bounds, 'alike': others, '__module__': __name__,
+        'unphysical_below': bounds, 'alike': alike, '__module__': __name__,
         'made_by': (_in_joints, (joints, alike))})
 
 

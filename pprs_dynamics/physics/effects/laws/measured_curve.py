@@ -105,7 +105,6 @@ class MeasuredCurve(DriveEffect):
     """A drive's force over one variable, as it was measured: a table, not a cause."""
 
     name: ClassVar[str] = 'measured_curve'
-    is_cause: ClassVar[bool] = False
     linear = ()
     variants = ((),)
     card = Card(
