@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -74,7 +73,7 @@ class SimulatedRobot:
             noise = values.largest
         else:
             self.plant, weight = Plant(values, effects, plant), WeightModel(values)
-            limits = Limits(**{one.name: values[f'limits.{one.name}'] for one in fields(Limits)})
+            limits = Limits.of(values)
         step = self.plant.settings.step
         self.steps_per_tick = max(1, round(1 / (rate * step)))
         if abs(self.steps_per_tick * step * rate - 1) > 1e-9:

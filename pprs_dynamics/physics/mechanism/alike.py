@@ -16,6 +16,7 @@ IEEE Transactions on Robotics and Automation 6 (1990).
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
@@ -28,27 +29,36 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 SAMPLES = 40  # random states: several times as many rows as a body has parameters
 WIDEST = 1.0  # [rad, m] that a drive moves from home at most
 HALVINGS = 6  # of that, until all states are within reach
+KEPT = 16  # of mechanisms: a model is built many times with other numbers
 SAME = 1e-7  # of a column's size that may lie outside the other's space: rounding
 
 
 def alike_bodies(robot: Mechanism) -> tuple[tuple[int, ...], ...]:
     """Return groups of bodies, by number, on which an added body does the same."""
-    if len(robot.bodies) < 2:
-        return tuple((k,) for k in range(len(robot.bodies)))
-    states = _states(robot.structure)
-    columns = robot.regressor(*states).reshape(-1, len(robot.bodies), PARAMETERS)
-    spaces = [_space(columns[:, k]) for k in range(len(robot.bodies))]
+    return _alike_bodies(robot.structure, tuple(robot.bodies.tolist()), tuple(robot.gravity))
+
+
+@lru_cache(KEPT)
+def _alike_bodies(structure: Structure, bodies: tuple[int, ...],
+                  gravity: tuple[float, float, float]) -> tuple[tuple[int, ...], ...]:
+    """Return the same; how heavy the bodies are does not matter."""
+    count = len(bodies)
+    if count < 2:
+        return tuple((k,) for k in range(count))
+    columns = _bare(structure, bodies, gravity).regressor(*_states(structure)).reshape(
+        -1, count, PARAMETERS)
+    spaces = [_space(columns[:, k]) for k in range(count)]
     return _groups(len(spaces), lambda i, j: spaces[i].shape == spaces[j].shape and bool(
         np.abs(spaces[j] - spaces[i] @ (spaces[i].T @ spaces[j])).max(initial=0.0) < SAME))
 
 
+@lru_cache(KEPT)
 def proportional_joints(structure: Structure) -> tuple[tuple[str, ...], ...]:
     """Return groups of joints whose rates are in the same proportion whatever the drives do."""
     position, rest, _ = _states(structure)
     names = tuple(structure.rows)
     at = [int(structure.tables.coordinate[structure.rows[name]]) for name in names]
-    rates = Mechanism(structure, np.zeros(0, dtype=int), np.zeros((0, PARAMETERS)), np.zeros(
-        len(structure.drives)), (0.0, 0.0, 0.0)).at(position, 0 * rest, 0 * rest).motion.T
+    rates = _bare(structure).at(position, 0 * rest, 0 * rest).motion.T
     rows = rates[:, at].transpose(1, 0, 2).reshape(len(names), -1)
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     unit = rows / np.where(size > 0, size, 1.0)
@@ -56,13 +66,19 @@ def proportional_joints(structure: Structure) -> tuple[tuple[str, ...], ...]:
         len(names), lambda i, j: bool(abs(abs(unit[i] @ unit[j]) - 1.0) < SAME)))
 
 
+def _bare(structure: Structure, bodies: tuple[int, ...] = (),
+          gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Mechanism:
+    """Return a mechanism whose bodies have no mass."""
+    return Mechanism(structure, np.array(bodies, dtype=int), np.zeros((len(bodies), PARAMETERS)),
+                     np.zeros(len(structure.drives)), gravity)
+
+
 def _states(structure: Structure) -> tuple[Array, Array, Array]:
     """Return random states of the drives about home, or the middle of their ranges."""
     rng = np.random.default_rng(0)
     middle, reach = structure.room(WIDEST)
     position, velocity, acceleration = rng.uniform(-1, 1, (3, SAMPLES, len(middle)))
-    bare = Mechanism(structure, np.zeros(0, dtype=int), np.zeros((0, PARAMETERS)),
-                     np.zeros(len(middle)), (0.0, 0.0, 0.0))
+    bare = _bare(structure)
     for halving in range(HALVINGS):
         at = middle + 0.5 ** (1 + halving) * reach * position
         try:

@@ -332,12 +332,12 @@ def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
         T[driven[d], d] = 1.0
     if count:
         gradients(t, m, passive_of, m.J)
-        there = size_of(t, m.J)
+        there = size_in_units(m.J, t.row_unit, t.passive_unit)
         for r in range(count):
             for c in range(count):
                 inverse[r, c] = 1.0 if r == c else 0.0
         m.state[1] = solve(m.J, inverse, count, count)
-        m.state[2] = there * size_of_inverse(t, inverse)
+        m.state[2] = there * size_in_units(inverse, t.passive_unit, t.row_unit)
         gradients(t, m, drive_of, rows)
         # Drives innermost: their sums do not wait for one another.
         for c in range(count):
@@ -364,29 +364,15 @@ def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
         accelerations(t, m)
 
 
-def size_of(t: Tables, J: Any) -> Any:
-    """Return Frobenius' norm of J_p in units of the mechanism's size."""
-    row_unit, unit = t.row_unit, t.passive_unit
-    total = 0.0 * J[0, 0]
-    for r in range(len(row_unit)):
+def size_in_units(matrix: Any, of_rows: Any, of_columns: Any) -> Any:
+    """Return Frobenius' norm of a matrix that takes what has units to what has others."""
+    total = 0.0 * matrix[0, 0]
+    for r in range(len(of_rows)):
         along = 0.0 * total
-        for c in range(len(unit)):
-            x = J[r, c] * unit[c]
+        for c in range(len(of_columns)):
+            x = matrix[r, c] * of_columns[c]
             along = along + x * x
-        total = total + along / (row_unit[r] * row_unit[r])
-    return sqrt(total)
-
-
-def size_of_inverse(t: Tables, inverse: Any) -> Any:
-    """Return the same of its inverse."""
-    row_unit, unit = t.row_unit, t.passive_unit
-    total = 0.0 * inverse[0, 0]
-    for c in range(len(unit)):
-        along = 0.0 * total
-        for r in range(len(row_unit)):
-            x = inverse[c, r] * row_unit[r]
-            along = along + x * x
-        total = total + along / (unit[c] * unit[c])
+        total = total + along / (of_rows[r] * of_rows[r])
     return sqrt(total)
 
 

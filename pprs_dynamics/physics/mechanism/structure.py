@@ -9,7 +9,7 @@ coordinate of the joint that it follows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -264,14 +264,6 @@ class _Builder:
         self.coordinate[row] = self.coordinate[self.rows[leader.name]]
         self.ratio[row], self.offset[row] = ratio, offset
 
-    def path(self, row: int) -> list[int]:
-        """Return the joints from one up to the base."""
-        path = []
-        while row:
-            path.append(row)
-            row = self.parent[row]
-        return path
-
     def tables(self, loops: tuple[Loop, ...], passive: Integers, rows: Integers | None,
                size: float) -> Tables:
         """Return tables with all rows of the loops, or with chosen ones."""
@@ -280,7 +272,7 @@ class _Builder:
         kept = every if rows is None else [every[r] for r in rows]
         starts, joints, signs = [0], [], []
         for a, _, b, _ in placed:
-            of_a, of_b = self.path(a), self.path(b)
+            of_a, of_b = path_to_base(self.parent, a), path_to_base(self.parent, b)
             for path, other, sign in ((of_b, of_a, 1), (of_a, of_b, -1)):
                 for row in path:
                     if row not in other:
@@ -446,19 +438,26 @@ def _moves(structure: Structure) -> Array:
     moves = []
     for carrier, point, is_tool in points:
         linear, angular = np.zeros((2, 3, len(structure.home)))
-        j = carrier
-        while j:
+        for j in path_to_base(t.parent, carrier):
             c, z = int(t.coordinate[j]), t.ratio[j] * m.z[0, j]
             if t.turns[j]:
                 angular[:, c] += z
                 linear[:, c] += np.cross(z, point - m.p[0, j])
             else:
                 linear[:, c] += z
-            j = int(t.parent[j])
         moves.append(linear / size if is_tool else SPIN * linear / size)
         if is_tool:
             moves.append(angular)
     return np.concatenate(moves)
+
+
+def path_to_base(parent: Sequence[int] | Integers, row: int) -> list[int]:
+    """Return the joints from one up to the base, which is 0, by the parent of each."""
+    path = []
+    while row:
+        path.append(row)
+        row = int(parent[row])
+    return path
 
 
 def pose_frame(pose: tuple[float, ...]) -> Frame:

@@ -24,7 +24,12 @@ from pprs_dynamics.physics.mechanism.linkage import Integers, follow, twists
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Tables
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.structure import STRIDE_SLIDE, STRIDE_TURN, Structure
+from pprs_dynamics.physics.mechanism.structure import (
+    STRIDE_SLIDE,
+    STRIDE_TURN,
+    Structure,
+    path_to_base,
+)
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them
@@ -184,10 +189,7 @@ def _with_pose(t: Tables, row: int, frame: Frame, home: Frame, chosen: Integers,
     axes, turned = np.eye(3)[[0, 1, 2, 2, 1, 0]], np.tile(np.eye(3), (6, 1, 1))
     origins = np.zeros((6, 3))
     origins[0], turned[SLIDES] = home.p, home.R
-    way = []
-    while row:
-        way.append(row)
-        row = int(t.parent[row])
+    way = path_to_base(t.parent, row)
     ties, joints = ROWS['fixed'], np.arange(first, first + 6)
     added = {
         'parent': [0, *joints[:-1]], 'turns': [False] * 3 + [True] * 3, 'place_R': turned,

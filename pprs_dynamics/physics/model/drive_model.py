@@ -147,7 +147,7 @@ class DriveModel(ForceModel):
                                      'be a lower and a higher position [m]')
             robot = Robot(Geometry(**_group(values, 'geometry.')),
                           Masses(**_group(values, 'masses.')), values['gravity'])
-            limits = Limits(**_group(values, 'limits.'))
+            limits = Limits.of(values)
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
                        _passive_friction(values, limits),
                        *added_effects(parameters, cls, cls.drives))

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -168,6 +168,11 @@ class Limits(DriveLimits):
     condition_number: float
     rod_sine: float
     rod_cosine: float
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Limits:
+        """Return the limits in the values of a model, by flat keys."""
+        return cls(**{one.name: values[f'limits.{one.name}'] for one in fields(cls)})
 
     @cached_property
     def strokes(self) -> tuple[Array, Array]:
