@@ -65,7 +65,7 @@ def refit_base(model: ForceModel, recordings: Sequence[Recording],
         As `measure_residuals`.
     """
     found = fit_base(model, recordings, validate, progress)
-    before = errors_of(model, validate or recordings)
+    before = errors_of(model, validate) if validate else found.before
     drives = [drive for drive in before if drive in found.held_out]
     # Drives of different sizes and units count alike.
     ratio = float(np.sqrt(np.mean([

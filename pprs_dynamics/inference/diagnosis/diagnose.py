@@ -238,7 +238,9 @@ class _Answer:
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 search.library.force(self.kept, candidate, remaining.shape), said.at_bound,
                 self.ranking.shares[k],
-                held_out[k + 1] >= held_out[k] and not self.validate and self._is_predicted(k)))
+                errors[k + 1] < errors[k] and (
+                    held_out[k + 1] < held_out[k]
+                    or (not self.validate and self._is_predicted(k)))))
         return found
 
     def _is_predicted(self, k: int) -> bool:

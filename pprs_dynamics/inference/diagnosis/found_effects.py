@@ -33,12 +33,13 @@ class FoundEffect:
         What it contributes [N].
     at_bound : tuple of str
         Parameters whose value is none: at the edge of what was tried.
-    is_predicted : bool
-        Whether held-out blocks are predicted better for certain, each frequency in units of its
-        noise, though their rms may not fall: slow noise and the model's own numbers have a share.
     share : float
         Of the error that it takes away, beside the effects before it: of the root mean square
         over drives, each as a multiple of its noise.
+    is_confirmed : bool
+        Whether the error falls with it, and that on held-out data: either their rms, or for
+        certain that of each frequency in units of its noise. In the former slow noise and the
+        model's own numbers have a share.
     """
 
     effect: type[CatalogueEffect]
@@ -52,7 +53,7 @@ class FoundEffect:
     force: Array
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
-    is_predicted: bool = False
+    is_confirmed: bool = True
 
     @property
     def name(self) -> str:
@@ -63,12 +64,6 @@ class FoundEffect:
     def places(self) -> tuple[tuple[str, ...], ...]:
         """Links or joints that it is on, each with those that no motion tells it from."""
         return self.effect.places_of(self.parameters)
-
-    @property
-    def is_confirmed(self) -> bool:
-        """Return whether the error falls with it, and that on held-out data."""
-        return self.error_after < self.error_before and (
-            self.held_out_after < self.held_out_before or self.is_predicted)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""

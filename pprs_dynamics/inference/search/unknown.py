@@ -8,6 +8,7 @@ They compete with the effects of the catalogue in the same search and by the sam
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -44,11 +45,14 @@ class Shared:
 
     def __init__(self) -> None:
         self._made: dict[Any, Any] = {}
-        self._lock = Lock()
+        self._locks: defaultdict[Any, Lock] = defaultdict(Lock)
+        self._lock = Lock()  # of the locks: drives do not wait for what only others need
 
     def once(self, key: Any, make: Callable[[], Any]) -> Any:
         """Return what `make` makes, of the first call with this key."""
         with self._lock:
+            lock = self._locks[key]
+        with lock:
             if key not in self._made:
                 self._made[key] = make()
             return self._made[key]
