@@ -267,20 +267,20 @@ def test_a_recording_that_is_added_while_others_are_looked_at_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     session, other = short_session(tmp_path)
-    looks, checked = threading.Event(), Inputs.checked
+    more, looks, added = session.inputs.with_more(other), threading.Event(), threading.Event()
 
     def slow(inputs: Inputs) -> Inputs:
-        found = checked(inputs)
-        if threading.current_thread() is looking:
-            looks.set()
-            time.sleep(2.0)
-        return found
+        looks.set()
+        added.wait(4.0)
+        return inputs
 
     monkeypatch.setattr(Inputs, 'checked', slow)
+    monkeypatch.setattr(Inputs, 'with_more', lambda *given: more)
     looking = threading.Thread(target=session.find_mistakes)
     looking.start()
     assert looks.wait(60)
     session.add(other)
+    added.set()
     looking.join()
     assert names_of(session) == ['one.csv', 'two.csv']
 
