@@ -92,6 +92,10 @@ MISTAKES = {
     ('reproduce', '--output', '/dev/null/below'): '/dev/null/below: cannot be a folder',
     ('reproduce', '--output', '{tmp}', '--model', 'nowhere.yaml'): 'nowhere.yaml: no such file',
     ('reproduce', '--output', '{tmp}', '--json', '{tmp}/no/x.json'): 'no/x.json: cannot be written',
+    # What would be taken and not minded.
+    ('workbench', '--json', '{tmp}/x.json'): '--json',
+    ('history', 'model.yaml', '--model', 'other.yaml'): '--model',
+    ('trend', 'store', '--model', 'other.yaml'): '--model',
 }
 
 

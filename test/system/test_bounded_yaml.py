@@ -72,7 +72,7 @@ def test_numbers_within_bounds_that_are_none_are_one_sentence(
 ) -> None:
     file = tmp_path / 'model.yaml'
     file.write_text(PAPER.read_text().replace('base_radius: 0.15', f'base_radius: {number}'))
-    done = subprocess.run([executable('pprs'), 'history', file.name, '--model', 'none'],
+    done = subprocess.run([executable('pprs'), 'history', file.name],
                           cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1

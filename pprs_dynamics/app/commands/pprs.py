@@ -36,6 +36,8 @@ from pprs_dynamics.system.threads import use_one_thread
 # Each a module of this folder with a docstring, add_arguments and run.
 COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
+# What all others take: models there are in the file or the store, and a session has no result.
+WITHOUT_MODEL, WITHOUT_JSON = ('history', 'trend'), ('workbench',)
 # Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
 LONGEST_SENTENCE = 800
 
@@ -147,10 +149,12 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     for name in COMMANDS:
         summary = _summary(name)
         command = commands.add_parser(name, help=summary, description=summary)
-        command.add_argument('--model', metavar='FILE', default=DEFAULT_MODEL,
-                             help=f'model file (default: the paper\'s robot, {DEFAULT_MODEL})')
-        command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
-                             help='write the result as JSON too')
+        if name not in WITHOUT_MODEL:
+            command.add_argument('--model', metavar='FILE', default=DEFAULT_MODEL, help='model '
+                                 f'file (default: the paper\'s robot, {DEFAULT_MODEL})')
+        if name not in WITHOUT_JSON:
+            command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
+                                 help='write the result as JSON too')
         if name in given:
             # Only this one: importing all would take longer than most of them run.
             _module(name).add_arguments(command)
