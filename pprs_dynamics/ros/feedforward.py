@@ -71,7 +71,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(REJECTIONS, 0)}
-        self._margins_due, self._margins = 0.0, Margins(None, 1.0, '')
+        self._margins_due, self._margins, self._beyond_curve = 0.0, Margins(None, 1.0, ''), ''
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, time.monotonic())
         self._files = files_given(options.get('cli_args') or sys.argv)
@@ -239,6 +239,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             if left.singularity is not None:
                 self._status.facts['singularity_margin'] = round(left.singularity, 6)
             self._status.facts['workspace_margin'] = round(left.workspace, 6)
+            self._beyond_curve = next((
+                said for effect in self._settings.model.effects
+                if isinstance(effect, MeasuredCurve)
+                and (said := effect.left(answer.forces.mechanism))), '')
         left = self._margins
         if answer.clamped:
             report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the effort was clamped')
@@ -248,19 +252,13 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         elif left.workspace < own['warning_margin']:
             report('WARN', 'NEAR_WORKSPACE', f'{left.drive} has {left.workspace:.3f} of half its '
                    f'range left, warning_margin is {own["warning_margin"]:g}')
-        elif (outside := self._beyond_curves(answer)) is not None:
-            report('WARN', 'CURVE', outside)
+        elif self._beyond_curve:
+            report('WARN', 'CURVE', self._beyond_curve)
         elif self._lagging:
             report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median: they '
                    'come faster than they are answered, or the machine is busy')
         else:
             report('OK', 'OK', 'commands follow the trajectory')
-
-    def _beyond_curves(self, answer: ForceCommand) -> str | None:
-        """Return which measured curve the drives are beyond, None for none."""
-        curves = next((effect for effect in self._settings.model.effects
-                       if isinstance(effect, MeasuredCurve)), None)
-        return None if curves is None else curves.left(answer.forces.mechanism)
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1

@@ -12,7 +12,11 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.model.force_model import Forces
-from pprs_dynamics.ros.messages.conversions import LATEST_SECOND, NANOSECONDS
+from pprs_dynamics.ros.messages.conversions import (
+    LATEST_SECOND,
+    NANOSECONDS,
+    seconds_and_rest,
+)
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.system.cdr import LITTLE_ENDIAN, STAMP, WORD, padded, with_text
 
@@ -43,7 +47,7 @@ class CommandBytes:
     def joint_state(self, stamp: int, effort: Array, position: Array | None = None,
                     velocity: Array | None = None) -> bytes:
         """Return a sensor_msgs/JointState of the drives at a time [ns]."""
-        message = LITTLE_ENDIAN + _stamp(stamp) + self._names
+        message = LITTLE_ENDIAN + STAMP.pack(*seconds_and_rest(stamp)) + self._names
         for values in (position, velocity, effort):
             if values is None:
                 message = padded(message, 4) + WORD.pack(0)
@@ -76,15 +80,11 @@ class CommandBytes:
         seconds, nanoseconds = np.divmod(offsets, NANOSECONDS)
         points['sec'] = np.minimum(seconds, LATEST_SECOND)
         points['nanosec'] = nanoseconds
-        head = padded(LITTLE_ENDIAN + _stamp(start) + self._names, 4) + WORD.pack(len(points))
+        stamp = STAMP.pack(*seconds_and_rest(start))
+        head = padded(LITTLE_ENDIAN + stamp + self._names, 4) + WORD.pack(len(points))
         # The first point's first length word may stand where its padding would be.
         first = padded(head + WORD.pack(self._count), 8)
         return first + points.tobytes()[8:]
-
-
-def _stamp(moment: int) -> bytes:
-    seconds, rest = divmod(moment, NANOSECONDS)
-    return STAMP.pack(min(seconds, LATEST_SECOND), rest)
 
 
 def _names(names: RobotNames) -> bytes:

@@ -140,15 +140,21 @@ def nanoseconds(moment: Time | Duration) -> int:
 
 
 def time(moment: int) -> Time:
-    """Return a stamp from nanoseconds, held within what the message can say."""
-    seconds, rest = divmod(moment, NANOSECONDS)
-    return Time(sec=min(seconds, LATEST_SECOND), nanosec=rest)
+    """Return a stamp from nanoseconds."""
+    sec, nanosec = seconds_and_rest(moment)
+    return Time(sec=sec, nanosec=nanosec)
 
 
 def duration(moment: int) -> Duration:
-    """Return a duration from nanoseconds, held within what the message can say."""
+    """Return a duration from nanoseconds."""
+    sec, nanosec = seconds_and_rest(moment)
+    return Duration(sec=sec, nanosec=nanosec)
+
+
+def seconds_and_rest(moment: int) -> tuple[int, int]:
+    """Return seconds, held within what messages can say, and nanoseconds of a time [ns]."""
     seconds, rest = divmod(moment, NANOSECONDS)
-    return Duration(sec=min(seconds, LATEST_SECOND), nanosec=rest)
+    return min(seconds, LATEST_SECOND), rest
 
 
 def doubles(values: Array) -> array[float]:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
@@ -14,6 +15,7 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.conversions import PLATFORM
 from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.serialisation import trajectories_have_known_bytes
@@ -53,27 +55,22 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
             tool = model.tool_pose.structure.tool
         except ModelError:
             return readers
-        frame = (names and names.frame) or str(model.values[f'{model.block}.base'])
-        readers[POSES] = RequestReader(
-            MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
-                message_in(data, MultiDOFJointTrajectory), now, age, missing, frame, tool))
+        readers[POSES] = _poses((names and names.frame) or str(model.values[f'{model.block}.base']),
+                                tool)
     return readers
 
 
 def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
     """Return how trajectories for a model arrive, by the names of its robot."""
     joints, frame = names or RobotNames.of(model)
-    if not isinstance(model, ArmModel):
-        if trajectories_have_known_bytes():
-            return RequestReader(MultiDOFJointTrajectory,
-                                 lambda data, now, age, missing: read_serialised(
-                                     data, now, age, missing, frame))
-        return RequestReader(
-            MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
-                message_in(data, MultiDOFJointTrajectory), now, age, missing, frame))
+    if isinstance(model, ArmModel):
+        return RequestReader(JointTrajectory, lambda data, *rules: read_joint_trajectory(
+            message_in(data, JointTrajectory), joints, *rules))
+    if trajectories_have_known_bytes():
+        return RequestReader(MultiDOFJointTrajectory, partial(read_serialised, frame=frame))
+    return _poses(frame, PLATFORM)
 
-    def read(data: bytes, now: int, max_age: float, missing: str) -> TrajectoryRequest:
-        return read_joint_trajectory(
-            message_in(data, JointTrajectory), joints, now, max_age, missing)
 
-    return RequestReader(JointTrajectory, read)
+def _poses(frame: str, body: str) -> RequestReader:
+    return RequestReader(MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
+        message_in(data, MultiDOFJointTrajectory), now, age, missing, frame, body))

@@ -16,19 +16,19 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD
 
-NANOSECONDS = 1_000_000_000
 NUMBERS = 19  # position, quaternion, two twists
 
-# What stands between stamp and points for each frame that means `base`: length words and
-# names, padding left out as it may hold anything. (place, bytes), and the place of the count.
+# What stands between stamp and points for each frame that means `base` (none, and its name), by
+# the length of its text: length words and names, padding left out as it may hold anything.
+# (place, bytes), and the place of the count.
 _NAMES = WORD.pack(1), WORD.pack(9) + b'platform\x00'
 _HEADS = {
     1: (((12, WORD.pack(1) + b'\x00'), (20, _NAMES[0] + _NAMES[1])), 40),
     5: (((12, WORD.pack(5) + b'base\x00'), (24, _NAMES[0] + _NAMES[1])), 44),
 }
-_FRAMES = {1: '', 5: 'base'}
 # The first number of the first point stands here for both heads, as numbers are aligned to 8.
 _FIRST = 52
 # One point: 7 numbers, 6 velocities and 6 accelerations with their length words, and the time.
