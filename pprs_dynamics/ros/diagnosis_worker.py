@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
 from multiprocessing import get_context
+from threading import Thread
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,6 +85,7 @@ class DiagnosisWorker:
     def __init__(self) -> None:
         self._process: Any = None
         self._pipe: Any = None
+        self._sending: Thread | None = None
         self.busy = False
 
     def submit(self, values: Mapping[str, Any], source: str, samples: StreamWindow) -> None:
@@ -95,7 +97,10 @@ class DiagnosisWorker:
             self._process = context.Process(target=_work, args=(theirs,), daemon=True)
             self._process.start()
             theirs.close()
-        self._pipe.send((dict(values), source, samples))
+        # A pipe holds less than a window, and a process that begins reads it after seconds.
+        self._sending = Thread(target=_send, args=(self._pipe, (dict(values), source, samples)),
+                               daemon=True)
+        self._sending.start()
         self.busy = True
 
     def poll(self) -> dict[str, Any] | None:
@@ -117,8 +122,15 @@ class DiagnosisWorker:
         if self._process is not None:
             self._process.kill()
             self._process.join()
+            if self._sending is not None:
+                self._sending.join()
             self._pipe.close()
         self._process, self.busy = None, False
+
+
+def _send(pipe: Any, window: Any) -> None:
+    with suppress(OSError):  # it has ended, as `poll` will tell
+        pipe.send(window)
 
 
 def _work(pipe: Any) -> None:

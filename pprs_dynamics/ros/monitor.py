@@ -35,7 +35,7 @@ from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParam
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
-from pprs_dynamics.ros.node.qos import LATCHED, publisher, subscription
+from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED, publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.simulation.export.tree_positions import TreePositions
 
@@ -82,7 +82,8 @@ class MonitorNode(ExplainsRefusals):
         self._all_joints = publisher(self, JointState, '~/joint_states_full')
         self._tree: TreePositions | None = None
         self._latest: tuple[int, Array] | None = None
-        subscription(self, JointState, 'joint_states', self._on_state, raw=True)
+        subscription(self, JointState, 'joint_states', self._on_state, raw=True,
+                     profile=UNANSWERED)
         steady_timer(self, 1.0 / own['update_rate'], self._judge)
         self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
         self._worker, self._changed = DiagnosisWorker(), ''

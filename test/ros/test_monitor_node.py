@@ -145,6 +145,16 @@ def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survive
     assert monitor.bench.status[-1]['code'] == 'OK'
 
 
+def test_a_node_that_is_kept_for_a_second_misses_no_measurement(monitor: MonitorBench) -> None:
+    for row in range(RATE):
+        monitor.publisher.publish(conversions.joint_state(
+            START + row * 1_000_000_000 // RATE, monitor.effort[row], monitor.position[row],
+            monitor.position[row]))
+    assert monitor.arrived(RATE)
+    assert monitor.bench.spin_until(lambda: monitor.node._counters['compared'])
+    assert monitor.node._counters['gaps'] == 0
+
+
 def test_a_message_that_arrives_cut_off_is_counted_and_survived(monitor: MonitorBench) -> None:
     message = conversions.joint_state(
         START, monitor.effort[0], monitor.position[0], monitor.position[0])
