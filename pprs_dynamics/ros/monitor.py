@@ -38,6 +38,7 @@ from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED, publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.simulation.export.tree_positions import TreePositions
+from pprs_dynamics.system.plain_text import for_json
 
 PARAMETERS = (
     FRAME,
@@ -166,7 +167,7 @@ class MonitorNode(ExplainsRefusals):
             if changed != self._changed:
                 self.get_logger().warning(changed or 'what had changed is gone')
             self._changed = changed
-            self._diagnosis.publish(String(data=json.dumps(answer)))
+            self._diagnosis.publish(String(data=json.dumps(for_json(answer))))
         if not self._worker.busy and (samples := self._windows.take()) is not None:
             model = self._settings.model
             self._worker.submit(model.values, model.source, samples)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import codecs
+from typing import Any
 
 # Name of the error handler for streams that are not UTF-8.
 PLAIN = 'pprs_plain'
@@ -21,6 +22,19 @@ def displayed(name: object) -> str:
     """
     return ''.join(character if character.isprintable() else _escaped(character)
                    for character in str(name))
+
+
+def for_json(content: Any) -> Any:
+    """Return what JSON can hold: text as `displayed`, None for numbers that are not finite."""
+    if isinstance(content, dict):
+        return {displayed(key): for_json(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [for_json(value) for value in content]
+    if isinstance(content, str):
+        return displayed(content)
+    if isinstance(content, float) and content - content != 0.0:
+        return None
+    return content
 
 
 def _escaped(character: str) -> str:

@@ -26,6 +26,7 @@ from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
+from pprs_dynamics.app.workbench.long_work import DesignedMotion
 from pprs_dynamics.app.workbench.server.folders import Folders
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.surveys import Surveys
@@ -33,6 +34,7 @@ from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.app.workbench.worker_process import EndedError, run_in_process
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 
@@ -200,7 +202,12 @@ def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) ->
 def test_everything_on_the_screen_is_json(session: Session) -> None:
     session.tick('payload_mass')
     session.settle()
+    # A design may leave numbers that nothing tells.
+    session.experiment = DesignedMotion(
+        {'contests': [], 'accuracy': [{'std_before': float('inf')}]}, HelicalPath().motion([0.0]))
     found = json.loads(json.dumps(session.to_dict(), allow_nan=False))
+    session.experiment = None
+    assert found['experiment']['accuracy'] == [{'std_before': None}]
     assert len(found['effects']) == 25
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 

@@ -16,7 +16,7 @@ from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import shown
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.system.output_files import write_text
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import for_json
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.front_door.result import Result
@@ -35,11 +35,8 @@ def make_folder(path: str | PathLike[str]) -> Path:
 
 
 def write_json(path: str | PathLike[str], content: Any) -> None:
-    """Write JSON atomically; numbers that are not finite become null, as JSON has none.
-
-    Names of files that are not UTF-8 become what `displayed` makes of them.
-    """
-    write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False) + '\n')
+    """Write JSON atomically; see `for_json`."""
+    write_text(path, json.dumps(for_json(content), indent=2, ensure_ascii=False) + '\n')
 
 
 def tell(result: Result, options: argparse.Namespace, screen: Any,
@@ -53,15 +50,3 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
             progress('page', 0.0)
             written = (page or result.page)().write(options.report)
         screen.print(f'page: {shown(written)}')
-
-
-def _plain(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {displayed(key): _plain(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_plain(value) for value in content]
-    if isinstance(content, str):
-        return displayed(content)
-    if isinstance(content, float) and content - content != 0.0:
-        return None
-    return content

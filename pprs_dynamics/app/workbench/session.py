@@ -52,6 +52,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.system.plain_text import for_json
 
 
 class Session:
@@ -570,7 +571,7 @@ class Session:
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'steps': [step.to_dict() for step in self.steps],
                 'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
-                'adoption': adoption.to_dict() if adoption else None,
-                'experiment': self.experiment.promise if self.experiment else None,
+                'adoption': for_json(adoption.to_dict()) if adoption else None,
+                'experiment': for_json(self.experiment.promise) if self.experiment else None,
                 'recordings': recordings_to_dict(self.inputs.fitted, self.fits, self.now),
                 'held_out': [one.name for one in self.inputs.held_out]}
