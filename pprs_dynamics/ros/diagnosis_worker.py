@@ -104,7 +104,11 @@ class DiagnosisWorker:
         self.busy = True
 
     def poll(self) -> dict[str, Any] | None:
-        """Return the answer of `LiveDiagnosis.to_dict`, or {'error': sentence}; None: not yet."""
+        """Return the answer of `LiveDiagnosis.to_dict`; None: not yet.
+
+        With a sentence as `error` where the window was not diagnosed; with that alone where
+        nothing is known any more.
+        """
         if not self.busy:
             return None
         try:
@@ -158,5 +162,7 @@ def _work(pipe: Any) -> None:
                     effort=samples.effort, drives=live.model.drives), start / 1e9)
             answer = live.to_dict()
         except PprsError as error:
-            answer = {'error': str(error)}
+            # What is known of this model stands, though this window says nothing.
+            kept = {**live.to_dict(), 'withdrawn': []} if known == (values, source) else {}
+            answer = {**kept, 'error': str(error)}
         pipe.send(answer)

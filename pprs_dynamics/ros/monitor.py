@@ -159,10 +159,10 @@ class MonitorNode(ExplainsRefusals):
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""
         if (answer := self._worker.poll()) is not None:
-            if 'error' in answer:
-                self.get_logger().warning(f'a window was not diagnosed: {answer["error"]}')
-                answer = {'effects': [], 'confirmed': False, 'since': None,
-                          'note': answer['error']}
+            if error := answer.pop('error', ''):
+                self.get_logger().warning(f'a window was not diagnosed: {error}')
+                answer = {'effects': [], 'confirmed': False, 'since': None, **answer,
+                          'note': error}
             changed = answer.get('text', '')
             if changed != self._changed:
                 self.get_logger().warning(changed or 'what had changed is gone')

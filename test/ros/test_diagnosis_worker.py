@@ -13,9 +13,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pytest
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.inference.diagnosis import live_diagnosis
 from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.ros import diagnosis_worker
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows
 
 SECOND = 1_000_000_000
@@ -111,6 +115,55 @@ def test_a_window_is_given_away_at_once_whatever_the_process_does() -> None:
         if worker._process is not None:
             worker._process.kill()
         worker.close()
+
+
+class Windows:
+    """The node's end of a pipe to the process: some windows, and what is answered to them."""
+
+    def __init__(self, *windows: tuple[Any, ...]) -> None:
+        self.windows = list(windows)
+        self.answers: list[dict[str, Any]] = []
+
+    def recv(self) -> tuple[Any, ...]:
+        if not self.windows:
+            raise EOFError
+        return self.windows.pop(0)
+
+    def send(self, answer: dict[str, Any]) -> None:
+        self.answers.append(answer)
+
+
+class Claiming:
+    """A live diagnosis that claims a change with the first window, and fails at the second."""
+
+    def __init__(self, model: DriveModel, text: str = '') -> None:
+        self.model, self.text = model, text
+
+    def with_window(self, recording: Any, start: float) -> Claiming:
+        if self.text:
+            raise WorkspaceError(0, 'slide_1 is at 3 m', 'must be in its stroke')
+        return Claiming(self.model, 'payload mass')
+
+    def to_dict(self) -> dict[str, Any]:
+        return {'text': self.text, 'confirmed': bool(self.text), 'withdrawn': ['gone before']}
+
+
+def test_what_is_claimed_stands_where_a_window_cannot_be_diagnosed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(live_diagnosis, 'LiveDiagnosis', Claiming)
+    monkeypatch.setattr(os, 'nice', lambda by: 0)
+    model = DriveModel.load()
+    still = StreamWindow(EPOCH + np.arange(100) * SECOND // 100, np.zeros((100, 6)),
+                         np.zeros((100, 6)))
+    pipe = Windows((model.values, '', still), (model.values, '', still),
+                   ({'masses.payload': -1.0}, '', still))
+    diagnosis_worker._work(pipe)
+    claimed, failed, unknown = pipe.answers
+    assert claimed['text'] == failed['text'] == 'payload mass'
+    assert 'slide_1' in failed['error']
+    assert failed['withdrawn'] == []
+    assert set(unknown) == {'error'}
 
 
 def waited_for(worker: DiagnosisWorker) -> dict[str, Any]:
