@@ -220,6 +220,17 @@ def test_parquet_files_of_others_are_no_store(tmp_path: Path,
     assert 'there is no store of pprs survey' in capsys.readouterr().err
 
 
+def test_a_file_is_found_by_its_name_though_that_reads_as_a_pattern(tmp_path: Path) -> None:
+    for name in ('run[1].csv', 'run1.csv', 'run2.csv'):
+        (tmp_path / name).write_text('time\n')
+
+    def found(pattern: str) -> list[str]:
+        return [Path(one.path).name for one in find_recordings([str(tmp_path / pattern)])]
+
+    assert found('run[1].csv') == ['run[1].csv']
+    assert found('run[12].csv') == ['run1.csv', 'run2.csv']
+
+
 def test_robots_are_called_as_their_folders(tmp_path: Path) -> None:
     for name in ('r2/b.csv', 'r1/a.csv', 'r1/note.txt', 'r3/bag/metadata.yaml'):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -88,9 +88,10 @@ def _entry(path: str, line: int, row: dict[str, str]) -> ManifestEntry:
             raise ManifestError(path, line, f'{name} is empty', 'be given')
     conditions = {name: value for name, text in row.items()
                   if name and name not in KNOWN and (value := _number(text)) is not None}
-    return ManifestEntry(_beside(path, given('path')), given('robot'),
-                 read_time(path, line, given('time')) if given('time') else None,
-                 _beside(path, given('model')) if given('model') else None, conditions)
+    return ManifestEntry(
+        _beside(path, given('path')), given('robot'),
+        read_time(path, line, given('time')) if given('time') else None,
+        _beside(path, given('model')) if given('model') else None, conditions)
 
 
 def _beside(manifest: str, path: str) -> str:
@@ -190,7 +191,8 @@ def _matching(pattern: str) -> Iterator[str]:
     system, root = filesystem(pattern)
     named = system.unstrip_protocol if is_remote(pattern) else str
     with reached(pattern):
-        places = sorted(system.glob(root)) if any(c in root for c in '*?[') else [root]
+        is_glob = any(c in root for c in '*?[') and not system.exists(root)
+        places = sorted(system.glob(root)) if is_glob else [root]
         for place in places:
             if system.isdir(place):
                 yield from map(named, _within(system, place))

@@ -166,10 +166,11 @@ def examine(job: SurveyJob, content: str | None) -> SurveyResult:
         text = str(error).replace(path, job.entry.path)
         # What could not even be read may be there the next time.
         return SurveyResult(key, [{**common, 'error': displayed(text),
-                             'seconds': perf_counter() - began}], failed=content is None)
+                                   'seconds': perf_counter() - began}], failed=content is None)
     except Exception as error:  # of the package itself, but no end of a survey
-        return SurveyResult(key, [{**common, 'seconds': perf_counter() - began,
-                             'error': f'unexpected {type(error).__name__}: {error}'}], failed=True)
+        return SurveyResult(key, [{
+            **common, 'seconds': perf_counter() - began,
+            'error': f'unexpected {type(error).__name__}: {error}'}], failed=True)
     seconds = perf_counter() - began
     return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows])
 
@@ -177,7 +178,7 @@ def examine(job: SurveyJob, content: str | None) -> SurveyResult:
 def lost(job: SurveyJob, content: str | None, reason: str) -> SurveyResult:
     """Return the row of a recording whose worker did not come back."""
     return SurveyResult(job.key(content or job.entry.path),
-                  [{**_common(job, content), 'error': reason}], failed=True)
+                        [{**_common(job, content), 'error': reason}], failed=True)
 
 
 def _common(job: SurveyJob, content: str | None) -> dict[str, Any]:
