@@ -197,6 +197,7 @@ class LiveNodes:
         self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
                                      context=self._context)
         self._base: Mapping[str, Any] = model.values
+        self._set_before: set[str] = set()
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
@@ -234,9 +235,11 @@ class LiveNodes:
         dict of str to str
             What each node said; '' where it took everything.
         """
-        changes = {key: value for key, value in model.values.items()
-                   if key != ACTIVE and not key.startswith('history.')
-                   and self._base.get(key) != value}
+        # What was set once is set again: a number that is as it was given is so on the nodes, too.
+        self._set_before |= {key for key, value in model.values.items()
+                             if key != ACTIVE and not key.startswith('history.')
+                             and self._base.get(key) != value}
+        changes = {key: value for key, value in model.values.items() if key in self._set_before}
         answers = {name: self._set(name, changes, list(model.values.get(ACTIVE, ())))
                    for name in self._node.clients_of}
         if any(not answer for answer in answers.values()):

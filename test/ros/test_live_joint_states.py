@@ -17,7 +17,8 @@ from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.live_joint_states import SHOWN, LiveJointStates
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.ros.live_joint_states import SHOWN, LiveJointStates, LiveNodes
 from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
@@ -49,6 +50,26 @@ def test_what_is_no_message_of_the_monitor_is_passed_over(running: tuple[Bench, 
     error.publish(Float64MultiArray(data=[3.0, 4.0]))
     assert bench.spin_until(lambda: node.to_dict()['monitor_error'] == [3.0, 4.0])
     assert bench.spin_until(lambda: node.to_dict()['diagnosis'] == {'since': None, 'effects': []})
+
+
+def test_numbers_that_are_taken_back_are_set_on_running_nodes_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    heavier = build_model({
+        **MODEL.values, 'masses.payload': MODEL.values['masses.payload'] + 0.1,
+        'effects.active': ['effort_offset'], 'effects.effort_offset.lift_1.force': 0.5})
+    nodes = LiveNodes(MODEL)
+    sent: list[dict[str, Any]] = []
+    try:
+        monkeypatch.setattr(nodes, '_set', lambda name, changes, active: sent.append(
+            {**changes, 'effects.active': active}) or '')
+        nodes.set_model(heavier)
+        nodes.set_model(MODEL)
+    finally:
+        nodes.close()
+    assert sent[0]['masses.payload'] == heavier.values['masses.payload']
+    assert sent[0]['effects.effort_offset.lift_1.force'] == 0.5
+    assert sent[-1] == {'masses.payload': MODEL.values['masses.payload'], 'effects.active': []}
 
 
 def test_what_is_drawn_stays_bounded_where_a_bag_is_played_in_a_loop(
