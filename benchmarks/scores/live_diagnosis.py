@@ -20,7 +20,10 @@ import copy
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import partial
+from operator import itemgetter
+from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from typing import Any
 
@@ -39,6 +42,7 @@ from benchmarks.hidden.recordings import (
     _motion,
     noise_settings,
 )
+from benchmarks.scores.cases import Outcome, here, read_outcomes, run_missing
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -92,7 +96,7 @@ def window(place: Scene, seed: int, effects: tuple[Any, ...], moment: float | No
                                  None, effort + stream.noise.samples(len(clock)))
 
 
-def changes(name: str, seed: int) -> dict[str, Any]:
+def changes(name: str, seed: int) -> Outcome:
     """Return what was said of one stream with a change."""
     case = Case('live', (name,), seed, snr=0.0)
     place = Scene(seed, 1.0)
@@ -124,7 +128,7 @@ def changes(name: str, seed: int) -> dict[str, Any]:
             'seconds': time.process_time() - used}
 
 
-def nothing(first: int, noise: float | str) -> dict[str, Any]:
+def nothing(first: int, noise: float | str) -> Outcome:
     """Return what was said of a stream of windows without any change."""
     place, stream, used = Scene(first, 0.0), Stream(first, noise, NOISE), time.process_time()
     live, claimed, named, start = LiveDiagnosis(place.model), [], [], 0.0
@@ -158,27 +162,37 @@ def _goes_on_to_claim(live: LiveDiagnosis, place: Scene, stream: Stream, seed: i
     return bool(live.with_window(recording, start).claimed)
 
 
-def run(mode: str, arguments: list[str]) -> Iterator[dict[str, Any]]:
-    """Yield results one after the other."""
+def cases(mode: str, arguments: list[str]) -> dict[str, Callable[[], Outcome]]:
+    """Return what is asked for, by its key in the file of outcomes."""
     if mode == 'changes':
-        names = arguments[1:] or sorted(IN_CATALOGUE)
-        for seed in range(int(arguments[0])):
-            for name in names:  # each with a robot, motions and a moment of its own
-                own = 300 + len(IN_CATALOGUE) * seed + sorted(IN_CATALOGUE).index(name)
-                yield {'key': f'{name} {seed}', 'of': lambda n=name, s=own: changes(n, s)}
-    else:
-        noises = [noise for noise in NOISES if str(noise) in (arguments[1:] or map(str, NOISES))]
-        for first in range(int(arguments[0]) // WINDOWS):
-            noise = noises[first % len(noises)]
-            yield {'key': f'nothing {noise} {first}',
-                   'of': lambda f=first, n=noise: nothing(500 + f, n)}
+        every = sorted(IN_CATALOGUE)
+        # Each with a robot, motions and a moment of its own.
+        return {f'{name} {seed}': partial(changes, name,
+                                          300 + len(every) * seed + every.index(name))
+                for seed in range(int(arguments[0])) for name in arguments[1:] or every}
+    noises = [noise for noise in NOISES if str(noise) in (arguments[1:] or map(str, NOISES))]
+    return {f'nothing {noise} {first}': partial(nothing, 500 + first, noise)
+            for first in range(int(arguments[0]) // WINDOWS)
+            for noise in (noises[first % len(noises)],)}
 
 
-def read(mode: str) -> list[dict[str, Any]]:
+def outcome(case: tuple[str, Callable[[], Outcome]]) -> Outcome:
+    """Return what came of a case, or why nothing did."""
+    key, work = case
+    try:
+        return {'key': key, **work()}
+    except PprsError as error:
+        return {'key': key, 'error': str(error)}
+
+
+def read(mode: str) -> list[Outcome]:
     """Return the results that are there, without those that came to nothing."""
-    file = OUTPUT / f'live_{mode}.jsonl'
-    lines = file.read_text().splitlines() if file.exists() else []
-    return [one for one in map(json.loads, lines) if 'error' not in one]
+    return [one for one in read_outcomes(file_of(mode)) if 'error' not in one]
+
+
+def file_of(mode: str) -> Path:
+    """Return the file of outcomes."""
+    return OUTPUT / f'live_{mode}.jsonl'
 
 
 def table() -> list[str]:
@@ -215,20 +229,9 @@ def main() -> int:
     if mode == 'table':
         print('\n'.join(table()))
         return 0
-    OUTPUT.mkdir(exist_ok=True)
-    file = OUTPUT / f'live_{mode}.jsonl'
-    done = ({json.loads(line)['key'] for line in file.read_text().splitlines()}
-            if file.exists() else set())
-    for one in run(mode, arguments):
-        if one['key'] in done:
-            continue
-        try:
-            result = {'key': one['key'], **one['of']()}
-        except PprsError as error:
-            result = {'key': one['key'], 'error': str(error)}
-        with file.open('a') as output:
-            output.write(json.dumps(result) + '\n')
-        print(json.dumps({k: v for k, v in result.items() if k != 'said'}), flush=True)
+    wanted = {key: (key, work) for key, work in cases(mode, arguments).items()}
+    run_missing(here, outcome, wanted, file_of(mode), itemgetter('key'), lambda one: json.dumps(
+        {key: value for key, value in one.items() if key != 'said'}))
     return 0
 
 
