@@ -28,6 +28,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.system.parallel import lazy
 
 
 class DriveLibrary:
@@ -47,7 +48,7 @@ class DriveLibrary:
         self.effects = [effect for effect in searched_in_drives(design)
                         if design.acts_on(effect, d) and not effect.shifts_positions()]
 
-    @cached_property
+    @lazy
     def score_test(self) -> ScoreTest[Component]:
         """All shapes in all variants that the rows of a scan suffice for; computed when asked for.
         """

@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -31,7 +31,7 @@ from pprs_dynamics.inference.search.patterns import (
     build_families,
     trial_limits,
 )
-from pprs_dynamics.system.parallel import each
+from pprs_dynamics.system.parallel import each, lazy
 
 OVERSAMPLING = 4  # of the frequencies at which lines are looked for
 FREQUENCY_STEPS = 4  # of Gauss-Newton, in the frequency of a line
@@ -159,7 +159,7 @@ class PatternLibrary:
         vars(found).pop('_scanned', None)
         return found
 
-    @cached_property
+    @lazy
     def _transformed(self) -> list[_Transformed]:
         samples = hash((self.series.index.tobytes(), self.series.known.tobytes()))
 
@@ -172,7 +172,7 @@ class PatternLibrary:
         return [self._shared.once(family, partial(transformed, family)) for family in families
                 if self.with_plain_forms or not (family.paired or family.is_plain)]
 
-    @cached_property
+    @lazy
     def _scanned(self) -> list[_Scanned]:
         scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
         return [_Scanned(one.family, Columns(self.regression, {self.d: one.rows}), one.gram,
