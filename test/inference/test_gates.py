@@ -24,6 +24,7 @@ from pprs_dynamics import AxisModel, DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.paired_errors import (
     BLOCKS,
@@ -323,9 +324,9 @@ def set_of(**columns: tuple[str, float, float]) -> Any:
     own = [one for *_, one in columns.values()]
     # The covariance of a coefficient is 1 over the square of what is the column's own.
     covariance = np.diag([1 / (10 * share) ** 2 for share in own])
-    fitted = SimpleNamespace(places=places, coefficients=np.array(coefficients),
-                             covariance=covariance)
-    fitted.of = lambda block: fitted.coefficients[places[block]]
+    nothing = np.zeros((1, 1))
+    fitted = JointFit(tuple(blocks), np.array(coefficients), covariance, nothing, nothing, 0.0,
+                      nothing, places)
     return SimpleNamespace(
         effects=tuple(candidates), candidates=tuple(candidates), fit=fitted,
         blocks_of=lambda one: [block for candidate, block in zip(candidates, blocks, strict=True)

@@ -18,6 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adopt import original
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -228,7 +229,7 @@ class TickFits:
 
     def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
         """Return a set with the linear parameters that somebody chose; all else follows."""
-        index: list[int] = []
+        blocks: list[Block] = []
         values: list[float] = []
         by_effect = {tick.effect: tick for tick in ticks}
         for candidate in found.effects:
@@ -241,12 +242,11 @@ class TickFits:
                     continue
                 c = found.coefficients(placement)
                 wanted = candidate.effect.to_coefficients({**placement.values(c), **mine})
-                place = found.fit.places[found.blocks[placement]]
-                index += range(place.start, place.stop)
+                blocks.append(found.blocks[placement])
                 values += [wanted[name] for name in placement.names]
-        if not index:
+        if not blocks:
             return found
-        fit = self.search.regression.held(found.fit, index, np.array(values))
+        fit = self.search.regression.held(found.fit, found.fit.index_of(blocks), np.array(values))
         return replace(found, fit=fit, total=found.total + fit.deviance - found.fit.deviance)
 
     # What a set says

@@ -13,7 +13,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, calibrations, estimate
 from pprs_dynamics.inference.search.held_out import hold_out
@@ -122,7 +122,7 @@ def fit_effect(
                   for key, one in said.parameters.items() if prefix + key in final.values}
     report(1.0)
     return EffectFit(
-        request, _names(design, candidate), final, fitted_model(search, plain_set), parameters,
+        request, design.named(candidate.drives), final, fitted_model(search, plain_set), parameters,
         said.at_bound, moved, evidence, share, last, found, before.error, after.error,
         plain_losses - after.losses)
 
@@ -130,11 +130,6 @@ def fit_effect(
 def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:
     return None if request.drives is None else tuple(
         design.drives.index(name) for name in request.drives)
-
-
-def _names(design: Design, candidate: EffectCandidate) -> tuple[str, ...] | None:
-    drives = candidate.drives
-    return None if drives is None else tuple(design.drives[d] for d in drives)
 
 
 def _require_motion(design: Design, request: EffectRequest) -> None:

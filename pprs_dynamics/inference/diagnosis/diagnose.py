@@ -234,7 +234,7 @@ class _Answer:
         for k, candidate in enumerate(ordered):
             said = estimate(search, self.kept, candidate, near)
             found.append(FoundEffect(
-                candidate.effect, self._names(candidate), said.parameters,
+                candidate.effect, self.design.named(candidate.drives), said.parameters,
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 search.library.force(self.kept, candidate, remaining.shape), said.at_bound,
                 self.ranking.shares[k],
@@ -285,13 +285,13 @@ class _Answer:
 
     def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:
-        return RankedEffect(candidate.name, self._names(candidate), evidence,
+        return RankedEffect(candidate.name, self.design.named(candidate.drives), evidence,
                             linear_error(search, found))
 
     def _sets(self) -> tuple[RankedSet, ...]:
         found: dict[frozenset[str], RankedSet] = {}
         for one in self.ranking.sets:
-            names = tuple((c.name, self._names(c)) for c in one.candidates)
+            names = tuple((c.name, self.design.named(c.drives)) for c in one.candidates)
             key = frozenset(name for name, _ in names)
             if key not in found:
                 # Of a set that bends nothing the cost is that in the first design.
@@ -304,12 +304,8 @@ class _Answer:
         force = self.search.library.force(remainder.found, remainder.candidate,
                                           self.design.residuals.measured.shape)
         return WithinModelError(
-            remainder.candidate.name, self._names(remainder.candidate),
+            remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
-
-    def _names(self, candidate: Candidate) -> tuple[str, ...] | None:
-        drives = candidate.drives
-        return None if drives is None else tuple(self.drives[d] for d in drives)
 
 
 def _rms(values: Array) -> float:

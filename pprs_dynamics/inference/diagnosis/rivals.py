@@ -93,10 +93,8 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
         search = selection.search_of(best)
         candidate = next(c for c in best.effects if name in (c.name, c.claim))
         remaining = linear_residual(search, best)
-        drives = candidate.drives
         found.append(RivalEffect(
-            of, candidate.effect,
-            None if drives is None else tuple(search.design.drives[d] for d in drives),
+            of, candidate.effect, search.design.named(candidate.drives),
             estimate(search, best, candidate).parameters,
             linear_error(search, best), _held_out(search, best, validate),
             best.cost - selection.best.cost,

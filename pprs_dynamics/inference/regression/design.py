@@ -13,7 +13,7 @@ coefficients, priors and costs always mean the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -112,6 +112,10 @@ class Design:
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
         return self.residuals.drives
+
+    def named(self, drives: Iterable[int] | None) -> tuple[str, ...] | None:
+        """Return the names of some drives; None of the structure, which is no drive's."""
+        return None if drives is None else tuple(self.drives[d] for d in drives)
 
     @classmethod
     def of(

@@ -17,7 +17,7 @@ constant. Coefficients and noise are fitted in turn until it stands still.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -35,6 +35,7 @@ from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
+Integers = np.typing.NDArray[np.int_]
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
@@ -76,6 +77,11 @@ class JointFit:
     def of(self, block: Block) -> Array:
         """Return the coefficients of a block."""
         return self.coefficients[self.places[block]]
+
+    def index_of(self, blocks: Iterable[Block]) -> Integers:
+        """Return where the coefficients of blocks are, one block after the other."""
+        return np.array([k for block in blocks for k in range(
+            self.places[block].start, self.places[block].stop)], dtype=int)
 
 
 class Regression:
@@ -225,7 +231,7 @@ class Regression:
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
 
-    def held(self, fit: JointFit, index: Sequence[int], values: Array) -> JointFit:
+    def held(self, fit: JointFit, index: Integers, values: Array) -> JointFit:
         """Return a fit with some coefficients (k,) as given, the others fitted beside them.
 
         The rest of a Gaussian posterior moves along with what is held; its density there is what
@@ -274,12 +280,10 @@ class Regression:
         white[..., ~series.known] = 0.0
         return white
 
-    def local(self, fit: JointFit, d: int) -> tuple[Array, list[Block]]:
+    def local(self, fit: JointFit, d: int) -> tuple[Integers, list[Block]]:
         """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""
         acting = [block for block in fit.blocks if d in block.rows]
-        index = [self.base_index[d]]
-        index += [np.arange(fit.places[block].start, fit.places[block].stop) for block in acting]
-        return np.concatenate(index), acting
+        return np.concatenate((self.base_index[d], fit.index_of(acting))), acting
 
     def remaining(self, fit: JointFit, d: int) -> Array:
         """Return the DCT coefficients of what a fit leaves on a drive, (n,) [N]."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import comb, inf, log
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -153,6 +153,8 @@ class UnknownCandidate:
     price : float
     """
 
+    components: ClassVar[tuple[Component, ...]] = ()  # none of the catalogue's
+
     family: Family
     pattern: Pattern
     rows: Mapping[int, Array] = field(repr=False)
@@ -233,6 +235,10 @@ class CandidateSet:
     def unknowns(self) -> tuple[UnknownCandidate, ...]:
         """Those of no catalogue."""
         return tuple(c for c in self.candidates if isinstance(c, UnknownCandidate))
+
+    def without(self, *gone: Candidate) -> tuple[Candidate, ...]:
+        """Return the candidates but some."""
+        return tuple(c for c in self.candidates if not any(c is one for one in gone))
 
     def coefficients(self, component: Component) -> Array:
         """Return the coefficients of a component."""

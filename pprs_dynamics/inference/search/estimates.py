@@ -121,8 +121,7 @@ def _of_set(search: Search, found: CandidateSet, candidate: EffectCandidate,
     for component in candidate.components:
         blocks = [found.blocks[component],
                   *([slopes[component]] if component in slopes else [])]
-        index = np.concatenate([np.arange(place.start, place.stop) for place in (
-            fit.places[block] for block in blocks)])
+        index = fit.index_of(blocks)
         covariance = fit.covariance[np.ix_(index, index)]
         c = found.coefficients(component)
         some, held = _of_component(search, component, c, covariance)

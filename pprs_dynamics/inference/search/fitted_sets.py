@@ -92,12 +92,10 @@ class FittedSets:
         nuisance = self._nuisance_blocks(candidates, self.regression.at(
             self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
-        found = self._set(candidates, fit, nuisance)
-        bodies = {one: block for one, block in found.blocks.items()
+        bodies = {one: self.library.block(one) for c in candidates for one in c.components
                   if issubclass(one.effect, AddedBody)}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
-        if possible is not fit:
-            found = self._set(candidates, possible or fit, nuisance)
+        found = self._set(candidates, possible or fit, nuisance)
         return replace(found, is_admissible=possible is not None and self._is_admissible(found))
 
     def blocks(self, candidates: Candidates, nuisance: Nuisance = MappingProxyType({}),
@@ -108,8 +106,7 @@ class FittedSets:
         )), *chain(*nuisance.values())]
 
     def _set(self, candidates: Candidates, fit: JointFit, nuisance: Nuisance) -> CandidateSet:
-        blocks = {one: self.library.block(one) for candidate in candidates
-                  if isinstance(candidate, EffectCandidate) for one in candidate.components}
+        blocks = {one: self.library.block(one) for c in candidates for one in c.components}
         found = CandidateSet(candidates, fit, fit.deviance, blocks, nuisance)
         return replace(found, total=fit.deviance + self.price(found))
 
@@ -131,14 +128,13 @@ class FittedSets:
         real forms depart from the catalogue's. Each has a coefficient of unit prior.
         """
         found = {}
-        for candidate in candidates:
-            for one in candidate.components if isinstance(candidate, EffectCandidate) else ():
-                size = _stepped(fit.of(self.library.block(one)))
-                key = (one, tuple(size.tolist()))
-                if key not in self._nuisance:
-                    self._nuisance[key] = self._nuisance_of(one, size)
-                if self._nuisance[key]:
-                    found[one] = self._nuisance[key]
+        for one in (one for c in candidates for one in c.components):
+            size = _stepped(fit.of(self.library.block(one)))
+            key = (one, tuple(size.tolist()))
+            if key not in self._nuisance:
+                self._nuisance[key] = self._nuisance_of(one, size)
+            if self._nuisance[key]:
+                found[one] = self._nuisance[key]
         return found
 
     def _nuisance_of(self, component: Component, c: Array) -> tuple[Block, ...]:
@@ -156,8 +152,7 @@ class FittedSets:
 
     def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
-        kept = {one for candidate in candidates if isinstance(candidate, EffectCandidate)
-                for one in candidate.components}
+        kept = {one for c in candidates for one in c.components}
         nuisance = {one: blocks for one, blocks in found.nuisance.items() if one in kept}
         fit = self.regression.at(self.blocks(candidates, nuisance), found.fit.amplitudes)
         return self._set(candidates, fit, nuisance)
@@ -225,13 +220,12 @@ class FittedSets:
     def slopes(self, found: CandidateSet) -> list[tuple[Component, Block]]:
         """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
         slopes = []
-        for candidate in found.effects:
-            for one in candidate.components if candidate.effect.shape else ():
-                assert one.drive is not None
-                rows = self.design.slope_rows(self.library.term(one),
-                                              one.every(found.coefficients(one)))
-                slopes.append((one, self.regression.block({one.drive: rows},
-                                                          precision=np.eye(len(rows)))))
+        for one in (one for one in found.blocks if one.effect.shape):
+            assert one.drive is not None
+            rows = self.design.slope_rows(self.library.term(one),
+                                          one.every(found.coefficients(one)))
+            slopes.append((one, self.regression.block({one.drive: rows},
+                                                      precision=np.eye(len(rows)))))
         return slopes
 
     def _reach(self, component: Component) -> dict[str, float]:

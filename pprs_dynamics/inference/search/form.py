@@ -69,8 +69,7 @@ def beyond_lack_of_fit(search: Search, best: CandidateSet,
     kept = best
     while small := _small(search, kept):
         # Of two that look like each other, either is small beyond the other.
-        without = {candidate: search.evaluate(
-            tuple(c for c in kept.candidates if c is not candidate)) for candidate in small}
+        without = {candidate: search.evaluate(kept.without(candidate)) for candidate in small}
         without = {candidate: found for candidate, found in without.items()
                    if _is_of_loads(search, kept, candidate)
                    or _over_noise(search, best, found) <= search.decisions.left_ratio}

@@ -10,11 +10,13 @@ so that a block's share in the normal equations can be taken out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ReversalShape
+from pprs_dynamics.inference.regression.joint_fit import Integers
 from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.search import Search
@@ -45,7 +47,7 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
     total = len(regression.residuals)
     edges = np.linspace(0, total, BLOCKS + 1)
     H, b = np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size))
-    white: dict[int, tuple[Array, Array, Array]] = {}
+    white: dict[int, tuple[Integers, Array, Array]] = {}
     for d in regression.drives:
         series = regression.series[d]
         index, acting = regression.local(fit, d)
@@ -63,12 +65,10 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
     prior = Prior.of(regression.columns, fit.blocks)
     others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
     fits = np.stack([one.coefficients for one in others])
-    reversals = [k for k, column in enumerate(search.design.base)
-                 if isinstance(column, ReversalShape)]
-    reversals += [k for blocks in found.nuisance.values() for block in blocks
-                  for k in range(fit.places[block].start, fit.places[block].stop)]
     plain = fits.copy()
-    plain[:, reversals] = 0.0
+    plain[:, [k for k, column in enumerate(search.design.base)
+              if isinstance(column, ReversalShape)]] = 0.0
+    plain[:, fit.index_of(chain(*found.nuisance.values()))] = 0.0
     losses, squares, count = np.zeros(BLOCKS), 0.0, 0
     for d, (index, stacked, rows) in white.items():
         series = regression.series[d]

@@ -56,8 +56,7 @@ def beyond_others(regression: Regression, found: CandidateSet, candidate: Candid
     if any(block.mean is not None for block in blocks):
         return sum(whitened_square(regression, found, block, set(block.rows))
                    for block in blocks)
-    index = np.concatenate([np.arange(place.start, place.stop) for place in (
-        found.fit.places[block] for block in blocks)])
+    index = found.fit.index_of(blocks)
     c = found.fit.coefficients[index]
     return float(c @ np.linalg.solve(found.fit.covariance[np.ix_(index, index)], c))
 

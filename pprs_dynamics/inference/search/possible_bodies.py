@@ -62,7 +62,7 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
         if found is None:
             return None
         if not np.array_equal(found, fit.of(block)):
-            fit = regression.held(fit, range(place.start, place.stop), found)
+            fit = regression.held(fit, fit.index_of([block]), found)
     return fit
 
 

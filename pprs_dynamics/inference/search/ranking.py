@@ -90,8 +90,7 @@ class Ranking:
     @classmethod
     def _keeping(cls, first: Search, last: Search, best: CandidateSet, kept: CandidateSet,
                  remainders: tuple[Remainder, ...]) -> Ranking:
-        without = {gone: last.evaluate(tuple(c for c in kept.candidates if c is not gone))
-                   for gone in kept.candidates}
+        without = {gone: last.evaluate(kept.without(gone)) for gone in kept.candidates}
         order, path = _falling(last, best, kept)
         return cls(first, last, _by_cost(first.sets), _by_cost(last.sets), best, kept, remainders,
                    MappingProxyType(without), order, path)

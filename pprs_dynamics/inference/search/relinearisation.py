@@ -206,13 +206,11 @@ def parts_of(search: Search, found: CandidateSet) -> tuple[Array, tuple[PlacedEf
     base = found.fit.coefficients[:len(search.design.base)].copy()
     base[[isinstance(column, ReversalShape) for column in search.design.base]] = 0.0
     effects = []
-    for candidate in found.effects:
-        for one in candidate.components:
-            every = one.every(found.coefficients(one)).tolist()
-            effects.append(PlacedEffect(
-                candidate.effect, one.drive, one.parameters,
-                {c.name: value for c, value in zip(candidate.effect.coefficients, every,
-                                                   strict=False)}))
+    for one in found.blocks:
+        every = one.every(found.coefficients(one)).tolist()
+        effects.append(PlacedEffect(
+            one.effect, one.drive, one.parameters,
+            {c.name: value for c, value in zip(one.effect.coefficients, every, strict=False)}))
     return base, tuple(effects)
 
 

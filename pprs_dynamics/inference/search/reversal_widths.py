@@ -102,11 +102,10 @@ def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
 def _turning(design: Design, found: CandidateSet, d: int) -> list[Turning]:
     """Return the friction on a drive: of the set's effects, and of the given model's."""
     turning: list[Turning] = []
-    for candidate in found.effects:
-        for one in candidate.components:
-            kind = one.effect
-            if one.drive == d and issubclass(kind, DriveEffect) and _may_turn(kind):
-                turning.append((kind, one.parameters, one.every(found.coefficients(one))))
+    for one in found.blocks:
+        kind = one.effect
+        if one.drive == d and issubclass(kind, DriveEffect) and _may_turn(kind):
+            turning.append((kind, one.parameters, one.every(found.coefficients(one))))
     for effect in design.given.effects:
         if (isinstance(effect, DriveEffect) and _may_turn(type(effect))
                 and design.drives[d] in effect.drives):

@@ -61,7 +61,7 @@ class ScannedSets(FittedSets):
                 ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
         """Return gains less prices of components, by effect; one for each drive."""
         library, fit = self.library, base.fit
-        taken = {(c.effect, one.drive) for c in base.effects for one in c.components}
+        taken = {(one.effect, one.drive) for one in base.blocks}
         drives = tuple(library.local) if drive is None else (drive,)
         offered = each(lambda d: library.local[d].offers(fit), drives)
         offers = [offer for of_drive in offered for offer in of_drive.values()]

@@ -24,6 +24,7 @@ from pprs_dynamics.inference.search.candidates import (
     Component,
     EffectCandidate,
     UnknownCandidate,
+    bends,
     set_key,
 )
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -98,8 +99,8 @@ class Search(ScannedSets):
         """Whether the best set has an effect that bends columns, and these are not bent by it."""
         point = self.design.point
         known = {(one.effect, one.drive) for one in point.effects} if point else set()
-        return any(c.effect.bends_columns and (c.effect, one.drive) not in known
-                   for c in self.best.effects for one in c.components)
+        return any(one.effect.bends_columns and (one.effect, one.drive) not in known
+                   for one in self.best.blocks)
 
     def _descend(self, with_patterns: bool, begin: float) -> None:
         """Move from the best set to better neighbours until there is none."""
@@ -131,8 +132,8 @@ class Search(ScannedSets):
             new += [self.evaluate(more) for more in self.proposals(found, 1)
                     if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
-        shaped = [one for one in new if any(c.effect.shape or c.components[0].centre
-                                                for c in one.effects)]
+        shaped = [found for found in new if any(one.effect.shape or one.centre
+                                                for one in found.blocks)]
         for number, found in enumerate(sorted(shaped, key=lambda one: one.cost)):
             # The first effect decides which way the search goes.
             if number < REFINED or len(found.candidates) == 1:
@@ -170,10 +171,9 @@ class Search(ScannedSets):
         """
         for candidate in best.effects:
             if candidate.effect.bends_columns:
-                rest = tuple(one for one in best.candidates if one is not candidate)
+                rest = best.without(candidate)
                 for candidates in self.proposals(self.at_noise_of(best, rest)):
-                    if any(one.effect.bends_columns for one in candidates
-                           if isinstance(one, EffectCandidate) and one not in rest):
+                    if any(bends(one) for one in candidates if one not in rest):
                         yield candidates
 
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
@@ -210,11 +210,11 @@ class Search(ScannedSets):
         """Return the set on all drives where its effects pay, in shapes that scans find."""
         for candidates in self.proposals(found, effects={c.effect for c in found.effects}):
             found = min(found, self.evaluate(candidates), key=lambda one: one.cost)
-        for effect, d in [(c.effect, one.drive) for c in found.effects for one in c.components
-                          if c.effect.shape and one.drive is not None]:
+        for effect, d in [(one.effect, one.drive) for one in found.blocks
+                          if one.effect.shape and one.drive is not None]:
             candidate = next(c for c in found.effects if c.effect is effect)
             others = [one for one in candidate.components if one.drive != d]
-            rest = tuple(c for c in found.candidates if c is not candidate)
+            rest = found.without(candidate)
             less = (*rest, EffectCandidate.of(others)) if others else rest
             offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
             if effect.name in offers:
@@ -242,8 +242,8 @@ class Search(ScannedSets):
     def pruned(self, found: CandidateSet) -> CandidateSet:
         """Return a set without the candidates that do not pay in it."""
         while found.candidates:
-            less = min((self.evaluate(tuple(c for c in found.candidates if c is not gone))
-                        for gone in found.candidates), key=lambda one: one.total)
+            less = min((self.evaluate(found.without(gone)) for gone in found.candidates),
+                       key=lambda one: one.total)
             if less.total > found.total:
                 break
             found = less
@@ -258,7 +258,7 @@ class Search(ScannedSets):
         for size in (1, 2):
             for gone in combinations(best.candidates, size):
                 if size == 1 or any(isinstance(c, EffectCandidate) for c in gone):
-                    rests.append((tuple(c for c in best.candidates if c not in gone), None))
+                    rests.append((best.without(*gone), None))
         for candidate in best.effects:
             for component in candidate.components if len(candidate.components) > 1 else ():
                 # On one of its drives it, or some of its coefficients, may stand for another.
@@ -281,13 +281,11 @@ class Search(ScannedSets):
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
         """Yield sets in which two other effects stand for one that claims more than one thing."""
-        rest = tuple(one for one in best.candidates if one is not gone)
-
         def with_another(candidates: Candidates) -> list[Candidates]:
             found = self.proposals(self.at_noise_of(best, candidates), REPLACEMENTS + 1)
             return [more for more in found if all(
                 one.effect is not gone.effect for one in more if isinstance(one, EffectCandidate))]
-        for first in with_another(rest):
+        for first in with_another(best.without(gone)):
             yield from with_another(first)[:REPLACEMENTS]
 
     def _alternatives(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
@@ -314,7 +312,7 @@ class Search(ScannedSets):
     def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
         for candidate in best.candidates:
             if len(best.candidates) > 1:
-                yield tuple(c for c in best.candidates if c is not candidate)
+                yield best.without(candidate)
             if not isinstance(candidate, EffectCandidate):
                 continue
             effect = candidate.effect
