@@ -107,7 +107,7 @@ class LinkagePlant:
         self._viscous, self._coulomb, self._offset = (
             np.asarray(values[f'friction.{key}'], dtype=float)
             for key in ('viscous', 'coulomb', 'offset'))
-        self._width = np.broadcast_to(np.asarray(reversal.velocity, dtype=float), len(s.drives))
+        self._width = reversal.widths(len(s.drives))
         self._passive = [effect.table(reversal) for effect in model.effects
                          if isinstance(effect, LinkageFriction)]
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []

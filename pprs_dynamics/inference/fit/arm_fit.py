@@ -86,7 +86,7 @@ def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
     known = np.concatenate([np.isfinite(one.measured) for one in columns])
     inertial = np.concatenate([one.inertial for one in columns])
     rest = np.concatenate([one.measured - one.rest for one in columns])
-    width = np.broadcast_to(np.asarray(model.reversal.velocity, dtype=float), (count,)).copy()
+    width = model.reversal.widths(count).copy()
     start = own_numbers(model)
     own, point = start.copy(), np.zeros(len(bodies))
     moving = known.mean(axis=0) >= STANDS

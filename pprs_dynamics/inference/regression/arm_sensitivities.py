@@ -21,6 +21,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     RELATIVE_STEP,
     Number,
     Sensitivities,
+    following,
     reversal_columns,
 )
 from pprs_dynamics.physics.effects.effect import Parameter
@@ -48,10 +49,7 @@ class ArmSensitivities(Sensitivities):
 
     def __init__(self, model: ForceModel, given: ForceModel) -> None:
         super().__init__(model, given)
-        self._following = [
-            effect for effect in self.model.effects
-            if not effect.is_measurement and not isinstance(effect, BodyEffect)
-            and effect.initial_memory() is None]
+        self._following = following(self.model)
         # Built once, not chunk by chunk.
         self._moved = [None if is_gain(number.key) else self._with(number)
                        for number in self.numbers]

@@ -206,7 +206,7 @@ class Design:
 
     def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
         """Return when a drive is in motion, (M,)."""
-        width = np.broadcast_to(self.given.reversal.velocity, len(self.drives))[drive]
+        width = self.given.reversal.widths(len(self.drives))[drive]
         return np.abs(self.residuals.variables['velocity'][:, drive]) > float(TURNED * width)
 
     def moves(self, drive: int) -> bool:

@@ -44,7 +44,7 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
     if (term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect)
             or effect.drive_memory() is not None):
         return np.zeros((0, len(design.residuals)))
-    width = np.broadcast_to(design.model.reversal.velocity, len(design.drives))[term.drive]
+    width = design.model.reversal.widths(len(design.drives))[term.drive]
     parts = []
     for recording in design.recordings:
         samples = recording.samples(slice(None), term.drive)

@@ -28,6 +28,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     RELATIVE_STEP,
     Number,
     Sensitivities,
+    following,
     reversal_columns,
 )
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
@@ -93,10 +94,7 @@ class ChunkSensitivities:
 
     def __init__(self, model: DriveModel, forces: DriveForces) -> None:
         self.model, self.state = model, forces.mechanism
-        self._following = [
-            effect for effect in model.effects
-            if not effect.is_measurement and not isinstance(effect, BodyEffect)
-            and effect.initial_memory() is None]
+        self._following = following(model)
         self._sensors = [e for e in model.effects if isinstance(e, MeasurementEffect)]
 
     @cached_property
@@ -152,9 +150,7 @@ class ChunkSensitivities:
         """Return the change with another model of the same geometry, memories left out."""
         state = self._solved(model)
         total = state.rigid_body.force + sum(
-            effect.force(state) for effect in model.effects
-            if not effect.is_measurement and not isinstance(effect, BodyEffect)
-            and effect.initial_memory() is None)
+            effect.force(state) for effect in following(model))
         difference: Array = total - self._reference
         return difference
 

@@ -19,7 +19,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -134,6 +135,13 @@ class Sensitivities(ABC):
             if isinstance(effect, MeasurementEffect):
                 column = effect.sensed(column, state.time, self.model.drives)
         return column
+
+
+def following(model: ForceModel) -> list[Effect]:
+    """Return the effects whose forces follow from a state: no bodies, sensors or memories."""
+    return [effect for effect in model.effects
+            if not effect.is_measurement and not isinstance(effect, BodyEffect)
+            and effect.initial_memory() is None]
 
 
 def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array) -> list[Array]:

@@ -214,7 +214,7 @@ def calibrations(search: Search, found: CandidateSet, widths: Mapping[int, float
             calibrated.append(Calibration(
                 number.key, number.element, number.value,
                 column.value(float(found.fit.coefficients[k])), std, number.unit))
-    before = np.broadcast_to(design.given.reversal.velocity, len(design.drives))
+    before = design.given.reversal.widths(len(design.drives))
     # Widths are told without an uncertainty: the fits allow for all of them anyway.
     return calibrated + [
         Calibration(*place_of(design, d), float(before[d]), width, 0.0, _units(design, d)('m/s'))

@@ -60,7 +60,7 @@ def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
                    if isinstance(column, ReversalShape) and column.drive == d]
         if not columns or not design.moves(d):
             continue
-        width = float(np.broadcast_to(design.model.reversal.velocity, len(design.drives))[d])
+        width = float(design.model.reversal.widths(len(design.drives))[d])
         series = regression.series[d]
         rest = regression.remaining(found.fit, d)
         for k in columns:

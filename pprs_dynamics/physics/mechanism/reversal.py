@@ -13,6 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import larger, tanh
 
 
@@ -30,6 +33,10 @@ class Reversal:
 
     velocity: float | tuple[float, ...] = 0.001
     rate: float = 0.001
+
+    def widths(self, drives: int) -> Array:
+        """Return the width of each drive [m/s], (D,)."""
+        return np.broadcast_to(np.asarray(self.velocity, dtype=float), (drives,))
 
 
 def smooth_sign(velocity: Any, reversal_velocity: Any) -> Any:

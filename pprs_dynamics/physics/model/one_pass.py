@@ -103,7 +103,7 @@ class OnePass:
         self._fields = {'robot': robot, 'reversal': reversal, 'printed': printed, 'load': None}
         self._geometry = robot.geometry
         self._bounds = limits.rod_sine, limits.condition_number
-        widths = np.broadcast_to(reversal.velocity, len(active.viscous)).tolist()
+        widths = reversal.widths(len(active.viscous)).tolist()
         drives = zip(active.viscous, active.coulomb, widths, strict=True)
         self.parameters = robot.kernel_parameters.extended(
             ForcesParameters, robot.geometry.platform_radius, float(printed),

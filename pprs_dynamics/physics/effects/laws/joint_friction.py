@@ -56,8 +56,8 @@ def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float
     reversal : Reversal
         In drives by their velocity, in all others by their rate.
     """
-    widths = dict(zip(structure.drives, np.broadcast_to(
-        reversal.velocity, len(structure.drives)).tolist(), strict=True))
+    widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
+                      strict=True))
     rows = friction_rows(structure)
     joint, loop = (np.array([rows[name][side] for name in blocks], dtype=np.int64)
                    for side in (0, 1))
