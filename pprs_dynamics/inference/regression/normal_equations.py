@@ -219,8 +219,8 @@ class DriveEquations:
         return np.maximum(left, 1e-12 * self.squares)
 
     def leverage(self, covariance: Array, weights: Array) -> Array:
-        """Return the degrees of freedom spent in the bands, (B,)."""
-        spent: Array = weights * (self._flat @ covariance.ravel())
+        """Return the degrees of freedom spent in the bands, (B,), by a flat covariance."""
+        spent: Array = weights * (self._flat @ covariance)
         return spent
 
 
@@ -245,26 +245,29 @@ class NormalEquations:
             place += block.size
         self.drives: list[DriveEquations] = []
         self.indices: list[np.typing.NDArray[np.int_]] = []
+        self._pairs: list[np.typing.NDArray[np.int_]] = []  # of these, in a flat (P, P) array
         for d in regression.drives:
             acting = tuple(block for block in blocks if d in block.rows)
             self.drives.append(regression.equations(d, acting))
             self.indices.append(np.concatenate([regression.base_index[d], *(
                 np.arange(self.places[one].start, self.places[one].stop) for one in acting)]))
+            self._pairs.append(np.add.outer(place * self.indices[-1], self.indices[-1]).ravel())
 
     def solve(self, spectra: Array, counts: Array) -> Solution:
         """Return the solution under noise spectra (D, B)."""
         gram, side = np.zeros_like(self.prior.precision), np.zeros(len(self.prior.mean))
         weights = 1 / spectra
-        for k, (drive, index) in enumerate(zip(self.drives, self.indices, strict=True)):
+        for k, (drive, index, pairs) in enumerate(zip(
+                self.drives, self.indices, self._pairs, strict=True)):
             products, with_error = drive.weighted(weights[k])
-            gram[np.ix_(index, index)] += products
+            gram.reshape(-1)[pairs] += products.reshape(-1)
             side[index] += with_error
         found = self.prior.posterior(gram, side)
         squares = np.stack([drive.left(found.coefficients[index])
                             for drive, index in zip(self.drives, self.indices, strict=True)])
         leverage = np.stack([
-            drive.leverage(found.covariance[np.ix_(index, index)], weights[k])
-            for k, (drive, index) in enumerate(zip(self.drives, self.indices, strict=True))])
+            drive.leverage(found.covariance.reshape(-1)[pairs], weights[k])
+            for k, (drive, pairs) in enumerate(zip(self.drives, self._pairs, strict=True))])
         deviance = float(np.sum(counts * np.log(spectra) + squares * weights)
                          + found.penalty + found.log_det)
         return Solution(found.coefficients, found.covariance, deviance, squares, leverage)

@@ -117,42 +117,47 @@ class NoiseShapes:
         squares, free = squares[:, 1:], np.maximum(
             counts[:, 1:] - leverage[:, 1:], 0.02 * counts[:, 1:])
         least = LEAST_SHARE * squares.sum(axis=1) / np.maximum(free.sum(axis=1), 1) + LEAST_POWER
-        return np.stack([_scored(*one, phi) for one in zip(
-            amplitudes, squares, free, least, strict=True)])
+        return _scored(amplitudes, squares, free, least[:, None], phi)
 
 
-def _scored(amplitudes: Array, squares: Array, free: Array, least: float, phi: Array) -> Array:
-    """Return the amplitudes of one drive that maximise the likelihood, (J + 1,)."""
+def _scored(amplitudes: Array, squares: Array, free: Array, least: Array, phi: Array) -> Array:
+    """Return the amplitudes of all drives that maximise the likelihood, (D, J + 1)."""
     from scipy.optimize import nnls  # here: commands that fit no noise start without it
 
-    amplitudes = np.maximum(amplitudes, least)
-    power = amplitudes @ phi
-    before = free @ np.log(power) + (squares / power).sum()
+    found = np.maximum(amplitudes, least)
+    going = np.arange(len(found))  # drives that have not converged
+    before = _deviance(found @ phi, squares, free)
     for _ in range(MOST_STEPS):
+        a, r2, f, low = found[going], squares[going], free[going], least[going]
+        power = a @ phi
         # Scoring is a regression of the bands' mean squares on the shapes, whose weights follow
         # from the last spectrum; that amplitudes are not negative is exact.
-        root = np.sqrt(free) / power
-        design = root * phi
-        scale = np.sqrt(np.sum(design ** 2, axis=1))
-        above, _ = nnls((design / scale[:, None]).T,
-                        root * (squares / np.maximum(free, 1e-300) - least * phi.sum(axis=0)),
-                        maxiter=MOST_ACTIVE)
-        step = least + above / scale - amplitudes
-        change = step @ phi
-        promised = float(change @ (squares / power ** 2 - free / power))
-        if promised < CONVERGED:
-            break
-        share = 1.0
-        while share > LEAST_STEP:
-            power = (amplitudes + share * step) @ phi
-            after = free @ np.log(power) + (squares / power).sum()
-            if after <= before - SUFFICIENT * share * promised:
+        root = np.sqrt(f) / power
+        design = root[:, None] * phi
+        scale = np.sqrt(np.sum(design ** 2, axis=2))
+        wanted = root * (r2 / np.maximum(f, 1e-300) - low * phi.sum(axis=0))
+        above = np.stack([nnls(one.T, target, maxiter=MOST_ACTIVE)[0]
+                          for one, target in zip(design / scale[:, :, None], wanted, strict=True)])
+        step = low + above / scale - a
+        promised = np.sum((step @ phi) * (r2 / power ** 2 - f / power), axis=1)
+        share = np.where(promised < CONVERGED, 0.0, 1.0)
+        while True:
+            after = _deviance((a + share[:, None] * step) @ phi, r2, f)
+            short = after > before[going] - SUFFICIENT * share * promised
+            if not np.any(short & (share > 0)):
                 break
-            share /= 2
-        else:
+            share = np.where(short, np.where(share > LEAST_STEP, share / 2, 0.0), share)
+        found[going], before[going] = a + share[:, None] * step, after
+        going = going[share > 0]
+        if not len(going):
             break
-        amplitudes, before = amplitudes + share * step, after
-    return amplitudes
+    return found
+
+
+def _deviance(power: Array, squares: Array, free: Array) -> Array:
+    """Return -2 ln of the likelihood of spectra (D, B), (D,)."""
+    deviance: Array = np.sum(free * np.log(power) + squares / power, axis=1)
+    return deviance
 
 
 @dataclass(frozen=True)

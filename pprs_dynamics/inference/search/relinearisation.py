@@ -11,7 +11,7 @@ search goes on from the set that was found. Costs of both searches mean the same
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -62,6 +62,7 @@ def _around_fitted(
     not yet; `rival` is the cost that each search has to reach for another one.
     """
     scale = search.regression.error_scale
+    costs: dict[Hashable, float] = {}
     for number in range(MOST_SEARCHES):
         kept, _ = beyond_lack_of_fit(search, best)
         if search.is_beyond_point:
@@ -80,8 +81,10 @@ def _around_fitted(
         search = Search(design, decisions, scale, _share_of(
             report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES), patterns=patterns)
         best = search.run(*starts)
-        if best.total > rival:
-            break
+        placed = frozenset((one.name, one.drives) for one in best.candidates)
+        if best.total > rival or abs(costs.get(placed, np.inf) - best.cost) < LEAST_CHANGE:
+            break  # found before: what follows would be what followed then
+        costs[placed] = best.cost
     return search, best
 
 
