@@ -68,6 +68,7 @@ class LiveComparison:
         self._span = span
         self._stamps: list[float] = []
         self._live: LiveReconstruction | None = None
+        self._gaps_before = self._gaps_in_a_row = 0
         self._waiting: list[LiveSample] = []
         self._recent: deque[tuple[float, Array]] = deque()
         self.use_model(model)
@@ -80,26 +81,23 @@ class LiveComparison:
         self._recent.clear()
 
     @property
-    def lag(self) -> float:
-        """By how much answers come late [s]; NaN before the step is known."""
-        if self._live is None:
-            return float('nan')
-        polynomial = self._live.polynomial
-        return polynomial.half * polynomial.step
-
-    @property
     def gaps(self) -> int:
         """How often the stream was interrupted."""
-        return 0 if self._live is None else self._live.gaps
+        return self._gaps_before + (0 if self._live is None else self._live.gaps)
 
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
         """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
         if self._live is None:
             self._learn(time)
         if self._live is not None:
+            gaps = self._live.gaps
             sample = self._live.push(time, position, np.asarray(effort) * self._model.recorded_gain)
             if sample is not None:
                 self._waiting.append(sample)
+            self._gaps_in_a_row = self._gaps_in_a_row + 1 if self._live.gaps > gaps else 0
+            if self._gaps_in_a_row == STAMPS_TO_LEARN:  # no gaps: another rate
+                self._gaps_before, self._gaps_in_a_row = self.gaps, 0
+                self._live, self._stamps = None, []
 
     def evaluate(self) -> Compared | None:
         """Return the samples that have become judgeable since the last call, None for none.

@@ -16,10 +16,6 @@ class Durations:
     """The last thousand durations [s], and the longest of all."""
 
     def __init__(self) -> None:
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget all."""
         self._recent, self._count, self._longest = np.zeros(WINDOW), 0, 0.0
 
     def add(self, duration: float) -> None:
