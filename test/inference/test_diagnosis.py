@@ -319,7 +319,13 @@ def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
         'effects.active': ['stribeck_friction'],
         effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
     recording = record(true, noise=0.05)
-    found = diagnose(MODEL, [recording])
+    other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2))
+    found = diagnose(MODEL, [recording], [other])
+    # The model that is judged on the other motion is the one that is adopted, with its widths.
+    (effect_found,) = found.effects
+    assert effect_found.held_out_after == pytest.approx(
+        np.sqrt(np.nanmean(measure_residuals(found.adopted, [other])[0].error ** 2)), rel=1e-6)
+    assert effect_found.held_out_after < 1.02 * found.noise_floor < effect_found.held_out_before
     widths = found.adopted.values['friction.reversal_velocities']
     assert widths[0] == pytest.approx(0.0015, rel=0.05)
     # What the linear fit promises is what the model does.

@@ -22,6 +22,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
@@ -171,10 +172,22 @@ class _Answer:
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
-        self.search: Search = ranking.last
-        self.best = ranking.best
-        self.design = self.search.design
-        self.drives = self.design.drives
+        self.drives = ranking.last.design.drives
+
+    @property
+    def search(self) -> Search:
+        """Around the model that is adopted."""
+        return self.ranking.last
+
+    @property
+    def design(self) -> Design:
+        """Of that search."""
+        return self.search.design
+
+    @property
+    def best(self) -> CandidateSet:
+        """That of lowest cost."""
+        return self.ranking.best
 
     @property
     def kept(self) -> CandidateSet:
@@ -182,20 +195,21 @@ class _Answer:
         return self.ranking.kept
 
     def diagnosis(self) -> Diagnosis:
-        search, regression = self.search, self.search.regression
         first = self.ranking.first.design
         unconfirmed: list[FoundEffect] = []
         while True:
-            widths = estimate_widths(search, self.kept)
-            adopted = with_widths(fitted_model(search, self.kept), self.design, widths)
+            widths = estimate_widths(self.search, self.kept)
+            adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
             remaining = first.residuals.measured - exact_forces(self.design, adopted)
-            effects = self._effects(remaining)
+            effects = self._effects(adopted, remaining)
             weak = [one for one in effects if not one.is_confirmed]
             if not weak:
                 break
             least = min(weak, key=lambda one: one.evidence)
             unconfirmed.append(least)
-            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)])
+            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)],
+                                             self.decisions)
+        search, regression = self.search, self.search.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}
@@ -215,7 +229,12 @@ class _Answer:
             float(np.sqrt(np.mean(np.square(list(floors.values()))))),
             'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
-    def _effects(self, remaining: Array) -> list[FoundEffect]:
+    def _model(self, found: CandidateSet) -> ForceModel:
+        """Return the fitted model of a set, where friction turns over in widths of its own."""
+        return with_widths(fitted_model(self.search, found), self.design,
+                           estimate_widths(self.search, found))
+
+    def _effects(self, adopted: ForceModel, remaining: Array) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
         search, ordered, steps = self.search, self.ranking.order, self.ranking.path
         if not ordered:
@@ -224,7 +243,7 @@ class _Answer:
                   *(linear_error(search, step) for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.ranking.first.design.given
-            models = [given, *(fitted_model(search, step) for step in steps[1:])]
+            models = [given, *map(self._model, steps[1:-1]), adopted]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
             # Nothing is fitted in the model as given: all of its error is held out.

@@ -23,7 +23,11 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import around_fitted, linear_residual
+from pprs_dynamics.inference.search.relinearisation import (
+    around_fitted,
+    linear_residual,
+    linearised,
+)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -95,10 +99,17 @@ class Ranking:
         return cls(first, last, _by_cost(first.sets), _by_cost(last.sets), best, kept, remainders,
                    MappingProxyType(without), order, path)
 
-    def less(self, gone: EffectCandidate) -> Ranking:
-        """Return the ranking without one of the kept effects, and what paid only beside it."""
-        return self._keeping(self.first, self.last, self.best,
-                             self.last.pruned(self.without[gone]), self.remainders)
+    def less(self, gone: EffectCandidate, decisions: Decisions) -> Ranking:
+        """Return the ranking without one of the kept effects, and what paid only beside it.
+
+        Where that one bent the columns, around what is left of the fitted model.
+        """
+        last, best, kept = self.last, self.best, self.last.pruned(self.without[gone])
+        if bends(gone):
+            design = linearised(last, kept, decisions)[0].design
+            last = Search(design, decisions, last.regression.error_scale, patterns=last.patterns)
+            best = kept = last.refined(last.evaluate(kept.candidates))
+        return self._keeping(self.first, last, best, kept, self.remainders)
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
