@@ -111,9 +111,18 @@ def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption
     assert 'lacks' not in words.headline
     assert ('hysteresis on lift_2 was fitted as well and is no finding: with it the error on '
             'held-out data does not fall (0.26 N before, 0.3 N after)') in words.headline
+    assert words.headline.startswith('Nothing that was found holds.')  # the error is the noise
     assert not words.effects
     assert words.following.startswith('Do not add hysteresis')
     assert 'adopt' not in words.command
+
+
+def test_an_error_above_the_noise_is_told_where_nothing_holds() -> None:
+    above = made_up_diagnosis('adequate', unconfirmed=(
+        found_effect('hysteresis', held_out_after=0.3),))
+    above = replace(above, remaining=2 * above.remaining)
+    assert re.match(r'Nothing that was found holds, and the error of 0.1\d* N is more than the '
+                    r'noise, 0.05 N\.', word_diagnosis(above).headline)
 
 
 def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:

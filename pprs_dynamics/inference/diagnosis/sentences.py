@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 
+import numpy as np
+
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
@@ -161,7 +163,10 @@ def _headline(diagnosis: Diagnosis) -> str:
                 f'{places}.{beside}{doubt}')
     noise = in_unit(diagnosis.noise_floor, unit)
     if not held and diagnosis.unconfirmed:
-        return f'Nothing that was found holds.{doubt}'
+        left = float(np.sqrt(np.nanmean(diagnosis.remaining ** 2)))
+        more = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
+                if left > AT_NOISE * diagnosis.noise_floor else '')
+        return f'Nothing that was found holds{more}.{doubt}'
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
