@@ -164,9 +164,9 @@ def _headline(diagnosis: Diagnosis) -> str:
     noise = in_unit(diagnosis.noise_floor, unit)
     if not held and diagnosis.unconfirmed:
         left = float(np.sqrt(np.nanmean(diagnosis.remaining ** 2)))
-        more = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
+        above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
                 if left > AT_NOISE * diagnosis.noise_floor else '')
-        return f'Nothing that was found holds{more}.{doubt}'
+        return f'Nothing that was found holds{above}.{doubt}'
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
