@@ -86,8 +86,11 @@ def adopt(
     case = _Case(model, start, request, recordings, validate, force, diagnosis, decisions)
     if request.present(model):
         return _fit_anew(case, report)
+    named = next((one for one in diagnosis.effects if one.name == request.name), None)
+    # Where the recordings call for it, beside what else they call for, is known by now.
+    placed = replace(request, drives=named.drives) if named and not request.drives else request
     try:
-        fitted = fit_effect(start, request, recordings, decisions,
+        fitted = fit_effect(start, placed, recordings, decisions,
                             lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
     except (ModelError, StandingError) as error:
         return case.without_model(str(error))
@@ -102,7 +105,7 @@ def adopt(
     remarks += [f'{", ".join(fitted.at_bound)} stands at the edge of what was tried'
                 ] if fitted.at_bound else []
     others = [one.name for one in diagnosis.effects if one.name != request.name]
-    if others and any(one.name == request.name for one in diagnosis.effects):
+    if others and named:
         remarks.append(f'the recordings call for {", ".join(others)}, too')
     if validate:
         held_out, gains = case.validated(fitted.plain, fitted.model, diagnosis.noise)
