@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -199,7 +199,7 @@ class _Answer:
         unconfirmed: list[FoundEffect] = []
         while True:
             widths = estimate_widths(self.search, self.kept)
-            adopted = with_widths(fitted_model(self.search, self.kept), self.design, widths)
+            adopted = self._model(self.kept, widths)
             remaining = first.residuals.measured - exact_forces(self.design, adopted)
             effects = self._effects(adopted, remaining)
             weak = [one for one in effects if not one.is_confirmed]
@@ -229,10 +229,9 @@ class _Answer:
             float(np.sqrt(np.mean(np.square(list(floors.values()))))),
             'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
-    def _model(self, found: CandidateSet) -> ForceModel:
-        """Return the fitted model of a set, where friction turns over in widths of its own."""
-        return with_widths(fitted_model(self.search, found), self.design,
-                           estimate_widths(self.search, found))
+    def _model(self, found: CandidateSet, widths: Mapping[int, float]) -> ForceModel:
+        """Return the fitted model of a set, where friction turns over in widths [m/s] by drive."""
+        return with_widths(fitted_model(self.search, found), self.design, widths)
 
     def _effects(self, adopted: ForceModel, remaining: Array) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
@@ -243,7 +242,8 @@ class _Answer:
                   *(linear_error(search, step) for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.ranking.first.design.given
-            models = [given, *map(self._model, steps[1:-1]), adopted]
+            models = [given, *(self._model(one, estimate_widths(search, one))
+                               for one in steps[1:-1]), adopted]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
             # Nothing is fitted in the model as given: all of its error is held out.
