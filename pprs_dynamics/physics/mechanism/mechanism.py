@@ -25,6 +25,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction, Loa
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.system.parallel import lazy
 
 # Condition number of the loops, lengths in units of the mechanism's size, over that at home.
 WORST_CONDITION = 300.0
@@ -269,7 +270,7 @@ class LinkageState(JointMotion):
         """Names of the drives."""
         return self.robot.structure.drives
 
-    @cached_property
+    @lazy
     def linkage(self) -> Linkage:
         """The motion of all links."""
         if self.known is not None and self.known.is_of(self.position, self.velocity,
@@ -277,13 +278,13 @@ class LinkageState(JointMotion):
             return self.known
         return self.robot.at(self.position, self.velocity, self.acceleration)
 
-    @cached_property
+    @lazy
     def direction(self) -> Array:
         """Sign of the velocity, sgn, turning over within the reversal velocity."""
         direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
         return direction
 
-    @cached_property
+    @lazy
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
         efforts: Array = self.reactions.efforts + self.robot.armature * self.acceleration
@@ -291,12 +292,12 @@ class LinkageState(JointMotion):
             efforts = efforts + self.linkage.wrench_efforts(self.load.wrench)
         return efforts
 
-    @cached_property
+    @lazy
     def guide_load(self) -> Array:
         """What a drive's gear carries: the size of its effort without friction [N m, N]."""
         return np.abs(self.rigid_force)
 
-    @cached_property
+    @lazy
     def reactions(self) -> Loads:
         """What joints and closures transmit without friction."""
         return self.linkage.loads(self.robot, with_reactions=True)
