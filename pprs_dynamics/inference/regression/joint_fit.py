@@ -187,11 +187,11 @@ class Regression:
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
         key = (d, acting)
-        if key not in self._equations:
-            if len(self._equations) >= MOST_EQUATIONS:
-                self._equations.clear()
-            self._equations[key] = DriveEquations(self, d, acting)
-        return self._equations[key]
+        found = self._equations.pop(key, None) or DriveEquations(self, d, acting)
+        if len(self._equations) >= MOST_EQUATIONS:
+            self._equations.pop(next(iter(self._equations)))  # not used for longest
+        self._equations[key] = found
+        return found
 
     def release(self) -> None:
         """Let go of equations; they are made again, of products that are kept."""

@@ -228,10 +228,13 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
     first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
     last, best = around_fitted(first, first.run(), decisions, report)
-    # Rivals that bend no columns are judged where none are bent.
-    for one in last.sets if last is not first else ():
-        if (one.cost < best.cost + decisions.rival_margin and one.effects and not one.unknowns
-                and not _is_bent(one)):
+    # Rivals that bend no columns are judged where none are bent: the best of each kind.
+    seen = {_claims(best)}
+    for one in _by_cost(last.sets) if last is not first else ():
+        if one.cost > best.cost + decisions.rival_margin:
+            break
+        if one.effects and not one.unknowns and not _is_bent(one) and _claims(one) not in seen:
+            seen.add(_claims(one))
             first.refined(first.evaluate(one.candidates))
     found = Ranking.of(first, last, best)
     report(1.0)
@@ -240,6 +243,10 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
 
 def _is_bent(found: CandidateSet) -> bool:
     return any(map(bends, found.candidates))
+
+
+def _claims(found: CandidateSet) -> frozenset[str]:
+    return frozenset(candidate.claim for candidate in found.effects)
 
 
 def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:

@@ -31,6 +31,7 @@ from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.inference.search.candidates import CandidateSet, bends
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form import beyond_lack_of_fit
+from pprs_dynamics.inference.search.scanned_sets import Place
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
@@ -63,6 +64,7 @@ def _around_fitted(
     """
     scale = search.regression.error_scale
     costs: dict[Hashable, float] = {}
+    refuted: set[Place] = set()
     for number in range(MOST_SEARCHES):
         kept, _ = beyond_lack_of_fit(search, best)
         if search.is_beyond_point:
@@ -79,13 +81,23 @@ def _around_fitted(
         design, patterns = last.design, search.patterns
         del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
         search = Search(design, decisions, scale, _share_of(
-            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES), patterns=patterns)
+            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES), patterns=patterns,
+            refuted=frozenset(refuted))
         best = search.run(*starts)
+        refuted |= _bent_in_vain(search, best)
         placed = frozenset((one.name, one.drives) for one in best.candidates)
         if best.total > rival or abs(costs.get(placed, np.inf) - best.cost) < LEAST_CHANGE:
             break  # found before: what follows would be what followed then
         costs[placed] = best.cost
     return search, best
+
+
+def _bent_in_vain(search: Search, best: CandidateSet) -> set[Place]:
+    """Return the effects that bent the columns of a search, and that its best set is without."""
+    point = search.design.point
+    bent = {(one.effect, one.drive) for one in point.effects
+            if one.effect.bends_columns} if point else set()
+    return bent - {(one.effect, one.drive) for one in best.blocks}
 
 
 def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:

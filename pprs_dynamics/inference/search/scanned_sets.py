@@ -9,12 +9,14 @@ of sums that are known. It proposes; a fit with its own noise decides (`search.s
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 
 import numpy as np
 
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -24,8 +26,26 @@ PROPOSED = -12.0  # lowest score of a proposal
 SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
 
+Place = tuple[type[CatalogueEffect], int | None]  # an effect, and the drive that it acts on alone
+
+
 class ScannedSets(FittedSets):
-    """Fitted sets, and what a scan proposes to add to each."""
+    """Fitted sets, and what a scan proposes to add to each.
+
+    Parameters
+    ----------
+    design, decisions, error_scale
+        See `FittedSets`.
+    refuted : container of Place
+        What no scan proposes: effects that bend the columns and were dropped where these were
+        computed with them, which counts for more than that they seem to pay where they are not.
+    """
+
+    def __init__(self, design: Design, decisions: Decisions,
+                 error_scale: Mapping[int, float] | None = None,
+                 refuted: Container[Place] = ()) -> None:
+        super().__init__(design, decisions, error_scale)
+        self.refuted = refuted
 
     def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,
                   least: float = PROPOSED,
@@ -66,11 +86,12 @@ class ScannedSets(FittedSets):
         offered = each(lambda d: library.local[d].offers(fit), drives)
         offers = [offer for of_drive in offered for offer in of_drive.values()]
         offers += library.shared_offers(fit) if drive is None else []
-        best: dict[tuple[type[CatalogueEffect], int | None], tuple[float, Component]] = {}
+        best: dict[Place, tuple[float, Component]] = {}
         for one, gain in offers:
             key = (one.effect, one.drive)
             net = gain - library.component_price(one)
-            if key not in taken and (key not in best or net > best[key][0]):
+            if key not in taken and key not in self.refuted and (
+                    key not in best or net > best[key][0]):
                 best[key] = (net, one)
         found: dict[type[CatalogueEffect], list[tuple[float, Component]]] = {}
         for (effect, _), scored in best.items():

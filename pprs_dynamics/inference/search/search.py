@@ -11,7 +11,7 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -29,7 +29,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates
-from pprs_dynamics.inference.search.scanned_sets import ScannedSets, with_fast_noise
+from pprs_dynamics.inference.search.scanned_sets import Place, ScannedSets, with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -56,13 +56,16 @@ class Search(ScannedSets):
         Patterns of no catalogue take part.
     patterns : sequence of PatternLibrary
         Those of another operating point; by default they are made.
+    refuted
+        See `ScannedSets`.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
                  error_scale: Mapping[int, float] | None = None,
                  progress: Callable[[float], None] | None = None,
-                 with_unknown: bool = True, patterns: Sequence[PatternLibrary] = ()) -> None:
-        super().__init__(design, decisions, error_scale)
+                 with_unknown: bool = True, patterns: Sequence[PatternLibrary] = (),
+                 refuted: Container[Place] = ()) -> None:
+        super().__init__(design, decisions, error_scale, refuted)
         shared = Shared()
         self.patterns = [one.around(self.regression) for one in patterns] or (
             [PatternLibrary(self.regression, self.prices, d, shared=shared)
