@@ -180,6 +180,18 @@ def test_the_catalogues_own_form_is_found_with_its_values_and_to_the_noise() -> 
     assert rms < found.effects[0].error_before / 3
 
 
+def test_what_another_recording_refutes_is_unknown_and_not_adequate() -> None:
+    """Friction that one recording shows, and the other does not: no model, and no noise."""
+    values = {**MODEL.values, 'effects.active': ['coulomb_friction'],
+              'effects.coulomb_friction.slide_1.force': 1.0}
+    found = diagnose(MODEL, [record(build_model(values), noise=0.05)],
+                     [record(MODEL, noise=0.05, seed=1)])
+    assert not found.effects
+    assert [one.name for one in found.unconfirmed] == ['coulomb_friction']
+    assert found.verdict == 'unknown'
+    assert not found.depends_on
+
+
 def test_what_is_in_the_model_is_moved_and_not_claimed_again() -> None:
     values = {'effects.active': ['coulomb_friction'],
               'effects.coulomb_friction.slide_2.force': 0.5}

@@ -123,6 +123,9 @@ def test_an_error_above_the_noise_is_told_where_nothing_holds() -> None:
     above = replace(above, remaining=2 * above.remaining)
     assert re.match(r'Nothing that was found holds, and the error of 0.1\d* N is more than the '
                     r'noise, 0.05 N\.', word_diagnosis(above).headline)
+    unknown = word_diagnosis(replace(above, verdict='unknown'))
+    assert unknown.headline.startswith('Something is missing. Nothing that was found holds, and')
+    assert unknown.following.startswith('Do not add hysteresis')
 
 
 def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:

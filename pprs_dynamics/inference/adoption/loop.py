@@ -99,10 +99,12 @@ def adopt_all(
             reasons = '; '.join(f'{step.effect}: {step.reason}' for step in refused)
             return AdoptionRun(tuple(steps), REFUSED, reasons, model, diagnosis)
         if found is None or taken == MOST_STEPS:
-            ended = 'unknown' if diagnosis.depends_on else 'adequate'
-            reason = (f'what remains no effect of the catalogue explains: '
-                      f'{diagnosis.depends_on[0].text}' if diagnosis.depends_on
-                      else 'nothing that is left stands out against noise')
+            ended = 'unknown' if diagnosis.verdict == 'unknown' else 'adequate'
+            reason = ('nothing that is left stands out against noise' if ended == 'adequate'
+                      else 'an error above the noise is left, and nothing that was found holds'
+                      if not diagnosis.depends_on
+                      else 'what remains no effect of the catalogue explains: '
+                      f'{diagnosis.depends_on[0].text}')
             return AdoptionRun(tuple(steps), ended, reason, model, diagnosis)
         name = found.name
         step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,

@@ -216,7 +216,8 @@ class _Answer:
         rivals = self._rivals()
         depends = self._depends_on(noise)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
-        verdict = ('unknown' if depends else 'ambiguous' if sets
+        is_left = unconfirmed and not effects and self._is_above_noise(remaining)
+        verdict = ('unknown' if depends or is_left else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(search, self.kept, widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
@@ -267,6 +268,12 @@ class _Answer:
         before, after = (hold_out(self.search, self.search.at_noise_of(
             self.kept, step.candidates)).losses for step in self.ranking.path[k:k + 2])
         return certainty(before - after) > self.decisions.sure
+
+    def _is_above_noise(self, remaining: Array) -> bool:
+        """Return whether errors (M, D) leave a drive more than its noise allows for."""
+        regression = self.search.regression
+        return any(_rms(remaining[:, d]) > self.decisions.left_ratio
+                   * regression.noise_floor(self.best.fit, d) for d in regression.drives)
 
     def _evidence(self, candidate: Candidate) -> float:
         return self.ranking.without[candidate].total - self.kept.total

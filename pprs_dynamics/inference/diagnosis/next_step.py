@@ -62,7 +62,7 @@ PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
-    if diagnosis.verdict == 'unknown':
+    if diagnosis.depends_on:
         if (curve := _curve(diagnosis)) is not None:
             return ('Look at that place on the machine. A measured curve takes the error away '
                     'until the cause is known', files.command(

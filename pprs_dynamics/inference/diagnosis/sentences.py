@@ -153,6 +153,13 @@ def _headline(diagnosis: Diagnosis) -> str:
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
+    noise = in_unit(diagnosis.noise_floor, unit)
+    if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
+        left = float(np.sqrt(np.nanmean(diagnosis.remaining ** 2)))
+        lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
+        above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
+                if left > AT_NOISE * diagnosis.noise_floor else '')
+        return f'{lacks}Nothing that was found holds{above}.{doubt}'
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]])
@@ -161,12 +168,6 @@ def _headline(diagnosis: Diagnosis) -> str:
         beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
-    noise = in_unit(diagnosis.noise_floor, unit)
-    if not held and diagnosis.unconfirmed:
-        left = float(np.sqrt(np.nanmean(diagnosis.remaining ** 2)))
-        above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
-                if left > AT_NOISE * diagnosis.noise_floor else '')
-        return f'Nothing that was found holds{above}.{doubt}'
     if diagnosis.verdict == 'adequate':
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
