@@ -3,7 +3,7 @@
 
 """The floor: a node as rclpy's tutorials write it, that answers six zeros and calculates nothing.
 
-Same subscription, publication and QoS as `feedforward`.
+Same subscription, publication and QoS as `feedforward`; with the argument `joints` that of an arm.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import MultiDOFJointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 
 class EchoNode(Node):
@@ -26,9 +26,10 @@ class EchoNode(Node):
         super().__init__('echo')
         qos = QoSProfile(depth=100)
         self._commands = self.create_publisher(Float64MultiArray, '~/commands', qos)
-        self.create_subscription(MultiDOFJointTrajectory, '~/trajectory', self._answer, qos)
+        kind = JointTrajectory if 'joints' in sys.argv[1:] else MultiDOFJointTrajectory
+        self.create_subscription(kind, '~/trajectory', self._answer, qos)
 
-    def _answer(self, message: MultiDOFJointTrajectory) -> None:
+    def _answer(self, message: JointTrajectory | MultiDOFJointTrajectory) -> None:
         self._commands.publish(Float64MultiArray(data=[0.0] * 6))
 
 

@@ -22,17 +22,20 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from rclpy.serialization import serialize_message
-from trajectory_msgs.msg import JointTrajectory
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from benchmarks.node import echo_node
 from benchmarks.node.stream import Stream, feedforward, node_process, served
+from pprs_dynamics import ArmModel
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.messages.conversions import write_trajectory
+from pprs_dynamics.simulation.arm_run import draw_motion
 
 RATES = (500.0, 1000.0)
 ROUNDS = 5
 CEILINGS = np.arange(500.0, 5001.0, 250.0)
 LONG = 1000  # points
+HEXAPOD = 'config/hexapod.yaml'  # from the package's folder
 
 
 def trajectory(points: int) -> bytes:
@@ -40,6 +43,15 @@ def trajectory(points: int) -> bytes:
     motion = HelicalPath().motion(1.0 + 0.001 * np.arange(points))
     return bytes(serialize_message(write_trajectory(
         motion, Time(), [k * 1_000_000 for k in range(points)])))
+
+
+def hexapod_setpoint(model: ArmModel) -> bytes:
+    """Return a serialised setpoint of the drives of a robot with loops, in motion."""
+    motion = draw_motion(model, 2.0, 1, RATES[0])
+    q, v, a = (values[len(values) // 2].tolist() for values in (
+        motion.position, motion.velocity, motion.acceleration))
+    return bytes(serialize_message(JointTrajectory(joint_names=list(model.drives), points=[
+        JointTrajectoryPoint(positions=q, velocities=v, accelerations=a)])))
 
 
 def main() -> int:
@@ -59,16 +71,31 @@ def run(seconds: float) -> dict[str, Any]:
         found['start_s'] = [start_time(one, domain) for _ in range(3)]
         with served(feedforward('command_timeout:=0.0'), domain=domain) as (node, _):
             for rate in RATES:
-                times: dict[str, list[np.ndarray]] = {'echo': [], 'feedforward': []}
-                for _ in range(ROUNDS):
-                    for name, stream in (('echo', floor), ('feedforward', node)):
-                        times[name].append(
-                            stream.steadily(one, rate, int(rate * seconds / ROUNDS)))
-                found[f'{rate:g} Hz'] = {name: _percentiles(np.concatenate(each))
-                                         for name, each in times.items()}
+                found[f'{rate:g} Hz'] = in_turns(floor, node, one, rate, seconds)
             found['sustained'] = {'echo': ceiling(floor, one), 'feedforward': ceiling(node, one)}
             found['long_ms'] = long_trajectory(node)
+        found['6-UPS'] = hexapod(seconds, domain)
     return found
+
+
+def hexapod(seconds: float, domain: int) -> dict[str, dict[str, float]]:
+    """Return round trips of a 6-UPS at the lower rate, in joints."""
+    setpoint = hexapod_setpoint(ArmModel.load(HEXAPOD))
+    command = [*feedforward('command_timeout:=0.0'), '--params-file', HEXAPOD]
+    with served([sys.executable, echo_node.__file__, 'joints'], '/echo', domain, False,
+                JointTrajectory) as (floor, _), served(
+                    command, domain=domain, kind=JointTrajectory) as (node, _):
+        return in_turns(floor, node, setpoint, RATES[0], seconds)
+
+
+def in_turns(floor: Stream, node: Stream, data: bytes, rate: float, seconds: float,
+             ) -> dict[str, dict[str, float]]:
+    """Return the round trips of echo and node at a rate, measured in turns."""
+    times: dict[str, list[np.ndarray]] = {'echo': [], 'feedforward': []}
+    for _ in range(ROUNDS):
+        for name, stream in (('echo', floor), ('feedforward', node)):
+            times[name].append(stream.steadily(data, rate, int(rate * seconds / ROUNDS)))
+    return {name: _percentiles(np.concatenate(each)) for name, each in times.items()}
 
 
 def start_time(data: bytes, domain: int) -> float:
@@ -120,10 +147,12 @@ def _percentiles(times: np.ndarray) -> dict[str, float]:
 def rows(found: dict[str, Any]) -> list[str]:
     """Return the rows of a table: what, echo, feedforward, ratio, goal."""
     table = ['| | echo | feedforward | ratio | goal |', '|---|---|---|---|---|']
-    for rate in RATES:
-        echo, node = (found[f'{rate:g} Hz'][name] for name in ('echo', 'feedforward'))
-        for key, limit in (('p50_ms', 1.10), ('p99_ms', 1.25)):
-            table.append(f'| round trip at {rate:g} Hz, {key[:3]} | {echo[key]:.2f} ms | '
+    for what, case, limits in (
+            *((f'at {rate:g} Hz', f'{rate:g} Hz', (1.10, 1.25)) for rate in RATES),
+            (f'of a 6-UPS at {RATES[0]:g} Hz', '6-UPS', (1.15, 1.25))):
+        echo, node = (found[case][name] for name in ('echo', 'feedforward'))
+        for key, limit in zip(('p50_ms', 'p99_ms'), limits, strict=True):
+            table.append(f'| round trip {what}, {key[:3]} | {echo[key]:.2f} ms | '
                          f'{node[key]:.2f} ms | {node[key] / echo[key]:.2f} | {limit:.2f} |')
     echo, node = (found['sustained'][name] for name in ('echo', 'feedforward'))
     table.append(f'| sustained without loss | {echo:g} Hz | {node:g} Hz | '

@@ -45,15 +45,17 @@ class Stream:
         Fully qualified name of the node under test.
     has_status : bool
         Whether it tells its status.
+    kind : type
+        Message of the trajectories.
     """
 
-    def __init__(self, node: str = '/feedforward', has_status: bool = True) -> None:
+    def __init__(self, node: str = '/feedforward', has_status: bool = True,
+                 kind: type = MultiDOFJointTrajectory) -> None:
         self.target = node
         self.context = Context()
         rclpy.init(context=self.context)
         self.node = Node('stream', context=self.context)
-        self.publisher = self.node.create_publisher(
-            MultiDOFJointTrajectory, f'{node}/trajectory', RELIABLE)
+        self.publisher = self.node.create_publisher(kind, f'{node}/trajectory', RELIABLE)
         self._listeners: list[tuple[Any, Callable[[bytes], None]]] = []
         self._wait_set = WaitSet(self.context)
         self.commands = 0
@@ -141,7 +143,7 @@ class Stream:
 @contextmanager
 def served(
     command: list[str], name: str = '/feedforward', domain: int | None = None,
-    has_status: bool = True,
+    has_status: bool = True, kind: type = MultiDOFJointTrajectory,
 ) -> Iterator[tuple[Stream, Any]]:
     """Run a node as a process and give a stream that is connected to it, and the process."""
     holder = None
@@ -152,9 +154,11 @@ def served(
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / 'log'
         with node_process(command, domain, log) as process:
-            stream = Stream(name, has_status)
+            stream = Stream(name, has_status, kind)
             try:
                 stream.connect()
+                # Equations that are not compiled yet are not what is measured.
+                stream.wait_until(lambda: not stream.status.get('preparing'), 'compiled equations')
                 yield stream, process
             except TimeoutError:
                 print(log.read_text()[-2000:], file=sys.stderr)

@@ -31,7 +31,9 @@ from benchmarks.scores.cases import (
     run_missing,
     scoring_parser,
 )
+from pprs_dynamics import ArmModel
 from pprs_dynamics.app.commands.pprs import main as pprs
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect, friction_rows
 from pprs_dynamics.simulation.arm_forms import NAMES
 
 
@@ -114,11 +116,15 @@ def table(found: Sequence[Outcome]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def todo(seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
-    """Yield effects and seeds, every effect once before any twice."""
+def todo(model: Path, seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
+    """Yield effects that a robot can have and seeds, every effect once before any twice."""
+    structure = ArmModel.load(model).robot.structure
+    has_passive = any(row >= 0 and name not in structure.drives
+                      for name, (row, _) in friction_rows(structure).items())
+    names = [name for name in NAMES if has_passive or name != JointFrictionEffect.name]
     for seed in range(max(seeds, nothing)):
         if seed < seeds:
-            yield from ((name, seed) for name in NAMES)
+            yield from ((name, seed) for name in names)
         if seed < nothing:
             yield '', seed
 
@@ -126,7 +132,7 @@ def todo(seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
 def run(model: Path, seeds: int, nothing: int, duration: float, file: Path, each: Each) -> None:
     """Run the cases that are not in a file of outcomes yet; append and print theirs."""
     run_missing(each, partial(run_case, model=model.resolve(), duration=duration),
-                {case: case for case in todo(seeds, nothing)}, file,
+                {case: case for case in todo(model, seeds, nothing)}, file,
                 lambda outcome: (outcome['effect'], outcome['seed']), described)
 
 
