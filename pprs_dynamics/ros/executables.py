@@ -41,10 +41,10 @@ def trajectory_proxy() -> int:
         print('trajectory_proxy needs control_msgs: apt install ros-$ROS_DISTRO-control-msgs',
               file=sys.stderr)
         return 2
-    return _run('trajectory_proxy', 'TrajectoryProxyNode')
+    return _run('trajectory_proxy', 'TrajectoryProxyNode', has_actions=True)
 
 
-def _run(module: str, node: str) -> int:
+def _run(module: str, node: str, has_actions: bool = False) -> int:
     _check_arguments(module, sys.argv[1:])
     use_one_thread()
     # Libraries make objects that stay, which looking for garbage among them only delays.
@@ -57,9 +57,11 @@ def _run(module: str, node: str) -> int:
         print(f'{module} needs ROS 2: source an installation (Jazzy or Kilted), or '
               "pip install 'pprs_dynamics[ros]'", file=sys.stderr)
         return 2
+    from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor
     from pprs_dynamics.ros.run import run_node
 
-    return run_node(getattr(importlib.import_module(f'pprs_dynamics.ros.{module}'), node))
+    return run_node(getattr(importlib.import_module(f'pprs_dynamics.ros.{module}'), node),
+                    executor_type=StoppableExecutor if has_actions else PromptExecutor)
 
 
 def _check_arguments(name: str, arguments: list[str]) -> None:

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.ros.node.executor import PromptExecutor, StopSignals
+from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor, StopSignals
 from pprs_dynamics.ros.node.parameters import with_hint
 from pprs_dynamics.ros.node.provenance import check_files
 
@@ -24,10 +24,12 @@ class Finished(Exception):
     """Raised by a node whose work is done."""
 
 
-def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
+def run_node(factory: Callable[[], Node], args: list[str] | None = None,
+             executor_type: type[StoppableExecutor] = PromptExecutor) -> int:
     """Spin one node until SIGINT, SIGTERM or `Finished`.
 
-    A node with a method `finish` gets it called while it can still publish.
+    A node with a method `finish` gets it called while it can still publish; one with actions needs
+    rclpy's own executor.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None) -> int:
         return _complain(' '.join(with_hint(error).split()))
     node = None
     # Two threads answered 44 of 5 000 messages at 1 kHz; one answers all.
-    executor = PromptExecutor()
+    executor = executor_type()
     stop.attach(executor)
     try:
         node = factory()
@@ -74,7 +76,7 @@ class _Stop:
     """What a stop signal does: nothing but leave a note until there is something to stop."""
 
     def __init__(self) -> None:
-        self._executor: PromptExecutor | None = None
+        self._executor: StoppableExecutor | None = None
         self._wanted = False
 
     def __call__(self) -> None:
@@ -82,7 +84,7 @@ class _Stop:
         if self._executor is not None:
             self._executor.stop()
 
-    def attach(self, executor: PromptExecutor) -> None:
+    def attach(self, executor: StoppableExecutor) -> None:
         self._executor = executor
         if self._wanted:
             executor.stop()

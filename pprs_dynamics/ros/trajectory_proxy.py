@@ -6,7 +6,8 @@
 MoveIt and other planners send goals to `~/follow_joint_trajectory`; the node computes the drives'
 efforts at every point and sends the goal on to the controller's own action. Feedback, result and
 cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is aborted
-with the reason in `error_string`, and nothing reaches the controller.
+with the reason in `error_string`, and nothing reaches the controller. So is one whose controller
+goes away before it ends.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from pprs_dynamics.ros.messages.request_reader import reader_for
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.status_codes import Code
 from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
+from pprs_dynamics.ros.node.action_answer import is_answered
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
 from pprs_dynamics.ros.node.provenance import hardware_of
@@ -75,8 +77,11 @@ class TrajectoryProxyNode(ExplainsRefusals):
         if not self._client.server_is_ready():
             return self._refused(handle, Result.INVALID_GOAL, 'CONTROLLER', 'nobody serves '
                                  f'{self._settings.own["action"]}: is the controller active?')
-        theirs = await self._client.send_goal_async(
+        sent = self._client.send_goal_async(
             goal, feedback_callback=lambda message: handle.publish_feedback(message.feedback))
+        if not await is_answered(self, self._client, sent):
+            return self._lost(handle)
+        theirs = sent.result()
         if not theirs.accepted:
             return self._refused(handle, Result.INVALID_GOAL, 'CONTROLLER', 'the controller '
                                  'rejected the goal; its log says why')
@@ -86,8 +91,12 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._theirs[key] = theirs
         if handle.is_cancel_requested:  # while the controller made up its mind
             theirs.cancel_goal_async()
-        answer = await theirs.get_result_async()
+        ended = theirs.get_result_async()
+        is_known = await is_answered(self, self._client, ended)
         del self._theirs[key]
+        if not is_known:
+            return self._lost(handle)
+        answer = ended.result()
         if answer.status == GoalStatus.STATUS_SUCCEEDED:
             handle.succeed()
         elif answer.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
@@ -101,6 +110,12 @@ class TrajectoryProxyNode(ExplainsRefusals):
         if theirs is not None:
             theirs.cancel_goal_async()
         return CancelResponse.ACCEPT
+
+    def _lost(self, handle: Any) -> Any:
+        return self._refused(
+            handle, Result.INVALID_GOAL, 'CONTROLLER', 'the controller behind '
+            f'{self._settings.own["action"]} went away before the goal ended; nobody knows how far '
+            'it came')
 
     def _refused(self, handle: Any, code: int, status: Code, text: str) -> Any:
         self._counters['refused'] += 1

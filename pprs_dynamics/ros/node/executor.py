@@ -37,7 +37,24 @@ MESSAGES_AT_ONCE = 10
 REST_PERIOD = 1.0  # [s] between looks at what nobody waits for
 
 
-class PromptExecutor(SingleThreadedExecutor):
+class StoppableExecutor(SingleThreadedExecutor):
+    """rclpy's own executor, which another thread can end."""
+
+    def __init__(self, **options: Any) -> None:
+        self._stopped: Future[None] = Future()
+        super().__init__(**options)
+
+    def stop(self) -> None:
+        """End `spin` after the present callback; from any thread."""
+        self._stopped.set_result(None)
+        self.wake()
+
+    def spin(self) -> None:
+        """Execute callbacks until `stop` or shutdown."""
+        self.spin_until_future_complete(self._stopped)
+
+
+class PromptExecutor(StoppableExecutor):
     """Serves messages and timers straight from the wait set; everything else goes rclpy's way.
 
     rclpy builds a task, a coroutine and a new wait set of every entity and every event handler
@@ -52,7 +69,6 @@ class PromptExecutor(SingleThreadedExecutor):
     def __init__(self, **options: Any) -> None:
         # Triggered where entities come or go, or by `stop`: nothing to serve in either case.
         self._waker = GuardCondition(None, None, options.get('context'))
-        self._stopped: Future[None] = Future()
         self._takes_info: WeakKeyDictionary[Subscription, bool] = WeakKeyDictionary()
         super().__init__(**options)
 
@@ -60,11 +76,6 @@ class PromptExecutor(SingleThreadedExecutor):
         """Look anew at what there is to wait for."""
         super().wake()
         self._waker.trigger()
-
-    def stop(self) -> None:
-        """End `spin` after the present callback; from any thread."""
-        self._stopped.set_result(None)
-        self.wake()
 
     def spin(self) -> None:
         """Execute callbacks until `stop` or shutdown."""
@@ -78,7 +89,7 @@ class PromptExecutor(SingleThreadedExecutor):
             get_logger('executor').warning(
                 f'this release of rclpy is not known ({reason}): its own executor is used, which '
                 'answers more slowly')
-            self.spin_until_future_complete(self._stopped)
+            super().spin()
 
     def _spin_promptly(self) -> None:
         rest_due, wait_set = 0.0, WaitSet(self.context)
