@@ -7,7 +7,7 @@ MoveIt and other planners send goals to `~/follow_joint_trajectory`; the node co
 efforts at every point and sends the goal on to the controller's own action. Feedback, result and
 cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is aborted
 with the reason in `error_string`, and nothing reaches the controller. So is one whose controller
-goes away before it ends.
+goes, or falls silent, in the middle of it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
-from rclpy.action import ActionClient, ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse
 from rclpy.serialization import deserialize_message, serialize_message
 from trajectory_msgs.msg import JointTrajectory
 
@@ -26,6 +26,7 @@ from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.feedforward_settings import parameters_for
 from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.command_cdr import CommandBytes
 from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
 from pprs_dynamics.ros.messages.rejection import Rejection
@@ -33,7 +34,7 @@ from pprs_dynamics.ros.messages.request_reader import reader_for
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.status_codes import Code
 from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
-from pprs_dynamics.ros.node.action_answer import is_answered
+from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
 from pprs_dynamics.ros.node.provenance import hardware_of
@@ -43,6 +44,8 @@ from pprs_dynamics.ros.node.status import StatusReporter
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
 ACTION = NodeParameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
                        'of the controller that the goals are passed on to', stays=True)
+TIMEOUT = NodeParameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
+                        'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
 
@@ -52,7 +55,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
-        parameters = (ACTION, *(one for one in parameters_for(drive_count(self))
+        parameters = (ACTION, TIMEOUT, *(one for one in parameters_for(drive_count(self))
                                 if one.name in SHARED))
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, lambda: None)
@@ -60,8 +63,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': own['action']}, self._counters,
                                       hardware_of(self._settings.model))
-        self._theirs: dict[bytes, Any] = {}
-        self._client = ActionClient(self, FollowJointTrajectory, own['action'])
+        self._relay = GoalRelay(self, FollowJointTrajectory, own['action'],
+                                lambda: self._settings.own['controller_timeout'])
         self._server = ActionServer(
             self, FollowJointTrajectory, '~/follow_joint_trajectory', self._execute,
             cancel_callback=self._cancel)
@@ -73,30 +76,14 @@ class TrajectoryProxyNode(ExplainsRefusals):
             goal = self._filled(handle.request)
         except PprsError as error:
             reason = Rejection.of(error)
-            return self._refused(handle, Result.INVALID_GOAL, reason.code, reason.text)
-        if not self._client.server_is_ready():
-            return self._refused(handle, Result.INVALID_GOAL, 'CONTROLLER', 'nobody serves '
-                                 f'{self._settings.own["action"]}: is the controller active?')
-        sent = self._client.send_goal_async(
-            goal, feedback_callback=lambda message: handle.publish_feedback(message.feedback))
-        if not await is_answered(self, self._client, sent):
-            return self._lost(handle)
-        theirs = sent.result()
-        if not theirs.accepted:
-            return self._refused(handle, Result.INVALID_GOAL, 'CONTROLLER', 'the controller '
-                                 'rejected the goal; its log says why')
-        self._counters['passed_on'] += 1
-        self._status.report('OK', 'OK', 'a goal was passed on with its efforts')
-        key = bytes(handle.goal_id.uuid)
-        self._theirs[key] = theirs
-        if handle.is_cancel_requested:  # while the controller made up its mind
-            theirs.cancel_goal_async()
-        ended = theirs.get_result_async()
-        is_known = await is_answered(self, self._client, ended)
-        del self._theirs[key]
-        if not is_known:
-            return self._lost(handle)
-        answer = ended.result()
+            return self._refused(handle, reason.code, reason.text)
+        try:
+            watched = await self._relay.accepted(handle, goal, self._duration(goal))
+            self._counters['passed_on'] += 1
+            self._status.report('OK', 'OK', 'a goal was passed on with its efforts')
+            answer = await self._relay.finished(watched)
+        except ControllerError as error:
+            return self._refused(handle, 'CONTROLLER', str(error))
         if answer.status == GoalStatus.STATUS_SUCCEEDED:
             handle.succeed()
         elif answer.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
@@ -106,23 +93,15 @@ class TrajectoryProxyNode(ExplainsRefusals):
         return answer.result
 
     def _cancel(self, handle: Any) -> CancelResponse:
-        theirs = self._theirs.get(bytes(handle.goal_id.uuid))
-        if theirs is not None:
-            theirs.cancel_goal_async()
+        self._relay.cancel(handle)
         return CancelResponse.ACCEPT
 
-    def _lost(self, handle: Any) -> Any:
-        return self._refused(
-            handle, Result.INVALID_GOAL, 'CONTROLLER', 'the controller behind '
-            f'{self._settings.own["action"]} went away before the goal ended; nobody knows how far '
-            'it came')
-
-    def _refused(self, handle: Any, code: int, status: Code, text: str) -> Any:
+    def _refused(self, handle: Any, status: Code, text: str) -> Any:
         self._counters['refused'] += 1
         self._status.report('ERROR', status, text)
         self.get_logger().warning(f'refused, {status}: {text}', throttle_duration_sec=1.0)
         handle.abort()
-        return Result(error_code=code, error_string=f'{status}: {text}')
+        return Result(error_code=Result.INVALID_GOAL, error_string=f'{status}: {text}')
 
     def _filled(self, goal: Any) -> Any:
         """Return the goal for the controller: of all drives, with their efforts.
@@ -142,6 +121,13 @@ class TrajectoryProxyNode(ExplainsRefusals):
         return Goal(
             trajectory=trajectory, path_tolerance=goal.path_tolerance,
             goal_tolerance=goal.goal_tolerance, goal_time_tolerance=goal.goal_time_tolerance)
+
+    def _duration(self, goal: Any) -> float:
+        """Return how long from now a goal's motion may take [s]."""
+        start = conversions.nanoseconds(goal.trajectory.header.stamp)
+        ahead = max(start - self.get_clock().now().nanoseconds, 0) if start else 0
+        return (ahead + conversions.nanoseconds(goal.trajectory.points[-1].time_from_start)
+                + conversions.nanoseconds(goal.goal_time_tolerance)) / conversions.NANOSECONDS
 
     def _request(self, model: Any, goal: Any) -> TrajectoryRequest:
         now = self.get_clock().now().nanoseconds

@@ -14,13 +14,14 @@ from typing import Any
 
 import pytest
 import rclpy
+from rclpy.action import ActionClient, ActionServer
 from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
 
 from pprs_dynamics.ros.node import executor as executors
 from pprs_dynamics.ros.node import rclpy_internals
-from pprs_dynamics.ros.node.executor import PromptExecutor
+from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor
 
 pytestmark = pytest.mark.nodes
 
@@ -146,3 +147,41 @@ def test_a_bug_in_a_callback_surfaces(spun: tuple[Node, PromptExecutor]) -> None
     node.create_timer(0.01, lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         executor.spin()
+
+
+def test_the_executor_of_nodes_with_actions_answers_goals() -> None:
+    fibonacci = pytest.importorskip('test_msgs.action').Fibonacci
+    context = Context()
+    rclpy.init(context=context)
+    node, executor = Node('spun', context=context), StoppableExecutor(context=context)
+    executor.add_node(node)
+    limit = threading.Timer(PATIENCE, executor.stop)
+    limit.start()
+    answers: list[Any] = []
+
+    def execute(goal: Any) -> Any:
+        goal.succeed()
+        return fibonacci.Result(sequence=[goal.request.order])
+
+    server = ActionServer(node, fibonacci, '~/goals', execute)
+    client = ActionClient(node, fibonacci, '/spun/goals')
+
+    async def ask() -> None:
+        accepted = await client.send_goal_async(fibonacci.Goal(order=7))
+        answers.append(await accepted.get_result_async())
+        executor.stop()
+
+    def begin() -> None:
+        if client.server_is_ready():
+            asking.cancel()
+            executor.create_task(ask)  # a callback that waits would keep all others waiting
+
+    asking = node.create_timer(0.1, begin)
+    executor.spin()
+    limit.cancel()
+    assert [list(answer.result.sequence) for answer in answers] == [[7]]
+    server.destroy()
+    client.destroy()
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
