@@ -93,11 +93,14 @@ def _around_fitted(
 
 
 def _bent_in_vain(search: Search, best: CandidateSet) -> set[Place]:
-    """Return the effects that bent the columns of a search, and that its best set is without."""
+    """Return the effects that bent the columns of a search, if its best set bends none.
+
+    Where others still do, the columns change with them, and what was dropped may yet pay.
+    """
     point = search.design.point
-    bent = {(one.effect, one.drive) for one in point.effects
-            if one.effect.bends_columns} if point else set()
-    return bent - {(one.effect, one.drive) for one in best.blocks}
+    if point is None or any(map(bends, best.candidates)):
+        return set()
+    return {(one.effect, one.drive) for one in point.effects if one.effect.bends_columns}
 
 
 def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:
