@@ -43,8 +43,8 @@ from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 PARAMETERS = (
     NodeParameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
-    NodeParameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0),
-    NodeParameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0),
+    NodeParameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
+    NodeParameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
     NodeParameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
                   'false: it is ignored, and the PD loop compensates gravity by itself'),
     NodeParameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '

@@ -18,6 +18,10 @@ from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.simulation.closed_chains import ClosedChains
 
+# [m, m/s, N, ...]: no drive's; with more, products with gains would overflow, and differences of
+# what overflowed are no numbers.
+LARGEST = 1e9
+
 NoteCode = Literal['HOLD', 'REFUSED', 'SATURATED', 'STOPPED']
 
 
@@ -165,6 +169,8 @@ class DriveControl:
             self._note(now, 'REFUSED', f'a command was refused: {reason}')
             return False
         self._since, self._setpoint, self._held = now, setpoint, False
+        if following is not None and self._fault(following):
+            following = None  # refused when its time comes
         self._following, self._after = following, after
         if self.settings.gravity_compensation and setpoint.position is not None:
             self._compensation = self._weight.holding(setpoint.position)
@@ -256,8 +262,9 @@ class DriveControl:
         for name in ('position', 'velocity', 'effort'):
             value = getattr(setpoint, name)
             if value is not None and (np.shape(value) != self._nothing.shape
-                                      or not np.all(np.isfinite(value))):
-                return f'its {name} must be {len(self._nothing)} finite numbers'
+                                      or not np.all(np.abs(value) <= LARGEST)):
+                return (f'its {name} must be {len(self._nothing)} numbers between {-LARGEST:g} and '
+                        f'{LARGEST:g}')
         if (setpoint.position is None) != (setpoint.velocity is None):
             return 'it must have both position and velocity, or neither'
         if setpoint.position is not None:

@@ -679,14 +679,28 @@ def test_efforts_alone_are_applied_as_they_are() -> None:
 
 @pytest.mark.parametrize('setpoint', [
     Setpoint(HOME, np.full(6, np.nan)), Setpoint(HOME[:5], np.zeros(6)),
-    Setpoint(effort=np.full(6, np.inf)), Setpoint(HOME), Setpoint(HOME + 0.5, np.zeros(6))],
-    ids=['nan', 'five', 'inf', 'no velocity', 'beyond stroke'])
+    Setpoint(effort=np.full(6, np.inf)), Setpoint(HOME), Setpoint(HOME + 0.5, np.zeros(6)),
+    Setpoint(HOME, np.full(6, 1e308))],
+    ids=['nan', 'five', 'inf', 'no velocity', 'beyond stroke', 'overflow'])
 def test_impossible_commands_are_refused_and_told(setpoint: Setpoint) -> None:
     robot = SimulatedRobot(MODEL.values, sensors=QUIET)
     assert not robot.command(setpoint)
     assert robot.notes[-1].code == 'REFUSED'
     assert robot.control.holding
     assert np.all(np.isfinite(robot.tick().position))
+
+
+@pytest.mark.parametrize('following', [1e308, 1e300, 1e9])
+@pytest.mark.parametrize('size', [1e9, 1.0, -1e9])
+def test_the_largest_commands_leave_every_number_finite(size: float, following: float) -> None:
+    robot = SimulatedRobot(MODEL.values)
+    large = np.full(6, size)
+    assert robot.command(Setpoint(HOME, large, -large),
+                         Setpoint(HOME, np.full(6, -following), np.full(6, following)))
+    for _ in range(60):
+        measured = robot.tick()
+        for values in (measured.position, measured.velocity, measured.effort):
+            assert np.all(np.isfinite(values))
 
 
 def test_actuation_delay_makes_efforts_come_late() -> None:
