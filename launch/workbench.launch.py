@@ -24,6 +24,7 @@ def generate_launch_description() -> LaunchDescription:
                               description='of the measurements'),
         DeclareLaunchArgument('port', default_value='8080', description='of the workbench'),
         ExecuteProcess(cmd=[pprs, 'workbench', '--live', '--no-browser', '--model',
-                            LaunchConfiguration('model'), '--topic', LaunchConfiguration('topic'),
-                            '--port', LaunchConfiguration('port')], output='screen'),
+                            LaunchConfiguration('model'), '--live-topic',
+                            LaunchConfiguration('topic'), '--port',
+                            LaunchConfiguration('port')], output='screen'),
     ])

@@ -250,19 +250,16 @@ class LiveNodes:
         client = self._node.clients_of[name]
         if not client.services_are_ready():
             return 'does not run'
-        # Its parameters first: never half an effect.
-        steps = [[Parameter(key, value=value) for key, value in changes.items()],
-                 [Parameter(ACTIVE, Parameter.Type.STRING_ARRAY, active)]]
-        for step in filter(None, steps):
-            done = threading.Event()
-            future = client.set_parameters(step)
-            future.add_done_callback(lambda _, done=done: done.set())
-            if not done.wait(PATIENCE):
-                return f'has not answered within {PATIENCE:g} s'
-            refused = [one.reason for one in future.result().results if not one.successful]
-            if refused:
-                return refused[0]
-        return ''
+        done = threading.Event()
+        # At once: never half an effect.
+        future = client.set_parameters_atomically([
+            *(Parameter(key, value=value) for key, value in changes.items()),
+            Parameter(ACTIVE, Parameter.Type.STRING_ARRAY, active)])
+        future.add_done_callback(lambda _: done.set())
+        if not done.wait(PATIENCE):
+            return f'has not answered within {PATIENCE:g} s'
+        result = future.result().result
+        return '' if result.successful else str(result.reason)
 
 
 def _plain(value: float) -> float | None:

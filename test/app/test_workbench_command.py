@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import http.client
 import json
 import signal
@@ -19,6 +20,7 @@ from workbench_bench import write_hidden
 from workbench_server import workbench
 
 from pprs_dynamics import load_model
+from pprs_dynamics.app.commands import workbench as workbench_command
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.server.serve import serve
@@ -156,3 +158,17 @@ def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setitem(sys.modules, 'uvicorn', None)
     with pytest.raises(MissingLibraryError, match=r'workbench'):
         serve(None, '127.0.0.1', 0, False)
+
+
+@pytest.mark.parametrize(('arguments', 'heard'), [
+    ([], 'joint_states'), (['--topic', '/left/joint_states'], '/left/joint_states'),
+    (['--live-topic', '/left/joint_states'], '/left/joint_states'),
+    (['--topic', '/logged', '--live-topic', '/left/joint_states'], '/left/joint_states')])
+def test_live_data_have_a_topic_of_their_own(
+    arguments: list[str], heard: str, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module = pytest.importorskip('pprs_dynamics.ros.live_joint_states')
+    monkeypatch.setattr(module, 'LiveNodes', lambda model, topic, *names: topic)
+    parser = argparse.ArgumentParser()
+    workbench_command.add_arguments(parser)
+    assert workbench_command._live(parser.parse_args(['--live', *arguments]), None) == heard

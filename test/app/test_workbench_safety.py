@@ -22,6 +22,7 @@ from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys
 from pprs_dynamics.app.workbench.server.folders import Folders, NotOfferedError
+from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS
 
 SECRET = 'no business of a browser'
 
@@ -229,6 +230,8 @@ def test_uploads_are_bounded_and_read_by_the_strict_readers(
     assert upload(bench, b'\x89MCAP0\r\n', 'a.mcap') == 400
     assert upload(bench, b'#!/bin/sh', 'a.sh') == 400
     assert upload(bench, b'x', '..%2f..%2fa.csv') == 400
+    for _ in range(MOST_UPLOADS):  # what failed does not count
+        assert upload(bench, b'time,\n1,2\n') == 400
     assert len(bench.screen()['recordings']) == before
     other = write_hidden(folder / 'other.csv', 3, 8.0)
     assert upload(bench, other.read_bytes(), '..%2f..%2fother.csv') == 200

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from node_bench import LATCHED, Bench, bench
+from rcl_interfaces.srv import GetParameters
 from rclpy.serialization import serialize_message
+from ros_processes import executable, node_process
 from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics import DriveModel
@@ -70,6 +73,29 @@ def test_numbers_that_are_taken_back_are_set_on_running_nodes_again(
     assert sent[0]['masses.payload'] == heavier.values['masses.payload']
     assert sent[0]['effects.effort_offset.lift_1.force'] == 0.5
     assert sent[-1] == {'masses.payload': MODEL.values['masses.payload'], 'effects.active': []}
+
+
+def test_a_node_takes_a_whole_model_or_nothing_of_it(ros_domain: int, tmp_path: Path) -> None:
+    payload = MODEL.values['masses.payload'] + 0.1
+    with node_process([executable('monitor')], ros_domain, tmp_path / 'log'), bench() as asking:
+        nodes = LiveNodes(MODEL)
+        client = asking.probe.create_client(GetParameters, '/monitor/get_parameters')
+        try:
+            services = nodes._node.clients_of['monitor'].services_are_ready
+            assert asking.spin_until(lambda: services() and client.service_is_ready(), 20)
+
+            def payload_after(active: list[str]) -> tuple[str, float]:
+                said = nodes._set('monitor', {'masses.payload': payload}, active)
+                asked = client.call_async(GetParameters.Request(names=['masses.payload']))
+                assert asking.spin_until(asked.done)
+                return said, asked.result().values[0].double_value
+
+            said, value = payload_after(['no_such_effect'])
+            assert 'no_such_effect' in said
+            assert value == MODEL.values['masses.payload']
+            assert payload_after([]) == ('', payload)
+        finally:
+            nodes.close()
 
 
 def test_what_is_drawn_stays_bounded_where_a_bag_is_played_in_a_loop(

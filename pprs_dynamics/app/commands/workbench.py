@@ -35,9 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='a recording that is never fitted: adoptions are judged on it; may '
                         'be repeated')
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
-                        'holds several, and to listen to with --live')
+                        'holds several')
     parser.add_argument('--live', action='store_true',
                         help='listen to joint_states, and set effects on running nodes')
+    parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,
+                        help='that --live listens to (default: that of --topic, else joint_states)')
     for node in ('monitor', 'feedforward'):
         parser.add_argument(f'--{node}', metavar='NODE', type=_ros_name, default=node,
                             help=f'name of the node that --live speaks to (default {node})')
@@ -82,6 +84,6 @@ def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
         from pprs_dynamics.ros.live_joint_states import LiveNodes
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
-    source: LiveSource = LiveNodes(model, options.topic or 'joint_states', options.monitor,
-                                   options.feedforward, options.namespace)
+    source: LiveSource = LiveNodes(model, options.live_topic or options.topic or 'joint_states',
+                                   options.monitor, options.feedforward, options.namespace)
     return source

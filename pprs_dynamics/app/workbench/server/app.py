@@ -18,7 +18,7 @@ import numpy as np
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
@@ -276,16 +276,12 @@ class Api:
 
     async def upload(self, request: Request) -> Response:
         """Take a recording from the browser."""
-        path = self.hub.save_upload(request.query_params.get('name', ''))
-        try:
+        with self.hub.upload(request.query_params.get('name', '')) as path:
             with path.open('xb') as file:
                 async for part in request.stream():
                     await run_in_threadpool(file.write, part)
             held_out = request.query_params.get('held_out') == '1'
             await run_in_threadpool(self.hub.open, path, held_out)
-        except (PprsError, TooLongError, ClientDisconnect, OSError):
-            path.unlink(missing_ok=True)
-            raise
         return await run_in_threadpool(self.screen, request.query_params)
 
     def invite(self, body: Any) -> Response:
@@ -302,9 +298,9 @@ class Api:
 
     def live_take(self, body: Any) -> Response:
         """Make what came in last a recording of the session."""
-        path = self.hub.save_upload('live.csv')
-        self._live.take(path)
-        self.hub.open(path)
+        with self.hub.upload('live.csv') as path:
+            self._live.take(path)
+            self.hub.open(path)
         return self.screen(body)
 
     @property

@@ -12,7 +12,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import TemporaryDirectory, mkdtemp
 from threading import Event, Lock, Thread
 from typing import Any, Protocol
 
@@ -73,7 +74,7 @@ class Hub:
         self._is_unjudged = False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
         self.log = ChangeLog()
-        self._count, self._lock, self._opening, self._steady = 0, Lock(), Lock(), Lock()
+        self._uploaded, self._lock, self._opening, self._steady = 0, Lock(), Lock(), Lock()
         self._work = Event()
         self.is_over = False
         self._waiting: set[asyncio.Queue[None]] = set()
@@ -174,8 +175,11 @@ class Hub:
         chosen = self.surveys if name.startswith(f'{PREFIX}/') else self.folders
         return chosen.path(name)
 
-    def save_upload(self, name: str) -> Path:
-        """Return the path for an upload, in a folder of its own, with what is plain of its name.
+    @contextmanager
+    def upload(self, name: str) -> Iterator[Path]:
+        """Give the path for an upload, in a folder of its own, with what is plain of its name.
+
+        What raises an error inside leaves nothing behind, and does not count.
 
         Raises
         ------
@@ -186,14 +190,19 @@ class Hub:
         if ending is None:
             raise SessionError(f'a recording must end in {", ".join(ENDINGS)}')
         with self._lock:
-            if self._count >= MOST_UPLOADS:
+            if self._uploaded >= MOST_UPLOADS:
                 raise SessionError(f'{MOST_UPLOADS} recordings were uploaded already, must be no '
                                    'more')
-            self._count += 1
-            folder = Path(self._uploads.name) / str(self._count)
-        folder.mkdir()
+            self._uploaded += 1
+        folder = Path(mkdtemp(dir=self._uploads.name))
         stem = NOT_PLAIN.sub('_', name.replace('\\', '/').rpartition('/')[2][:-len(ending)])
-        return folder / f'{stem.strip(".")[:LONGEST_NAME] or "recording"}{ending}'
+        try:
+            yield folder / f'{stem.strip(".")[:LONGEST_NAME] or "recording"}{ending}'
+        except BaseException:
+            rmtree(folder, ignore_errors=True)
+            with self._lock:
+                self._uploaded -= 1
+            raise
 
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''
