@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,9 @@ from ros_processes import environment, reserve_domain
 from pprs_dynamics.system.threads import use_one_thread
 
 use_one_thread()
+# A shell's background jobs ignore Ctrl-C, and so would every command that is tested.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 # The same examples each time, so that a change is judged by what it changes; `make fuzz` looks
 # for new ones, which then become examples of their own.
 # None is timed: a busy machine is no defect.
