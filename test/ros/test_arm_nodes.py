@@ -327,4 +327,4 @@ def test_the_monitor_tells_what_the_model_of_an_arm_lacks(
     np.testing.assert_allclose(
         np.nanmedian([one.effort for one in residual], axis=0), lacking, rtol=0, atol=0.1)
     assert error[-1].data[1] > 2
-    assert 'N or N m' in running.status[-1]['message']
+    assert running.spin_until(lambda: 'N or N m' in running.status[-1]['message'])

@@ -74,11 +74,16 @@ class Relayed:
 
     def controller(self, *arguments: str) -> subprocess.Popen[bytes]:
         """Start a controller and wait until it is there."""
+        before = self._servers()  # one that was killed is among them for as long as its lease
         process = self._processes.enter_context(node_process(
             [sys.executable, str(SERVER), *arguments], self._domain, self._log))
+        assert self._running.spin_until(lambda: self._servers() > before, 20)
         assert self._running.spin_until(self.node.relay.server_is_there, 20)
         self._running.spin_for(0.5)  # discovery is one-sided
         return process
+
+    def _servers(self) -> int:
+        return int(self.node.count_services('/controller/count/_action/send_goal'))
 
     def goal(self, order: int) -> Any:
         """Send a goal; return what its status and result will be."""
