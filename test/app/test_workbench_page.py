@@ -363,10 +363,27 @@ def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
 def test_an_adoption_is_called_off(page: Page) -> None:
     page.tick('payload_mass')
     page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Adopt').click()
-    page.tab.locator('#verdict', has_text='judging').get_by_role(
-        'button', name='Cancel').last.click()
+    page.tab.get_by_role('button', name='Cancel judging payload mass').click()
     page.tab.locator('#message', has_text='called off').wait_for()
     assert page.settled()['steps'] == []
+
+
+def test_a_button_stays_while_it_is_pressed(page: Page) -> None:
+    """Progress comes in between: a button that it replaces would never be clicked."""
+    page.tab.evaluate("""async () => {
+        const {showJobs} = await import('/static/panels.mjs');
+        const job = {number: 1e6, kind: 'experiment', what: '', share: 0.1, is_running: true};
+        window.shown = (share) => showJobs([{...job, share}], () => { window.pressed = true; });
+        window.shown(0.1);
+    }""")
+    button = page.tab.get_by_role('button', name='Cancel designing')
+    box = button.bounding_box()
+    page.tab.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
+    page.tab.mouse.down()
+    page.tab.evaluate('window.shown(0.6)')
+    page.tab.mouse.up()
+    assert page.tab.evaluate('window.pressed') is True
+    assert page.tab.get_by_role('progressbar', name='designing').evaluate('bar => bar.value') == 0.6
 
 
 def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:

@@ -346,6 +346,12 @@ def test_a_job_is_cancelled_at_its_next_report() -> None:
     assert not job.is_running
 
 
+def test_work_that_was_done_when_it_was_called_off_counts() -> None:
+    job: Job[str] = Job('adopt', 'this', lambda report: job.cancel() or 'done')
+    assert job.start().result(10) == 'done'
+    assert not job.to_dict()['is_cancelled']
+
+
 def sleep(seconds: float, progress: Any) -> str:
     for _ in range(int(100 * seconds)):
         progress(0.5)

@@ -9,21 +9,38 @@ const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missin
 
 const fall = (before, now, state) => `${amount(before)} → ${amount(now)} ${state.unit}`;
 
-export const showVerdict = (state, cancel) => {
+const doing = (job) => ({diagnose: 'diagnosing', adopt: `judging ${titleOf(job.what)}`,
+                         experiment: 'designing'}[job.kind]);
+
+const jobLine = (job, cancel) => {
+  const bar = make('progress', '', '', {max: 1});
+  bar.setAttribute('aria-label', doing(job));
+  const stop = button('Cancel', () => cancel(job.kind));
+  stop.setAttribute('aria-label', `Cancel ${doing(job)}`);
+  const line = make('span', '', 'job', {id: `job-${job.number}`});
+  line.append(` · ${doing(job)} `, bar, ' ', stop);
+  return line;
+};
+
+/* Each job keeps its elements: a button that is replaced while it is pressed is never clicked. */
+export const showJobs = (jobs, cancel) => {
+  const running = jobs.filter((job) => job.is_running);
+  for (const line of document.querySelectorAll('#jobs .job')) {
+    if (!running.some((job) => line.id === `job-${job.number}`)) line.remove();
+  }
+  for (const job of running) {
+    if (!$(`job-${job.number}`)) $('jobs').append(jobLine(job, cancel));
+    $(`job-${job.number}`).querySelector('progress').value = job.share;
+  }
+};
+
+export const showVerdict = (state) => {
   const {before, now, noise} = state.overall;
   const line = make('span');
   line.append('error ', make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
     state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
   if (state.verdict) line.append(` · diagnosis: ${VERDICTS[state.verdict]}`);
-  const nodes = [line];
-  for (const job of Object.values(state.jobs).filter((one) => one.is_running)) {
-    const what = {diagnose: 'diagnosing', adopt: `judging ${titleOf(job.what)}`,
-                  experiment: 'designing'}[job.kind];
-    const bar = make('progress', '', '', {max: 1, value: job.share});
-    bar.setAttribute('aria-label', what);
-    nodes.push(` · ${what} `, bar, ' ', button('Cancel', () => cancel(job.kind)));
-  }
-  $('verdict').replaceChildren(...nodes);
+  $('verdict').replaceChildren(line);
 };
 
 /* What an adoption came to, once: [sentence, whether it is good]. */

@@ -69,9 +69,11 @@ export class Server {
 
   /* Ask for what is no change of the model, and show what follows. */
   async run(path, body = {}, said = '') {
+    this.tell('');
     try {
       const found = await this.ask(path, body);
-      this.tell(said, true); // what follows may say more
+      // What the work comes to may have been told by now.
+      if (said) this.tell(said, true);
       this.take(found);
     } catch (error) {
       this.tell(error.message);

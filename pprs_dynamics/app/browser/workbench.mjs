@@ -7,7 +7,7 @@ import {EffectList} from './effects.mjs';
 import {showErrors} from './errors.mjs';
 import {amount, titleOf, unitOf} from './format.mjs';
 import {Live} from './live.mjs';
-import {adoptionSaid, showExperiment, showFiles, showLedger, showRecordings, showStage,
+import {adoptionSaid, showExperiment, showFiles, showJobs, showLedger, showRecordings, showStage,
         showVerdict} from './panels.mjs';
 import {drawScale, Robot} from './robot.mjs';
 import {Scatter} from './scatter.mjs';
@@ -49,7 +49,8 @@ const show = (last, state, arrays) => {
   if (arrays.now) latest = rowsOf(arrays.now);
   if (state.generation !== last?.generation || last.is_empty) begin(state.generation);
   else if (arrays.now && curves.before) curves.setNow(latest);
-  showVerdict(state, (kind) => server.run('cancel', {kind}));
+  showVerdict(state);
+  showJobs(Object.values(state.jobs), (kind) => server.run('cancel', {kind}));
   showErrors($('errors'), state);
   effects.show(state);
   showStage(state);

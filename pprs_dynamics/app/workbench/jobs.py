@@ -56,8 +56,8 @@ class Job(Generic[Result]):
 
     @property
     def is_cancelled(self) -> bool:
-        """True once it was called off."""
-        return self._cancel.is_set()
+        """True where it ended because it was called off; work that was done by then counts."""
+        return isinstance(self.error, Cancelled)
 
     def cancel(self) -> None:
         """Call it off; it ends at its next report of progress."""
