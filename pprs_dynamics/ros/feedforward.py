@@ -72,6 +72,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._margins_due, self._margins, self._beyond_curve = 0.0, Margins(None, 1.0, ''), ''
+        self._last_unjudged: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, time.monotonic())
         self._files = files_given(options.get('cli_args') or sys.argv)
@@ -233,7 +234,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def _judge(self, answer: ForceCommand) -> None:
         own, report, now = self._settings.own, self._status.report, time.monotonic()
-        if now > self._margins_due:
+        self._last_unjudged = None if now > self._margins_due else answer
+        if self._last_unjudged is None:
             self._margins_due = now + MARGINS_PERIOD
             self._margins = left = margins(self._settings.model, answer.forces.mechanism)
             if left.singularity is not None:
@@ -320,6 +322,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def _refresh(self) -> None:
         """Bring what is told once a second up to date."""
+        if self._last_unjudged is not None and self._status.code == 'OK':
+            # Nothing came after it: where it leads to is told all the same.
+            self._judge(self._last_unjudged)
         accepted, now = self._counters['accepted'], time.monotonic()
         before, then = self._counted
         self._counted = (accepted, now)
