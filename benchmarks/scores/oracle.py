@@ -14,8 +14,9 @@ from dataclasses import replace
 from typing import Any
 
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_model import linear_error
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import Ranking
-from pprs_dynamics.inference.search.relinearisation import linear_error
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
@@ -33,13 +34,13 @@ def consult(selection: Ranking, truth: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     effect, design = catalogue()[hidden[0]['name']], selection.first.design
     drives = hidden[0]['drives'] and [design.drives.index(drive) for drive in hidden[0]['drives']]
-    search = Search(design, DECISIONS, with_unknown=False)
-    nothing = search.evaluate(())
+    fits = FittedSets(design, DECISIONS)
+    search, nothing = Search(fits), fits.evaluate(())
     own = search.best_of(effect, drives)
     if own is None:
         return {}
-    base = replace(nothing, fit=search.regression.at((), own.fit.amplitudes))
-    rivals = [search.refined(search.evaluate(one)).cost
-              for one in search.proposals(base, RIVALS) if one[0].name != effect.name]
-    return {'best_error': linear_error(search, own),
+    base = replace(nothing, fit=fits.regression.at((), own.fit.amplitudes))
+    rivals = [fits.refined(fits.evaluate(one)).cost
+              for one in search.scan.proposals(base, RIVALS) if one[0].name != effect.name]
+    return {'best_error': linear_error(fits, own),
             'separable': min(rivals, default=nothing.cost) > own.cost + DECISIONS.rival_margin}

@@ -22,7 +22,7 @@ from pprs_dynamics.inference.fit.arm_fit import fit_arm
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 
 sys.path.insert(0, str(Path(__file__).parents[2] / 'docs'))
@@ -65,9 +65,9 @@ def test_friction_of_the_base_turns_over_within_the_motion(base: ArmModel) -> No
 
 
 def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: ArmModel) -> None:
-    search = Search(Design.of(base, [part_of(base, 'load_insertion_105_fast.csv.gz')]), DECISIONS)
-    found = [search.refined(search.evaluate((EffectCandidate.of([component]),)))
-             for component in search.library.structure]
+    fits = FittedSets(Design.of(base, [part_of(base, 'load_insertion_105_fast.csv.gz')]), DECISIONS)
+    found = [fits.refined(fits.evaluate((EffectCandidate.of([component]),)))
+             for component in fits.library.structure]
     best = min(found, key=lambda one: one.cost)
     (candidate,) = best.effects
     assert candidate.claim == 'link_mass:back_link'

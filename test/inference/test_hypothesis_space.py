@@ -27,6 +27,7 @@ from pprs_dynamics.inference.search import candidates as candidates_module
 from pprs_dynamics.inference.search import library as library_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
@@ -136,9 +137,9 @@ SPACES = [
 def test_the_search_ends_at_the_best_of_all_sets(
         number: int, truth: dict[tuple[str, int | None], float]) -> None:
     design = random_design(truth, number)
-    search = Search(design, DECISIONS, with_unknown=False)
+    search = Search(FittedSets(design, DECISIONS))
     found = search.run()
-    exhaustive = Search(design, DECISIONS, with_unknown=False)
+    exhaustive = FittedSets(design, DECISIONS)
     every = everything()
     best = exhaustive.evaluate(())
     for size in range(1, max(len(truth), 2) + 1):
@@ -153,13 +154,13 @@ def test_the_search_ends_at_the_best_of_all_sets(
 
 def test_costs_do_not_depend_on_what_was_fitted_before() -> None:
     design = random_design(SPACES[-1], 11)
-    search = Search(design, DECISIONS, with_unknown=False)
+    search = Search(FittedSets(design, DECISIONS))
     search.run()
-    visited = list(search.sets)
+    visited = list(search.fits.sets)
     assert len(visited) > 15
     rng = np.random.default_rng(0)
     for _ in range(3):
-        other = Search(design, DECISIONS, with_unknown=False)
+        other = FittedSets(design, DECISIONS)
         for k in rng.permutation(len(visited)):
             one = visited[k]
             order = rng.permutation(len(one.candidates))

@@ -48,6 +48,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import Ranking, Rival
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
@@ -351,20 +352,20 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     time = np.arange(0.0, DURATION, 0.004)
     path = FAMILY.path(parameters)
     old = recorded(robot, path.motion(time), 1, 0.1)
-    search = Search(Design.of(model, [old]), DECISIONS)
-    search.evaluate(())
+    fits = FittedSets(Design.of(model, [old]), DECISIONS)
+    fits.evaluate(())
 
     def fitted(name: str, *coefficients: str) -> CandidateSet:
         component = Component(CATALOGUE[name], 3, coefficients)
-        return search.evaluate((EffectCandidate.of([component]),))
+        return fits.evaluate((EffectCandidate.of([component]),))
 
     adopted = fitted('coulomb_friction', 'force')
-    ranking = Ranking.of(search, search, adopted)
+    ranking = Ranking.of(fits, Search(fits), adopted)
     assert ranking.kept is adopted
     assert question_after(ranking, []).kind == 'estimate'
     free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')
-    ranking = Ranking.of(search, search, adopted)
+    ranking = Ranking.of(fits, Search(fits), adopted)
     question = question_after(ranking, [
         Rival(free, ('coulomb_friction',), ('asymmetric_friction',)),
         Rival(other, ('coulomb_friction',), ('load_friction',))])

@@ -19,13 +19,14 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search import search as search_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.ranking import select
-from pprs_dynamics.inference.search.relinearisation import (
+from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
     squared,
 )
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.ranking import select
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -82,9 +83,9 @@ def test_the_search_ends_at_the_best_of_all_sets(
     # All sets within one design, those that would be relinearised around, too.
     monkeypatch.setattr(Search, 'is_beyond_point', False)
     design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
-    search = Search(design, DECISIONS, with_unknown=False)
+    search = Search(FittedSets(design, DECISIONS))
     found = search.run()
-    exhaustive = Search(design, DECISIONS, with_unknown=False)
+    exhaustive = FittedSets(design, DECISIONS)
     best = exhaustive.evaluate(())
     every: list[EffectCandidate] = []
     for name in SMALL:
@@ -105,14 +106,12 @@ def test_the_search_ends_at_the_best_of_all_sets(
 @pytest.mark.usefixtures('small_catalogue')
 def test_what_does_not_pay_in_a_set_is_pruned() -> None:
     recording = axis_recording({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1)
-    search = Search(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS,
-                    with_unknown=False)
-    search.evaluate(())
+    fits = FittedSets(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS)
     spring, drag, gain = (EffectCandidate.of([Component.of(
         CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
         for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
-    assert names(search.pruned(search.evaluate((spring, drag, gain)))) == ['drive_spring']
-    assert search.pruned(search.evaluate(())).candidates == ()
+    assert names(fits.pruned(fits.evaluate((spring, drag, gain)))) == ['drive_spring']
+    assert fits.pruned(fits.evaluate(())).candidates == ()
 
 
 def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -> Recording:

@@ -91,13 +91,13 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
     """Return the fit of effects at the noise of the diagnosis, and the cost."""
     selection = diagnosis.selection
     assert selection is not None
-    search = selection.last
+    fits = selection.last
     blocks = [block for candidate, one in tried for component in candidate.components
-              for block in (search.library.block(component), *one.nuisance.get(component, ()))]
-    fit = search.regression.at(blocks, selection.best.fit.amplitudes)
+              for block in (fits.library.block(component), *one.nuisance.get(component, ()))]
+    fit = fits.regression.at(blocks, selection.best.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
-    price = sum(search.library.price(one) for one, _ in tried) + sum(
-        search.prices.of_signs(one.effect, one.values(fit.of(search.library.block(one))))
+    price = sum(fits.library.price(one) for one, _ in tried) + sum(
+        fits.prices.of_signs(one.effect, one.values(fit.of(fits.library.block(one))))
         for one in components)
     return fit, fit.deviance + price
 

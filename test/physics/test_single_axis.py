@@ -22,7 +22,7 @@ from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.model_file import build_model
@@ -206,7 +206,7 @@ def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
 def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
     model = build_model({**VALUES, 'tolerances.axis.offset': 1.0})
     design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
-    found = Search(design, DECISIONS, with_unknown=False).evaluate(())
+    found = FittedSets(design, DECISIONS).evaluate(())
     place, number = next((k, column.number) for k, column in enumerate(design.base)
                          if isinstance(column, ModelNumber))
     assert OFFSET - found.fit.coefficients[place] * number.deviation == pytest.approx(

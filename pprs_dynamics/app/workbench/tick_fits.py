@@ -23,14 +23,10 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.relinearisation import (
-    exact_forces,
-    fitted_model,
-    linear_residual,
-    relinearised,
-)
-from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.relinearisation import relinearised
+from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -130,8 +126,9 @@ class TickFits:
         self.model, self.recordings, self.decisions = model, tuple(recordings), decisions
         start = original(model)
         self.design = Design.of(start, recordings)
-        self.search = Search(self.design, decisions, with_unknown=False)
-        self.none = self.search.evaluate(())
+        self.fits = FittedSets(self.design, decisions)
+        self.scan = Scan(self.fits)
+        self.none = self.fits.evaluate(())
         self._scanning = RLock()  # of the library
         self.measured = self.design.residuals.measured
         self.before = (self.design.residuals if start is model
@@ -173,18 +170,18 @@ class TickFits:
 
     def _on_drive(self, effect: type[DriveEffect], d: int, found: CandidateSet,
                   ) -> Component | None:
-        library = self.search.library
+        library = self.fits.library
         if d in library.local:
             scanned = library.local[d].offers(found.fit).get(effect.name)
             if scanned is not None:
                 return scanned[0]
         there = [one for one in library.spanning if one.effect is effect and one.drive == d]
         # All have the same price.
-        return max(there, key=lambda one: self.search.regression.gain(
+        return max(there, key=lambda one: self.fits.regression.gain(
             found.fit, library.block(one)), default=None)
 
     def _proposals(self, found: CandidateSet) -> Iterable[tuple[object, ...]]:
-        return self.search.proposals(found, least=-np.inf)
+        return self.scan.proposals(found, least=-np.inf)
 
     def offers(self, found: CandidateSet) -> list[Offer]:
         """Return what every effect that is not in a set would gain beside it, the best first."""
@@ -217,15 +214,15 @@ class TickFits:
 
     def at(self, candidates: Sequence[EffectCandidate], near: CandidateSet) -> CandidateSet:
         """Return a set under the noise of another: linear, in milliseconds."""
-        return self.search.at_noise_of(near, tuple(candidates))
+        return self.fits.at_noise_of(near, tuple(candidates))
 
     def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
         """Return a set with the noise fitted beside it."""
-        return self.search.evaluate(tuple(candidates))
+        return self.fits.evaluate(tuple(candidates))
 
     def refined(self, found: CandidateSet) -> CandidateSet:
         """Return the set with all shapes where the cost is lowest."""
-        return self.search.refined(found)
+        return self.fits.refined(found)
 
     def held(self, found: CandidateSet, ticks: Sequence[Tick]) -> CandidateSet:
         """Return a set with the linear parameters that somebody chose; all else follows."""
@@ -246,14 +243,14 @@ class TickFits:
                 values += [wanted[name] for name in placement.names]
         if not blocks:
             return found
-        fit = self.search.regression.held(found.fit, found.fit.index_of(blocks), np.array(values))
+        fit = self.fits.regression.held(found.fit, found.fit.index_of(blocks), np.array(values))
         return replace(found, fit=fit, total=found.total + fit.deviance - found.fit.deviance)
 
     # What a set says
 
     def residual(self, found: CandidateSet) -> Array:
         """Return what the linear fit leaves, (M, D) [N]."""
-        return linear_residual(self.search, found)
+        return linear_residual(self.fits, found)
 
     def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
         """Return the parameters of every effect of a set, by drive.parameter."""
@@ -268,7 +265,7 @@ class TickFits:
 
     def estimates(self, found: CandidateSet) -> dict[str, dict[str, Estimate]]:
         """Return the parameters of every effect of a set with their uncertainty."""
-        return {candidate.name: estimate(self.search, found, candidate).parameters
+        return {candidate.name: estimate(self.fits, found, candidate).parameters
                 for candidate in found.effects}
 
     def key(self, drive: int | None, name: str) -> str:
@@ -286,18 +283,18 @@ class TickFits:
         PprsError
             For values that no model may have, or that cannot be followed.
         """
-        search, parameters = self.search, None
+        fits, parameters = self.fits, None
         if is_free and any(c.effect.bends_columns for c in found.effects):
-            search, found = relinearised(search, found, self.decisions)
-            parameters = {c.name: estimate(search, found, c).parameters for c in found.effects}
-        model = fitted_model(search, found)
-        return Exact(model, self.measured - exact_forces(search.design, model), parameters)
+            fits, found = relinearised(fits, found)
+            parameters = {c.name: estimate(fits, found, c).parameters for c in found.effects}
+        model = fitted_model(fits, found)
+        return Exact(model, self.measured - exact_forces(fits.design, model), parameters)
 
     def quiet_noise(self, found: CandidateSet) -> dict[str, float]:
         """Return a first guess of every drive's noise [N]: the fast part of what a fit calls noise.
 
         The slow part may be what is missing.
         """
-        regression = self.search.regression
+        regression = self.fits.regression
         fast = with_fast_noise(regression, found.fit)
         return {self.drives[d]: regression.noise_floor(fast, d) for d in regression.drives}

@@ -31,10 +31,10 @@ from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
+from pprs_dynamics.inference.search.fitted_model import fitted_model, linear_error
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import fitted_model, linear_error
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -111,7 +111,7 @@ def adopt(
         held_out, gains = case.validated(fitted.plain, fitted.model, diagnosis.noise)
     else:
         held_out, gains = (fitted.held_out_before, fitted.held_out_after), fitted.block_gains
-    promised = linear_error(fitted.search, fitted.found)
+    promised = linear_error(fitted.fits, fitted.found)
     found += [*objections.of_linearity(promised, rms(after), after.unit),
               *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
     report(1.0)
@@ -200,30 +200,30 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     """Return the model with what it has fitted anew, where that gains anything."""
     design = Design.of(case.start, case.recordings,
                        lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
-    search, name = Search(design, case.decisions, with_unknown=False), case.request.name
-    found = search.evaluate(())
+    fits, name = FittedSets(design, case.decisions), case.request.name
+    found = fits.evaluate(())
     try:
-        fitted = with_widths(fitted_model(search, found), design, estimate_widths(search, found))
+        fitted = with_widths(fitted_model(fits, found), design, estimate_widths(fits, found))
     except ModelError as error:
         return case.without_model(str(error))
     before, after = case.residuals(fitted)
     noises = case.diagnosis.noise
     gains = block_gains(before, after, noises)
     free = sum(isinstance(column, (PresentCoefficient, PresentShape)) for column in design.base)
-    evidence = float(gains.sum() - free * np.log(search.regression.samples)
-                     - search.library.prices.of_name())
+    evidence = float(gains.sum() - free * np.log(fits.regression.samples)
+                     - fits.library.prices.of_name())
     refused = [] if evidence > 0 else [
         f'{name} is in the model already, and to fit it anew would gain nothing: the error would '
         f'go from {rms(before):.4g} to {rms(after):.4g} {before.unit} (evidence {evidence:.3g}, '
         'where 0 is the threshold)']
-    held_out = rms(before), hold_out(search, found).error
+    held_out = rms(before), hold_out(fits, found).error
     if case.validate:
         held_out, gains = case.validated(case.model, fitted, noises)
     if not refused:
-        refused = [*objections.of_linearity(linear_error(search, found), rms(after), after.unit),
+        refused = [*objections.of_linearity(linear_error(fits, found), rms(after), after.unit),
                    *objections.of_held_out_error(*held_out, gains, case.model, case.held_out)]
     report(1.0)
     effect = next(one for one in fitted.effects if one.name == name)
     return case.answer(
         fitted, tuple(effect.drives) if isinstance(effect, DriveEffect) else None, refused, [], (),
-        estimate_present(search, found, fitted, name), (), before, after, held_out)
+        estimate_present(fits, found, fitted, name), (), before, after, held_out)

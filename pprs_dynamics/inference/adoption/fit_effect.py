@@ -16,8 +16,10 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, calibrations, estimate
+from pprs_dynamics.inference.search.fitted_model import fitted_model
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import fitted_model, relinearised
+from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
@@ -52,7 +54,7 @@ class EffectFit:
         By which the cost falls with the effect.
     own_share : float
         The least share of a column's square that nothing else in the model explains.
-    search : Search
+    fits : FittedSets
         Around the model with the effect.
     found : CandidateSet
     held_out_before, held_out_after : float
@@ -70,7 +72,7 @@ class EffectFit:
     calibrated: list[Calibration]
     evidence: float
     own_share: float
-    search: Search
+    fits: FittedSets
     found: CandidateSet
     held_out_before: float
     held_out_after: float
@@ -95,20 +97,20 @@ def fit_effect(
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.3 * share))
     _require_motion(design, request)
-    search = Search(design, decisions, with_unknown=False)
-    without = search.evaluate(())
-    found = search.best_of(request.effect, _numbers(design, request))
+    fits = FittedSets(design, decisions)
+    without = fits.evaluate(())
+    found = Search(fits).best_of(request.effect, _numbers(design, request))
     report(0.6)
     if found is None:
         return None
-    share = min((search.regression.own_share(without.fit, block)
+    share = min((fits.regression.own_share(without.fit, block)
                  for block in found.blocks.values() if block.mean is None), default=1.0)
-    before = hold_out(search, without)
+    before = hold_out(fits, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.
-    plain_set = replace(without, fit=search.regression.at((), found.fit.amplitudes))
-    plain_losses = hold_out(search, plain_set).losses
+    plain_set = replace(without, fit=fits.regression.at((), found.fit.amplitudes))
+    plain_losses = hold_out(fits, plain_set).losses
     evidence = without.cost - found.cost
-    last, found = relinearised(search, found, decisions)
+    last, found = relinearised(fits, found)
     report(0.8)
     candidate = found.effects[0]
     said = estimate(last, found, candidate)
@@ -122,7 +124,7 @@ def fit_effect(
                   for key, one in said.parameters.items() if prefix + key in final.values}
     report(1.0)
     return EffectFit(
-        request, design.named(candidate.drives), final, fitted_model(search, plain_set), parameters,
+        request, design.named(candidate.drives), final, fitted_model(fits, plain_set), parameters,
         said.at_bound, moved, evidence, share, last, found, before.error, after.error,
         plain_losses - after.losses)
 

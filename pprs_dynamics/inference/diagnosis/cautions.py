@@ -11,30 +11,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pprs_dynamics.inference.search.candidates import CandidateSet
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 
 if TYPE_CHECKING:
     from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 
 
 def find_cautions(
-    search: Search, best: CandidateSet, effects: Sequence[FoundEffect],
+    fits: FittedSets, best: CandidateSet, effects: Sequence[FoundEffect],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
-    return (*_length(search, best), *_motion(search), *_filtered(search),
-            *_unexcited(search, best), *_bounds(effects))
+    return (*_length(fits, best), *_motion(fits), *_filtered(fits),
+            *_unexcited(fits, best), *_bounds(effects))
 
 
-def _length(search: Search, best: CandidateSet) -> list[str]:
-    design, regression = search.design, search.regression
+def _length(fits: FittedSets, best: CandidateSet) -> list[str]:
+    design, regression = fits.design, fits.regression
     residuals = design.residuals
     duration = len(residuals) * residuals.period
-    if duration < search.decisions.short:
+    if duration < fits.decisions.short:
         return [f'the recordings last {duration:.3g} s together: too short to tell effects from '
                 'slow noise; record at least 20 s']
     worth = {d: noise.effective_samples(int(regression.series[d].known.sum()))
              for d, noise in regression.noise(best.fit).items()}
-    poor = [design.drives[d] for d, count in worth.items() if count < search.decisions.few_samples]
+    poor = [design.drives[d] for d, count in worth.items() if count < fits.decisions.few_samples]
     if poor:
         least = min(worth.values())
         return [f'noise on {", ".join(poor)} is so slow that the recording is worth only '
@@ -43,8 +43,8 @@ def _length(search: Search, best: CandidateSet) -> list[str]:
     return []
 
 
-def _motion(search: Search) -> list[str]:
-    design = search.design
+def _motion(fits: FittedSets) -> list[str]:
+    design = fits.design
     velocity = design.residuals.variables['velocity']
     still, one_way = [], []
     for d, name in enumerate(design.drives):
@@ -52,7 +52,7 @@ def _motion(search: Search) -> list[str]:
         moving = design.moving(d)
         if not design.moves(d):
             still.append(name)
-        elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > search.decisions.one_way:
+        elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > fits.decisions.one_way:
             one_way.append(name)
     found = []
     if still:
@@ -64,9 +64,9 @@ def _motion(search: Search) -> list[str]:
     return found
 
 
-def _filtered(search: Search) -> list[str]:
+def _filtered(fits: FittedSets) -> list[str]:
     """Look for efforts that hold no fast noise at all, at full rate."""
-    design = search.design
+    design = fits.design
     found = []
     for d, name in enumerate(design.drives):
         error = [one.effort_measured[part, d] - one.effort[part, d]
@@ -77,7 +77,7 @@ def _filtered(search: Search) -> list[str]:
             continue
         first, third = np.diff(longest), np.diff(longest, 3)
         # Third differences of white noise have ten times the variance of first ones.
-        if np.mean(third ** 2) < search.decisions.filtered * np.mean(first ** 2):
+        if np.mean(third ** 2) < fits.decisions.filtered * np.mean(first ** 2):
             found.append(name)
     if not found:
         return []
@@ -86,19 +86,19 @@ def _filtered(search: Search) -> list[str]:
             'time_delay and hysteresis that are the filter\'s']
 
 
-def _unexcited(search: Search, best: CandidateSet) -> list[str]:
+def _unexcited(fits: FittedSets, best: CandidateSet) -> list[str]:
     """Return effects that this motion would not show even at a size that matters."""
-    regression = search.regression
+    regression = fits.regression
     adopted = {candidate.name for candidate in best.effects}
     weak = []
-    for term in search.design.structure:
+    for term in fits.design.structure:
         if term.effect.name in adopted or term.effect.is_of_one_place:
             continue
         own = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])
         sizes = np.diag(own) * scales ** 2
         present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)}
-        names = [name for name, size in present.items() if size < search.decisions.unexcited]
+        names = [name for name, size in present.items() if size < fits.decisions.unexcited]
         if names:
             weak.append(term.effect.name if len(names) == len(present)
                         else f'{term.effect.name} ({", ".join(names)})')

@@ -30,16 +30,12 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration, calibrations, estimate
+from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_error
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.ranking import Ranking, select
-from pprs_dynamics.inference.search.relinearisation import (
-    exact_forces,
-    fitted_model,
-    linear_error,
-)
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -175,14 +171,14 @@ class _Answer:
         self.drives = ranking.last.design.drives
 
     @property
-    def search(self) -> Search:
+    def fits(self) -> FittedSets:
         """Around the model that is adopted."""
         return self.ranking.last
 
     @property
     def design(self) -> Design:
-        """Of that search."""
-        return self.search.design
+        """Of these."""
+        return self.fits.design
 
     @property
     def best(self) -> CandidateSet:
@@ -198,7 +194,7 @@ class _Answer:
         first = self.ranking.first.design
         unconfirmed: list[FoundEffect] = []
         while True:
-            widths = estimate_widths(self.search, self.kept)
+            widths = estimate_widths(self.fits, self.kept)
             adopted = self._model(self.kept, widths)
             remaining = first.residuals.measured - exact_forces(self.design, adopted)
             effects = self._effects(adopted, remaining)
@@ -207,9 +203,8 @@ class _Answer:
                 break
             least = min(weak, key=lambda one: one.evidence)
             unconfirmed.append(least)
-            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)],
-                                             self.decisions)
-        search, regression = self.search, self.search.regression
+            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)])
+        fits, regression = self.fits, self.fits.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}
@@ -219,44 +214,44 @@ class _Answer:
         is_left = unconfirmed and not effects and self._is_above_noise(remaining)
         verdict = ('unknown' if depends or is_left else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
-        moved = [one for one in calibrations(search, self.kept, widths)
+        moved = [one for one in calibrations(fits, self.kept, widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
         return Diagnosis(
             verdict, tuple(effects), sets, tuple(unconfirmed), self._candidates(),
             self._suspects(), depends, tuple(map(self._within_model_error,
                                                  self.ranking.remainders)), self._sets(),
-            tuple(moved), find_cautions(search, self.best, effects), first.notes,
+            tuple(moved), find_cautions(fits, self.best, effects), first.notes,
             first.given, adopted, first.residuals, remaining, noise, floors,
             float(np.sqrt(np.mean(np.square(list(floors.values()))))),
             'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
     def _model(self, found: CandidateSet, widths: Mapping[int, float]) -> ForceModel:
         """Return the fitted model of a set, where friction turns over in widths [m/s] by drive."""
-        return with_widths(fitted_model(self.search, found), self.design, widths)
+        return with_widths(fitted_model(self.fits, found), self.design, widths)
 
     def _effects(self, adopted: ForceModel, remaining: Array) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
-        search, ordered, steps = self.search, self.ranking.order, self.ranking.path
+        fits, ordered, steps = self.fits, self.ranking.order, self.ranking.path
         if not ordered:
             return []
         errors = [_rms(self.ranking.first.design.residuals.error),
-                  *(linear_error(search, step) for step in steps[1:-1]), _rms(remaining)]
+                  *(linear_error(fits, step) for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.ranking.first.design.given
-            models = [given, *(self._model(one, estimate_widths(search, one))
+            models = [given, *(self._model(one, estimate_widths(fits, one))
                                for one in steps[1:-1]), adopted]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
             # Nothing is fitted in the model as given: all of its error is held out.
-            held_out = [errors[0], *(hold_out(search, step).error for step in steps[1:])]
+            held_out = [errors[0], *(hold_out(fits, step).error for step in steps[1:])]
         near = self.ranking.near(self.decisions.rival_margin)
         found = []
         for k, candidate in enumerate(ordered):
-            said = estimate(search, self.kept, candidate, near)
+            said = estimate(fits, self.kept, candidate, near)
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                search.library.force(self.kept, candidate, remaining.shape), said.at_bound,
+                fits.library.force(self.kept, candidate, remaining.shape), said.at_bound,
                 self.ranking.shares[k],
                 errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
@@ -265,13 +260,13 @@ class _Answer:
 
     def _is_predicted(self, k: int) -> bool:
         """Return whether held-out blocks are predicted better for certain with an effect more."""
-        before, after = (hold_out(self.search, self.search.at_noise_of(
+        before, after = (hold_out(self.fits, self.fits.at_noise_of(
             self.kept, step.candidates)).losses for step in self.ranking.path[k:k + 2])
         return certainty(before - after) > self.decisions.sure
 
     def _is_above_noise(self, remaining: Array) -> bool:
         """Return whether errors (M, D) leave a drive more than its noise allows for."""
-        regression = self.search.regression
+        regression = self.fits.regression
         return any(_rms(remaining[:, d]) > self.decisions.left_ratio
                    * regression.noise_floor(self.best.fit, d) for d in regression.drives)
 
@@ -288,13 +283,13 @@ class _Answer:
 
     def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
         statements = []
-        libraries = {library.d: library for library in self.search.patterns}
+        libraries = {library.d: library for library in self.ranking.patterns}
         for candidate in self.kept.unknowns:
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
                     self.drives[d], libraries[d], candidate, self.kept.fit.of(block),
                     self._evidence(candidate), ()))
-        statements += levels(self.search.regression.residuals, dict(noise),
+        statements += levels(self.fits.regression.residuals, dict(noise),
                              self.decisions).values()
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
@@ -306,13 +301,13 @@ class _Answer:
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
         """Return effects that nearly pay beside those adopted: slow noise would do as well."""
-        return tuple(self._ranked(self.search, one, candidate, self.best.cost - one.cost)
+        return tuple(self._ranked(self.fits, one, candidate, self.best.cost - one.cost)
                      for candidate, one in self.ranking.suspects(self.decisions.suspect_margin))
 
-    def _ranked(self, search: Search, found: CandidateSet, candidate: EffectCandidate,
+    def _ranked(self, fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:
         return RankedEffect(candidate.name, self.design.named(candidate.drives), evidence,
-                            linear_error(search, found))
+                            linear_error(fits, found))
 
     def _sets(self) -> tuple[RankedSet, ...]:
         found: dict[frozenset[str], RankedSet] = {}
@@ -327,7 +322,7 @@ class _Answer:
         return tuple(found.values())
 
     def _within_model_error(self, remainder: Remainder) -> WithinModelError:
-        force = self.search.library.force(remainder.found, remainder.candidate,
+        force = self.fits.library.force(remainder.found, remainder.candidate,
                                           self.design.residuals.measured.shape)
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),

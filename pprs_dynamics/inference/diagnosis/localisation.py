@@ -26,7 +26,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.patterns import Pattern
-from pprs_dynamics.inference.search.scanned_sets import with_fast_noise
+from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary
 from pprs_dynamics.system.parallel import each
 

@@ -15,13 +15,9 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
+from pprs_dynamics.inference.search.fitted_model import fitted_model, linear_error, linear_residual
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import (
-    fitted_model,
-    linear_error,
-    linear_residual,
-)
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
@@ -90,22 +86,22 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
                      and adopted[of] not in {c.claim for c in one.effects}), None)
         if best is None:
             continue
-        search = selection.search_of(best)
+        fits = selection.fits_of(best)
         candidate = next(c for c in best.effects if name in (c.name, c.claim))
-        remaining = linear_residual(search, best)
+        remaining = linear_residual(fits, best)
         found.append(RivalEffect(
-            of, candidate.effect, search.design.named(candidate.drives),
-            estimate(search, best, candidate).parameters,
-            linear_error(search, best), _held_out(search, best, validate),
+            of, candidate.effect, fits.design.named(candidate.drives),
+            estimate(fits, best, candidate).parameters,
+            linear_error(fits, best), _held_out(fits, best, validate),
             best.cost - selection.best.cost,
-            search.library.force(best, candidate, remaining.shape), remaining))
+            fits.library.force(best, candidate, remaining.shape), remaining))
     return tuple(found)
 
 
-def _held_out(search: Search, found: CandidateSet, validate: Sequence[Recording]) -> float:
+def _held_out(fits: FittedSets, found: CandidateSet, validate: Sequence[Recording]) -> float:
     if not validate:
-        return hold_out(search, found).error
+        return hold_out(fits, found).error
     try:
-        return rms(measure_residuals(fitted_model(search, found), validate)[0])
+        return rms(measure_residuals(fitted_model(fits, found), validate)[0])
     except PprsError:
         return float('nan')

@@ -26,7 +26,7 @@ from pprs_dynamics.inference.regression.normal_equations import (
 )
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.ranking import Ranking
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
 
@@ -160,7 +160,7 @@ class _System:
 
     def __init__(self, diagnosis: Diagnosis, selection: Ranking, kept: CandidateSet) -> None:
         self.diagnosis, self.kept = diagnosis, kept
-        self.search: Search = selection.last
+        self.fits = selection.last
         self.first_choice: dict[str, set[int | None]] = {}
         self.placements: dict[tuple[str, int | None], Component] = {}
         self.nuisance: dict[Component, tuple[Block, ...]] = {}
@@ -179,7 +179,7 @@ class _System:
         # Here fixed columns stand like others; a fit takes them with the coefficient 1.
         standing = [block if block.mean is None else replace(block, precision=np.eye(1))
                     for block in blocks]
-        self.equations = NormalEquations(self.search.regression, standing)
+        self.equations = NormalEquations(self.fits.regression, standing)
         self.columns: Mapping[Block, tuple[int, ...]] = {
             block: tuple(range(place.start, place.stop)) for block, place in zip(
                 blocks, (self.equations.places[one] for one in standing), strict=True)}
@@ -188,10 +188,10 @@ class _System:
         for block in blocks:
             if block.mean is not None:
                 self.gram[self.columns[block] * 2] = 0.0
-        for d, drive, index in zip(self.search.regression.drives, self.equations.drives,
+        for d, drive, index in zip(self.fits.regression.drives, self.equations.drives,
                                    self.equations.indices, strict=True):
             products, with_error = drive.weighted(
-                self.search.regression.weights(selection.best.fit, d))
+                self.fits.regression.weights(selection.best.fit, d))
             self.gram[np.ix_(index, index)] += products
             self.side[index] += with_error
 
@@ -212,16 +212,16 @@ class _System:
         for one in by_cost(selection.of_last):
             yield one.effects, one
         # Where no set has an effect, a scan beside what was found says in which shape and where.
-        for proposal in self.search.proposals(self.kept, least=-inf):
+        for proposal in Scan(self.fits).proposals(self.kept, least=-inf):
             yield effects(proposal), self.kept
 
     def _blocks(self, placement: Component) -> list[Block]:
-        return [self.search.library.block(placement), *self.nuisance[placement]]
+        return [self.fits.library.block(placement), *self.nuisance[placement]]
 
     def what_if(self) -> WhatIf:
         """Return what a page needs of it."""
-        search, prices = self.search, self.search.prices
-        always = [*range(len(search.design.base)),
+        fits, prices = self.fits, self.fits.prices
+        always = [*range(len(fits.design.base)),
                   *(column for block in self.unknown for column in self.columns[block])]
         return WhatIf(
             tuple(OptionalEffect(
@@ -230,10 +230,10 @@ class _System:
                     self.placements.items(), key=lambda item: item[0][1] or 0) if of == name))
                 for name in self.first_choice),
             tuple(always), tuple(np.flatnonzero(self.equations.prior.limited).tolist()),
-            self.gram, self.side, prices.of_name(), -2 * log(search.decisions.wrong_sign_odds),
-            tuple(prices.of_drives(count + 1) for count in range(len(search.regression.drives))),
+            self.gram, self.side, prices.of_name(), -2 * log(fits.decisions.wrong_sign_odds),
+            tuple(prices.of_drives(count + 1) for count in range(len(fits.regression.drives))),
             tuple(self._forces(d, drive, index) for d, drive, index in zip(
-                search.regression.drives, self.equations.drives, self.equations.indices,
+                fits.regression.drives, self.equations.drives, self.equations.indices,
                 strict=True)))
 
     def _optional(self, placement: Component) -> OptionalPlacement:
@@ -242,7 +242,7 @@ class _System:
         free = [block for block in own if block.mean is None]
         bounds = effect.unphysical_below
         return OptionalPlacement(
-            None if d is None else self.search.design.drives[d],
+            None if d is None else self.fits.design.drives[d],
             any(placement in one.components for one in self.kept.effects),
             d in self.first_choice[effect.name],
             tuple(column for block in free for column in self.columns[block]),
@@ -250,14 +250,14 @@ class _System:
                   for column in self.columns[block]),
             tuple((column, bounds[name]) for name, column in zip(
                 placement.names, self.columns[own[0]], strict=False) if name in bounds),
-            self.search.library.component_price(placement)
+            self.fits.library.component_price(placement)
             - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
             tuple(sorted(map(str, effect.hypotheses(placement.names)))))
 
     def _forces(self, d: int, drive: DriveEquations, index: np.typing.NDArray[np.int_],
                 ) -> OptionalForces:
-        regression, diagnosis = self.search.regression, self.diagnosis
-        series, name = regression.series[d], self.search.design.drives[d]
+        regression, diagnosis = self.fits.regression, self.diagnosis
+        series, name = regression.series[d], self.fits.design.drives[d]
         rows = {int(k): row for k, row in zip(regression.base_index[d], regression.base[d],
                                               strict=False)}
         for block, places in self.columns.items():

@@ -28,8 +28,8 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -117,14 +117,14 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
             pairs |= new
             sets.append(rival.found)
     # The last search, or the first where one of the sets is linear around its point.
-    search = (ranking.last if all(ranking.search_of(one) is ranking.last for one in sets)
-              else ranking.first)
-    placed = [search.evaluate(one.candidates) for one in sets]
+    fits = (ranking.last if all(ranking.fits_of(one) is ranking.last for one in sets)
+            else ranking.first)
+    placed = [fits.evaluate(one.candidates) for one in sets]
     terms = _Terms()
     parts = [terms.of_set(one) for one in placed]
     further = {(k, j): terms.on_drives_of(placed[k], placed[j])
                for k, j in permutations(range(len(sets)), 2)}
-    plan = ColumnPlan.of_design(search.design, terms.all)
+    plan = ColumnPlan.of_design(fits.design, terms.all)
     # By name, and two of the same name by link or joint.
     claims = [{c.claim: c.name for c in one.effects} for one in placed]
     moved = {name for one in claims[1:] for claim, name in one.items()
@@ -142,31 +142,31 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
         sides = {name.partition(':')[0] for name in contest.sides[0]}
         own = [term for term, _ in parts[j] if term.effect.name in sides]
         # An effect that can be all that another one is fits it on any motion.
-        if all(contest.sides) and not all(_holds(refitted, one, search.design) for one in own):
+        if all(contest.sides) and not all(_holds(refitted, one, fits.design) for one in own):
             contests.append(contest)
     subjects = [_explanation([c.name], terms.of_candidate(placed[0], c), plan, 0.0)
                 for c in placed[0].effects]
-    return _asked('separate', search, placed[0], plan, Separation(tuple(contests)), contests,
+    return _asked('separate', fits, placed[0], plan, Separation(tuple(contests)), contests,
                   subjects)
 
 
-def _estimation(search: Search, adopted: CandidateSet) -> Question:
+def _estimation(fits: FittedSets, adopted: CandidateSet) -> Question:
     """Return how to measure the parameters of effects that are there."""
     terms = _Terms()
     parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
-    plan = ColumnPlan.of_design(search.design, terms.all)
-    samples = search.library.prices.samples
-    subjects = [_explanation([c.name], own, plan, search.library.price(c) + sum(
+    plan = ColumnPlan.of_design(fits.design, terms.all)
+    samples = fits.library.prices.samples
+    subjects = [_explanation([c.name], own, plan, fits.library.price(c) + sum(
         len(term.names) for term, _ in own) * log(samples))
         for c, own in zip(adopted.effects, parts, strict=True)]
-    return _asked('estimate', search, adopted, plan, precision_of(plan, subjects), (), subjects)
+    return _asked('estimate', fits, adopted, plan, precision_of(plan, subjects), (), subjects)
 
 
-def _excitation(search: Search, nothing: CandidateSet) -> Question:
+def _excitation(fits: FittedSets, nothing: CandidateSet) -> Question:
     """Return how to show effects that the motion would not show at a size that matters."""
-    regression = search.regression
+    regression = fits.regression
     weak = []
-    for term in search.design.structure:
+    for term in fits.design.structure:
         if term.effect.is_of_one_place:
             continue
         block = regression.block(term.rows)
@@ -175,9 +175,9 @@ def _excitation(search: Search, nothing: CandidateSet) -> Question:
         here = [term.names.index(name) for name in found.names]
         if np.any(gain[here] * found.scales ** 2 < DECISIONS.unexcited):
             weak.append(found)
-    plan = ColumnPlan.of_design(search.design, weak)
-    subjects = subjects_of(plan, search.library.prices)
-    return _asked('excite', search, nothing, plan, precision_of(plan, subjects), (), subjects)
+    plan = ColumnPlan.of_design(fits.design, weak)
+    subjects = subjects_of(plan, fits.library.prices)
+    return _asked('excite', fits, nothing, plan, precision_of(plan, subjects), (), subjects)
 
 
 def subjects_of(plan: ColumnPlan, prices: Prices) -> list[Explanation]:
@@ -200,12 +200,12 @@ def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision
     return Precision(free_of(subjects), tuple(range(len(plan.base))), scales)
 
 
-def _asked(kind: str, search: Search, found: CandidateSet, plan: ColumnPlan, criterion: Criterion,
+def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan, criterion: Criterion,
            contests: Sequence[Contest], subjects: Sequence[Explanation]) -> Question:
     """Return a question under the noise of a set."""
-    regression, fit = search.regression, found.fit
+    regression, fit = fits.regression, found.fit
     noise = regression.noise(fit)
-    known = Information(plan, noise).of_recordings(search.design, regression, fit)
+    known = Information(plan, noise).of_recordings(fits.design, regression, fit)
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
     return Question(kind, plan, noise, known, criterion, tuple(contests), tuple(subjects), floor)
 

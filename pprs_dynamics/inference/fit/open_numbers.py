@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Calibration, calibrations
-from pprs_dynamics.inference.search.relinearisation import fitted_model, relinearised
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_model import fitted_model
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -27,6 +28,6 @@ def fit_open_numbers(model: ForceModel, recordings: Sequence[Recording],
     PprsError
         As `measure_residuals`.
     """
-    search = Search(Design.of(model, recordings), DECISIONS, with_unknown=False)
-    search, found = relinearised(search, search.evaluate(()), DECISIONS)
-    return fitted_model(search, found), calibrations(search, found, {})
+    fits = FittedSets(Design.of(model, recordings), DECISIONS)
+    fits, found = relinearised(fits, fits.evaluate(()))
+    return fitted_model(fits, found), calibrations(fits, found, {})

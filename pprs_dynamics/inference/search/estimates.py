@@ -15,8 +15,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ModelNumber, PresentCoefficient, within
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.reversal_widths import place_of
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_AVERAGED = 4  # further sets that estimates are averaged over
@@ -73,7 +73,7 @@ class Estimates:
     at_bound: tuple[str, ...]
 
 
-def estimate(search: Search, found: CandidateSet, candidate: EffectCandidate,
+def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
              near: Sequence[CandidateSet] = ()) -> Estimates:
     """Return the parameters of an effect, in the values that the set has.
 
@@ -83,14 +83,14 @@ def estimate(search: Search, found: CandidateSet, candidate: EffectCandidate,
 
     Parameters
     ----------
-    search : Search
+    fits : FittedSets
     found : CandidateSet
     candidate : EffectCandidate
         Of the set.
     near : sequence of CandidateSet
-        Of the same search.
+        Of the same fits.
     """
-    own, bound = _of_set(search, found, candidate)
+    own, bound = _of_set(fits, found, candidate)
     weights = [1.0]
     mixed: dict[str, list[tuple[float, float]]] = {
         key: [(one.value, one.std)] for key, one in own.items()}
@@ -99,7 +99,7 @@ def estimate(search: Search, found: CandidateSet, candidate: EffectCandidate,
         if same is None or other is found:
             continue
         weights.append(float(np.exp(-0.5 * max(other.cost - found.cost, 0.0))))
-        said, _ = _of_set(search, other, same)
+        said, _ = _of_set(fits, other, same)
         for key, one in own.items():
             there = said.get(key, one)
             mixed[key].append((there.value, there.std))
@@ -112,10 +112,10 @@ def estimate(search: Search, found: CandidateSet, candidate: EffectCandidate,
     return Estimates(parameters, bound)
 
 
-def _of_set(search: Search, found: CandidateSet, candidate: EffectCandidate,
+def _of_set(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
             ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-    slopes = dict(search.slopes(found))
-    fit = search.regression.at((*found.fit.blocks, *slopes.values()), found.fit.amplitudes)
+    slopes = dict(fits.slopes(found))
+    fit = fits.regression.at((*found.fit.blocks, *slopes.values()), found.fit.amplitudes)
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
     for component in candidate.components:
@@ -124,17 +124,17 @@ def _of_set(search: Search, found: CandidateSet, candidate: EffectCandidate,
         index = fit.index_of(blocks)
         covariance = fit.covariance[np.ix_(index, index)]
         c = found.coefficients(component)
-        some, held = _of_component(search, component, c, covariance)
+        some, held = _of_component(fits, component, c, covariance)
         parameters.update(some)
         bound += held
     return parameters, tuple(bound)
 
 
-def _of_component(search: Search, component: Component, c: Array, covariance: Array,
+def _of_component(fits: FittedSets, component: Component, c: Array, covariance: Array,
                   ) -> tuple[dict[str, Estimate], list[str]]:
     effect, shape = component.effect, component.parameters
-    prefix = '' if component.drive is None else f'{search.design.drives[component.drive]}.'
-    unit_of = _units(search.design, component.drive)
+    prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
+    unit_of = _units(fits.design, component.drive)
     values = component.values(c)
     size = len(c)
     found = {}
@@ -159,8 +159,8 @@ def _of_component(search: Search, component: Component, c: Array, covariance: Ar
         found[prefix + parameter.name] = Estimate(
             within(parameter, value), parameter.spread(amount, value),
             unit_of(parameter.unit))
-    return found, [prefix + name for name in search.library.at_edge(
-        component, search.decisions.edge_share)]
+    return found, [prefix + name for name in fits.library.at_edge(
+        component, fits.decisions.edge_share)]
 
 
 def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
@@ -171,41 +171,41 @@ def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
     return design.residuals.units_of(name).of
 
 
-def estimate_present(search: Search, found: CandidateSet, fitted: ForceModel, name: str,
+def estimate_present(fits: FittedSets, found: CandidateSet, fitted: ForceModel, name: str,
                      ) -> dict[str, Estimate]:
     """Return the parameters of an effect that the given model has, as a fit moves them.
 
     Deviations are known for parameters that are coefficients.
     """
     known = {}
-    for k, column in enumerate(search.design.base):
+    for k, column in enumerate(fits.design.base):
         if isinstance(column, PresentCoefficient) and column.effect.name == name:
             key = f'{column.drive}.{column.coefficient.name}' if column.drive else (
                 column.coefficient.name)
             known[key] = float(np.sqrt(found.fit.covariance[k, k])) * column.coefficient.scale
-    effect = next(type(e) for e in search.design.given.effects if e.name == name)
+    effect = next(type(e) for e in fits.design.given.effects if e.name == name)
     units = {p.name: p.unit for p in getattr(effect, 'parameters', ())}
     prefix = f'effects.{name}.'
     place_of = getattr(effect, 'place_and_parameter', lambda key: ('', key))
     return {key: Estimate(float(value), known.get(key, float('nan')),
-                          _units(search.design, drive or None)(units[parameter]))
+                          _units(fits.design, drive or None)(units[parameter]))
             for full, value in fitted.values.items() if full.startswith(prefix)
             for key in [full.removeprefix(prefix)]
             for drive, parameter in [place_of(key)]}
 
 
-def calibrations(search: Search, found: CandidateSet, widths: Mapping[int, float],
+def calibrations(fits: FittedSets, found: CandidateSet, widths: Mapping[int, float],
                  ) -> list[Calibration]:
     """Return the numbers as the fit moves them within their tolerances, and reversal widths.
 
     Parameters
     ----------
-    search : Search
+    fits : FittedSets
     found : CandidateSet
     widths : mapping of drive to float
         Widths of reversal that differ from the given model's for certain [m/s].
     """
-    design = search.design
+    design = fits.design
     calibrated = []
     for k, column in enumerate(design.base):
         if isinstance(column, ModelNumber):

@@ -67,6 +67,10 @@ class FittedSets:
         """All that were fitted so far."""
         return tuple(self._evaluated.values())
 
+    def has(self, candidates: Candidates) -> bool:
+        """Return whether a set was fitted."""
+        return set_key(candidates) in self._evaluated
+
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
@@ -97,6 +101,21 @@ class FittedSets:
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
         found = self._set(candidates, possible or fit, nuisance)
         return replace(found, is_admissible=possible is not None and self._is_admissible(found))
+
+    def pruned(self, found: CandidateSet) -> CandidateSet:
+        """Return a set without the candidates that do not pay in it."""
+        while found.candidates:
+            less = min((self.evaluate(found.without(gone)) for gone in found.candidates),
+                       key=lambda one: one.total)
+            if less.total > found.total:
+                break
+            found = less
+        return found
+
+    def release(self) -> None:
+        """Let go of what only further scans and fits would need."""
+        self.library.release()
+        self.regression.release()
 
     def blocks(self, candidates: Candidates, nuisance: Nuisance = MappingProxyType({}),
                ) -> list[Block]:

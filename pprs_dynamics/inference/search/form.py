@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -47,9 +47,10 @@ def without_remainders(search: Search, best: CandidateSet,
     What was best together with them may not be without: then something else may stand for it.
     Where that, with a lack of fit of its own, costs less than the set given, it is the best.
     """
-    kept, remainders = beyond_lack_of_fit(search, best)
-    while kept.total > best.total + search.decisions.rival_margin:
-        better = search.replaced(kept, lambda one: not _small(search, one))
+    fits = search.fits
+    kept, remainders = beyond_lack_of_fit(fits, best)
+    while kept.total > best.total + fits.decisions.rival_margin:
+        better = search.replaced(kept, lambda one: not _small(fits, one))
         if better is kept:
             break
         kept = better
@@ -57,22 +58,22 @@ def without_remainders(search: Search, best: CandidateSet,
         return without_remainders(search, search.best)
     if remainders:
         # What paid beside them only is not kept for their sake.
-        kept = search.pruned(kept)
+        kept = fits.pruned(kept)
     names = {candidate.name for candidate in kept.candidates}
     return best, kept, tuple(one for one in remainders if one.candidate.name not in names)
 
 
-def beyond_lack_of_fit(search: Search, best: CandidateSet,
+def beyond_lack_of_fit(fits: FittedSets, best: CandidateSet,
                        ) -> tuple[CandidateSet, tuple[Remainder, ...]]:
     """Return what a set holds beyond the model error of its effects, and what is within it."""
     remainders: list[Remainder] = []
     kept = best
-    while small := _small(search, kept):
+    while small := _small(fits, kept):
         # Of two that look like each other, either is small beyond the other.
-        without = {candidate: search.evaluate(kept.without(candidate)) for candidate in small}
+        without = {candidate: fits.evaluate(kept.without(candidate)) for candidate in small}
         without = {candidate: found for candidate, found in without.items()
-                   if _is_of_loads(search, kept, candidate)
-                   or _over_noise(search, best, found) <= search.decisions.left_ratio}
+                   if _is_of_loads(fits, kept, candidate)
+                   or _over_noise(fits, best, found) <= fits.decisions.left_ratio}
         if not without:
             break
         least = min(without, key=lambda candidate: without[candidate].total)
@@ -81,30 +82,30 @@ def beyond_lack_of_fit(search: Search, best: CandidateSet,
     return kept, tuple(remainders)
 
 
-def _is_of_loads(search: Search, found: CandidateSet, candidate: Candidate) -> bool:
+def _is_of_loads(fits: FittedSets, found: CandidateSet, candidate: Candidate) -> bool:
     """Return whether a candidate is friction of drives that an effect beside it loads.
 
     Friction may follow such loads or not, which is known to first order only.
     """
     return (isinstance(candidate, EffectCandidate) and candidate.effect.is_friction
             and issubclass(candidate.effect, DriveEffect)
-            and any(search.library.term(one).bare for other in found.effects
+            and any(fits.library.term(one).bare for other in found.effects
                     if other is not candidate for one in other.components))
 
 
-def _over_noise(search: Search, best: CandidateSet, found: CandidateSet) -> float:
+def _over_noise(fits: FittedSets, best: CandidateSet, found: CandidateSet) -> float:
     """Return the largest rms that a set leaves on a drive, over the noise beside the best set."""
-    regression = search.regression
+    regression = fits.regression
     noise = [regression.noise_floor(best.fit, d) for d in regression.drives]
     return float(np.max(regression.left(found.fit) / np.maximum(noise, 1e-300)))
 
 
-def _small(search: Search, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
+def _small(fits: FittedSets, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
     """Return the candidates within the model error of others, and of which."""
     small = {}
     for candidate in found.candidates:
         share, names = discrepancy_ratio(
-            search.design, search.regression, search.decisions, found, candidate)
+            fits.design, fits.regression, fits.decisions, found, candidate)
         if share < 1:
             small[candidate] = names
     return small

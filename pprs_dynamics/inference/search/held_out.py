@@ -19,7 +19,7 @@ from pprs_dynamics.inference.regression.base_columns import ReversalShape
 from pprs_dynamics.inference.regression.joint_fit import Integers
 from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.search.candidates import CandidateSet
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 
 BLOCKS = 10
 
@@ -40,9 +40,9 @@ class HeldOut:
     losses: Array
 
 
-def hold_out(search: Search, found: CandidateSet) -> HeldOut:
+def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
     """Return how well blocks of the recordings are predicted from the others."""
-    regression, fit = search.regression, found.fit
+    regression, fit = fits.regression, found.fit
     size = len(fit.coefficients)
     total = len(regression.residuals)
     edges = np.linspace(0, total, BLOCKS + 1)
@@ -64,9 +64,9 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
             b[k, index] += part[:-1] @ part[-1]
     prior = Prior.of(regression.columns, fit.blocks)
     others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
-    fits = np.stack([one.coefficients for one in others])
-    plain = fits.copy()
-    plain[:, [k for k, column in enumerate(search.design.base)
+    coefficients = np.stack([one.coefficients for one in others])
+    plain = coefficients.copy()
+    plain[:, [k for k, column in enumerate(fits.design.base)
               if isinstance(column, ReversalShape)]] = 0.0
     plain[:, fit.index_of(chain(*found.nuisance.values()))] = 0.0
     losses, squares, count = np.zeros(BLOCKS), 0.0, 0
@@ -75,7 +75,7 @@ def hold_out(search: Search, found: CandidateSet) -> HeldOut:
         at = np.searchsorted(series.index, edges)
         for k in range(BLOCKS):
             block = slice(at[k], at[k + 1])
-            left = stacked[-1, block] - fits[k, index] @ stacked[:-1, block]
+            left = stacked[-1, block] - coefficients[k, index] @ stacked[:-1, block]
             losses[k] += float(left @ left)
             rest = (rows[-1, block] - plain[k, index] @ rows[:-1, block])[series.known[block]]
             squares, count = squares + float(rest @ rest), count + len(rest)

@@ -22,13 +22,12 @@ from pprs_dynamics.inference.search.candidates import (
     bends,
 )
 from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.fitted_model import linear_residual
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import (
-    around_fitted,
-    linear_residual,
-    linearised,
-)
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.relinearisation import around_fitted, linearised
+from pprs_dynamics.inference.search.search import Search, patterns_of
+from pprs_dynamics.inference.search.unknown import PatternLibrary
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -58,8 +57,10 @@ class Ranking:
 
     Parameters
     ----------
-    first, last : Search
+    first, last : FittedSets
         Around the model as given, and around the last operating point: for looking closer.
+    patterns : tuple of PatternLibrary
+        Of no catalogue, around the last.
     of_first, of_last : tuple of CandidateSet
         Their sets, by cost.
     best, kept : CandidateSet
@@ -74,8 +75,9 @@ class Ranking:
         From the patterns of the kept set to all of it, an effect more in each in that order.
     """
 
-    first: Search = field(repr=False)
-    last: Search = field(repr=False)
+    first: FittedSets = field(repr=False)
+    last: FittedSets = field(repr=False)
+    patterns: tuple[PatternLibrary, ...] = field(repr=False)
     of_first: tuple[CandidateSet, ...] = field(repr=False)
     of_last: tuple[CandidateSet, ...] = field(repr=False)
     best: CandidateSet
@@ -86,30 +88,32 @@ class Ranking:
     path: tuple[CandidateSet, ...] = field(repr=False)
 
     @classmethod
-    def of(cls, first: Search, last: Search, best: CandidateSet) -> Ranking:
+    def of(cls, first: FittedSets, last: Search, best: CandidateSet) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
         best, kept, remainders = without_remainders(last, best)
-        return cls._keeping(first, last, best, kept, remainders)
+        return cls._keeping(first, last.fits, last.patterns, best, kept, remainders)
 
     @classmethod
-    def _keeping(cls, first: Search, last: Search, best: CandidateSet, kept: CandidateSet,
-                 remainders: tuple[Remainder, ...]) -> Ranking:
+    def _keeping(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
+                 best: CandidateSet, kept: CandidateSet, remainders: tuple[Remainder, ...],
+                 ) -> Ranking:
         without = {gone: last.evaluate(kept.without(gone)) for gone in kept.candidates}
         order, path = _falling(last, best, kept)
-        return cls(first, last, _by_cost(first.sets), _by_cost(last.sets), best, kept, remainders,
-                   MappingProxyType(without), order, path)
+        return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), best, kept,
+                   remainders, MappingProxyType(without), order, path)
 
-    def less(self, gone: EffectCandidate, decisions: Decisions) -> Ranking:
+    def less(self, gone: EffectCandidate) -> Ranking:
         """Return the ranking without one of the kept effects, and what paid only beside it.
 
         Where that one bent the columns, around what is left of the fitted model.
         """
         last, best, kept = self.last, self.best, self.last.pruned(self.without[gone])
         if bends(gone):
-            design = linearised(last, kept, decisions)[0].design
-            last = Search(design, decisions, last.regression.error_scale, patterns=last.patterns)
+            around, kept = linearised(last, kept)
+            last = FittedSets(around.design, around.decisions, around.regression.error_scale)
             best = kept = last.refined(last.evaluate(kept.candidates))
-        return self._keeping(self.first, last, best, kept, self.remainders)
+        return self._keeping(self.first, last, tuple(
+            one.around(last.regression) for one in self.patterns), best, kept, self.remainders)
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -152,8 +156,8 @@ class Ranking:
                 found.setdefault(one.effects[0].name, one)
         return found
 
-    def search_of(self, found: CandidateSet) -> Search:
-        """Return the search that holds a set."""
+    def fits_of(self, found: CandidateSet) -> FittedSets:
+        """Return the fitted sets that a set is of."""
         return self.last if any(one is found for one in self.of_last) else self.first
 
     def near(self, margin: float) -> tuple[CandidateSet, ...]:
@@ -226,11 +230,12 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
-    first = Search(design, decisions, progress=lambda share: report(0.25 + 0.35 * share))
-    last, best = around_fitted(first, first.run(), decisions, report)
+    first = FittedSets(design, decisions)
+    search = Search(first, patterns_of(first), (), lambda share: report(0.25 + 0.35 * share))
+    last, best = around_fitted(search, search.run(), report)
     # Rivals that bend no columns are judged where none are bent: the best of each kind.
     seen = {_claims(best)}
-    for one in _by_cost(last.sets) if last is not first else ():
+    for one in _by_cost(last.fits.sets) if last is not search else ():
         if one.cost > best.cost + decisions.rival_margin:
             break
         if one.effects and not one.unknowns and not _is_bent(one) and _claims(one) not in seen:
@@ -253,29 +258,29 @@ def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:
     return tuple(sorted(sets, key=lambda one: one.cost))
 
 
-def _falling(search: Search, best: CandidateSet, kept: CandidateSet,
+def _falling(fits: FittedSets, best: CandidateSet, kept: CandidateSet,
              ) -> tuple[tuple[EffectCandidate, ...], tuple[CandidateSet, ...]]:
     """Return the effects of a set, what lowers the error most first, and the sets on the way.
 
     As a multiple of each drive's noise, since drives may be of different sizes and units.
     """
     order: list[EffectCandidate] = []
-    path = [search.evaluate(kept.unknowns)]
+    path = [fits.evaluate(kept.unknowns)]
     left = list(kept.effects)
     while left:
-        with_each = {one: kept if len(left) == 1 else search.evaluate(
+        with_each = {one: kept if len(left) == 1 else fits.evaluate(
             (*order, one, *kept.unknowns)) for one in left}
         following = min(left, key=lambda one: _over_noise(
-            search, best, linear_residual(search, with_each[one])))
+            fits, best, linear_residual(fits, with_each[one])))
         order.append(following)
         path.append(with_each[following])
         left.remove(following)
     return tuple(order), tuple(path)
 
 
-def _over_noise(search: Search, best: CandidateSet, left: Array) -> float:
+def _over_noise(fits: FittedSets, best: CandidateSet, left: Array) -> float:
     """Return the root of the mean square of errors (M, D), over the noise of each drive."""
     shares = [np.nanmean(np.square(left[:, d])) / max(
-        search.regression.noise_floor(best.fit, d), 1e-12) ** 2
-        for d in search.regression.drives]
+        fits.regression.noise_floor(best.fit, d), 1e-12) ** 2
+        for d in fits.regression.drives]
     return float(np.sqrt(np.mean(shares)))

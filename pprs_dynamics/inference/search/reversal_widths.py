@@ -19,7 +19,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ReversalShape, present_values, rounded
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -48,9 +48,9 @@ def with_widths(model: ForceModel, design: Design, widths: Mapping[int, float]) 
     return replace(build_model(values), source=model.source)
 
 
-def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
+def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
     """Return the widths [m/s] of the drives on which they differ from the model's for certain."""
-    design, regression = search.design, search.regression
+    design, regression = fits.design, fits.regression
     friction = design.friction()
     if friction is None:
         return {}
@@ -94,7 +94,7 @@ def estimate_widths(search: Search, found: CandidateSet) -> dict[int, float]:
 
         refined = minimize_scalar(loss, bounds=(low, high), method='bounded',
                                   options={'maxiter': 15})
-        if -float(refined.fun) > search.prices.of_width(TRIALS):
+        if -float(refined.fun) > fits.prices.of_width(TRIALS):
             widths[d] = rounded(width * float(np.exp(refined.x)))
     return widths
 

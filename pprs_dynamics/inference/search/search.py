@@ -11,13 +11,12 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -25,11 +24,9 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     UnknownCandidate,
     bends,
-    set_key,
 )
-from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates
-from pprs_dynamics.inference.search.scanned_sets import Place, ScannedSets, with_fast_noise
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -43,34 +40,31 @@ REFINED = 3  # of the sets fitted in a round
 REPLACED, RECOVERED = 15.0, 0.9
 
 
-class Search(ScannedSets):
+class Search:
     """A search over the candidates of one design.
 
     Parameters
     ----------
-    design, decisions, error_scale
-        See `FittedSets`.
+    fits : FittedSets
+    patterns : sequence of PatternLibrary, optional
+        Patterns of no catalogue that take part, see `patterns_of`; by default none do.
+    refuted : container of Place
+        See `Scan`.
     progress : callable, optional
         Called with the share of the work that is done.
-    with_unknown : bool
-        Patterns of no catalogue take part.
-    patterns : sequence of PatternLibrary
-        Those of another operating point; by default they are made.
-    refuted
-        See `ScannedSets`.
     """
 
-    def __init__(self, design: Design, decisions: Decisions,
-                 error_scale: Mapping[int, float] | None = None,
-                 progress: Callable[[float], None] | None = None,
-                 with_unknown: bool = True, patterns: Sequence[PatternLibrary] = (),
-                 refuted: Container[Place] = ()) -> None:
-        super().__init__(design, decisions, error_scale, refuted)
-        shared = Shared()
-        self.patterns = [one.around(self.regression) for one in patterns] or (
-            [PatternLibrary(self.regression, self.prices, d, shared=shared)
-             for d in self.regression.drives] if with_unknown else [])
+    def __init__(self, fits: FittedSets, patterns: Sequence[PatternLibrary] = (),
+                 refuted: Container[Place] = (),
+                 progress: Callable[[float], None] | None = None) -> None:
+        self.fits, self.patterns = fits, tuple(patterns)
+        self.scan = Scan(fits, refuted)
         self._report = progress or (lambda share: None)
+
+    @property
+    def best(self) -> CandidateSet:
+        """The set of lowest cost so far."""
+        return self.fits.best
 
     def run(self, *starts: Candidates) -> CandidateSet:
         """Return the best set that the search reaches from all starts, by effects alone at first.
@@ -79,10 +73,10 @@ class Search(ScannedSets):
         that bends the columns, the search ends: what would come next might only make good that
         they are not bent.
         """
-        self.evaluate(())
+        self.fits.evaluate(())
         for number, start in enumerate(starts):
-            improve = self.refined if number else self.rescanned
-            improve(self.evaluate(start))
+            improve = self.fits.refined if number else self.rescanned
+            improve(self.fits.evaluate(start))
         if len(starts) != 1:
             self._descend(False, 0.0)
         if self.patterns and not self.is_beyond_point:
@@ -92,15 +86,14 @@ class Search(ScannedSets):
 
     def release(self) -> None:
         """Let go of what only further scans and fits would need."""
-        self.library.release()
-        self.regression.release()
+        self.fits.release()
         for patterns in self.patterns:
             patterns.release()
 
     @property
     def is_beyond_point(self) -> bool:
         """Whether the best set has an effect that bends columns, and these are not bent by it."""
-        point = self.design.point
+        point = self.fits.design.point
         known = {(one.effect, one.drive) for one in point.effects} if point else set()
         return any(one.effect.bends_columns and (one.effect, one.drive) not in known
                    for one in self.best.blocks)
@@ -128,11 +121,11 @@ class Search(ScannedSets):
         """Fit sets, and refine the shapes of the best few."""
         new = []
         for candidates in sets:
-            if set_key(candidates) not in self._evaluated and self._is_bounded(candidates):
-                new.append(self.evaluate(candidates))
+            if not self.fits.has(candidates) and self._is_bounded(candidates):
+                new.append(self.fits.evaluate(candidates))
         # No noise takes a constant: what lacks nothing else is judged once it has it.
         for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
-            new += [self.evaluate(more) for more in self.proposals(found, 1)
+            new += [self.fits.evaluate(more) for more in self.scan.proposals(found, 1)
                     if self._is_bounded(more)]
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [found for found in new if any(one.effect.shape or one.centre
@@ -140,12 +133,13 @@ class Search(ScannedSets):
         for number, found in enumerate(sorted(shaped, key=lambda one: one.cost)):
             # The first effect decides which way the search goes.
             if number < REFINED or len(found.candidates) == 1:
-                self.refined(found)
+                self.fits.refined(found)
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
         squares = found.fit.squares[:, 0] / found.fit.spectra[:, 0]
-        return found.cost - float(np.sum(np.maximum(squares - self.regression.counts[:, 0], 0)))
+        counts = self.fits.regression.counts[:, 0]
+        return found.cost - float(np.sum(np.maximum(squares - counts, 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
@@ -155,13 +149,13 @@ class Search(ScannedSets):
     def _additions(self, with_patterns: bool) -> list[Candidates]:
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[Candidates] = []
-        ranked = sorted(self._evaluated.values(), key=lambda one: one.cost)
+        ranked = sorted(self.fits.sets, key=lambda one: one.cost)
         for rank, base in enumerate(ranked[:BEAM]):
             count = PROPOSALS if rank == 0 else 2
-            found += self.proposals(base, count)
+            found += self.scan.proposals(base, count)
             if rank == 0:
-                fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
-                found += self.proposals(fast, REPLACEMENTS)
+                fast = replace(base, fit=with_fast_noise(self.fits.regression, base.fit))
+                found += self.scan.proposals(fast, REPLACEMENTS)
                 for near in (base, fast) if with_patterns else ():
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
                     found += [(*base.candidates, pattern) for pattern in patterns]
@@ -175,7 +169,7 @@ class Search(ScannedSets):
         for candidate in best.effects:
             if candidate.effect.bends_columns:
                 rest = best.without(candidate)
-                for candidates in self.proposals(self.at_noise_of(best, rest)):
+                for candidates in self.scan.proposals(self.fits.at_noise_of(best, rest)):
                     if any(bends(one) for one in candidates if one not in rest):
                         yield candidates
 
@@ -185,45 +179,45 @@ class Search(ScannedSets):
 
         None where the model has it everywhere already.
         """
-        base = self._evaluated[frozenset()]
-        fast = replace(base, fit=with_fast_noise(self.regression, base.fit))
+        base = self.fits.evaluate(())
+        fast = replace(base, fit=with_fast_noise(self.fits.regression, base.fit))
         for near in (base, fast):
-            found = self._offers(near).get(effect, [])
+            found = self.scan.offers(near).get(effect, [])
             if drives is None:
-                chosen = self._best_drives(effect, found, None)[1] if found else []
+                chosen = self.scan.best_drives(effect, found, None)[1] if found else []
             else:
                 chosen = [one for _, one in found if one.drive in drives]
             if chosen:
-                self.refined(self.evaluate((EffectCandidate.of(chosen),)))
+                self.fits.refined(self.fits.evaluate((EffectCandidate.of(chosen),)))
         while True:
-            alone = [one for one in self._evaluated.values() if one.candidates]
+            alone = [one for one in self.fits.sets if one.candidates]
             if not alone:
                 return None
             best = min(alone, key=lambda one: one.cost)
             for candidate in (*self._alternatives(best.effects[0]),
                               *(self._variants(best.effects[0]))):
-                self.evaluate((candidate,))
-            after = min((one for one in self._evaluated.values() if one.candidates),
+                self.fits.evaluate((candidate,))
+            after = min((one for one in self.fits.sets if one.candidates),
                         key=lambda one: one.cost)
             if after.cost > best.cost - LEAST_IMPROVEMENT:
                 return best
-            self.refined(after)
+            self.fits.refined(after)
 
     def rescanned(self, found: CandidateSet) -> CandidateSet:
         """Return the set on all drives where its effects pay, in shapes that scans find."""
-        for candidates in self.proposals(found, effects={c.effect for c in found.effects}):
-            found = min(found, self.evaluate(candidates), key=lambda one: one.cost)
+        for candidates in self.scan.proposals(found, effects={c.effect for c in found.effects}):
+            found = min(found, self.fits.evaluate(candidates), key=lambda one: one.cost)
         for effect, d in [(one.effect, one.drive) for one in found.blocks
                           if one.effect.shape and one.drive is not None]:
             candidate = next(c for c in found.effects if c.effect is effect)
             others = [one for one in candidate.components if one.drive != d]
             rest = found.without(candidate)
             less = (*rest, EffectCandidate.of(others)) if others else rest
-            offers = self.library.local[d].offers(self.at_noise_of(found, less).fit)
+            offers = self.fits.library.local[d].offers(self.fits.at_noise_of(found, less).fit)
             if effect.name in offers:
-                found = min(found, self.evaluate((*rest, EffectCandidate.of(
+                found = min(found, self.fits.evaluate((*rest, EffectCandidate.of(
                     [*others, offers[effect.name][0]]))), key=lambda one: one.cost)
-        return self.refined(found)
+        return self.fits.refined(found)
 
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate with other coefficients of one component."""
@@ -235,22 +229,12 @@ class Search(ScannedSets):
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
         """Return the best of a set and those in which something else stands for one or two."""
-        before = set(self._evaluated)
+        before = len(self.fits.sets)
         self._try(self._replacements(found))
-        better = [one for key, one in self._evaluated.items()
-                  if key not in before and one.cost < found.total - LEAST_IMPROVEMENT]
+        better = [one for one in self.fits.sets[before:]
+                  if one.cost < found.total - LEAST_IMPROVEMENT]
         return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
                     found)
-
-    def pruned(self, found: CandidateSet) -> CandidateSet:
-        """Return a set without the candidates that do not pay in it."""
-        while found.candidates:
-            less = min((self.evaluate(found.without(gone)) for gone in found.candidates),
-                       key=lambda one: one.total)
-            if less.total > found.total:
-                break
-            found = less
-        return found
 
     def _replacements(self, best: CandidateSet) -> Iterable[Candidates]:
         """Yield sets in which something else stands for one or two candidates, or for a drive's.
@@ -271,11 +255,11 @@ class Search(ScannedSets):
                     less = self._with(candidate, component, *kept)
                     rests.append((self._exchanged(best, candidate, less), component.drive))
         for rest, drive in rests:
-            base = self.at_noise_of(best, rest)
+            base = self.fits.at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
             # Whatever stands for one effect as well is a rival: all of them are fitted.
             one_gone = drive is None and len(rest) == len(best.candidates) - 1
-            yield from self.proposals(base, None if one_gone else REPLACEMENTS, drive, least)
+            yield from self.scan.proposals(base, None if one_gone else REPLACEMENTS, drive, least)
         for candidate in best.effects:
             for other in self._alternatives(candidate):
                 yield self._exchanged(best, candidate, other)
@@ -285,7 +269,7 @@ class Search(ScannedSets):
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
         """Yield sets in which two other effects stand for one that claims more than one thing."""
         def with_another(candidates: Candidates) -> list[Candidates]:
-            found = self.proposals(self.at_noise_of(best, candidates), REPLACEMENTS + 1)
+            found = self.scan.proposals(self.fits.at_noise_of(best, candidates), REPLACEMENTS + 1)
             return [more for more in found if all(
                 one.effect is not gone.effect for one in more if isinstance(one, EffectCandidate))]
         for first in with_another(best.without(gone)):
@@ -307,10 +291,10 @@ class Search(ScannedSets):
         while True:
             best = self.best
             for candidates in self._simpler(best):
-                self.evaluate(candidates)
+                self.fits.evaluate(candidates)
             if self.best.cost > best.cost - LEAST_IMPROVEMENT:
                 return
-            self.refined(self.best)
+            self.fits.refined(self.best)
 
     def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
         for candidate in best.candidates:
@@ -320,10 +304,11 @@ class Search(ScannedSets):
                 continue
             effect = candidate.effect
             # The drives where it matters most; fewer of them may be better though one less is not.
-            strength = {one: self.drop_cost(best, one) for one in candidate.components}
+            strength = {one: self.fits.drop_cost(best, one) for one in candidate.components}
             ranked = sorted(candidate.components, key=lambda one: -strength[one])
+            most = 3 * self.fits.decisions.rival_margin
             for count in range(1, len(ranked)):
-                if sum(strength[one] for one in ranked[count:]) < 3 * self.decisions.rival_margin:
+                if sum(strength[one] for one in ranked[count:]) < most:
                     yield self._exchanged(best, candidate,
                                           EffectCandidate.of(ranked[:count]))
             if len({one.names for one in candidate.components}) > 1:
@@ -346,3 +331,10 @@ class Search(ScannedSets):
     @staticmethod
     def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
         return tuple(new if c is old else c for c in found.candidates)
+
+
+def patterns_of(fits: FittedSets) -> list[PatternLibrary]:
+    """Return the patterns of no catalogue of all drives."""
+    shared = Shared()
+    return [PatternLibrary(fits.regression, fits.prices, d, shared=shared)
+            for d in fits.regression.drives]

@@ -9,14 +9,12 @@ of sums that are known. It proposes; a fit with its own noise decides (`search.s
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container
 
 import numpy as np
 
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
-from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -29,23 +27,19 @@ SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 Place = tuple[type[CatalogueEffect], int | None]  # an effect, and the drive that it acts on alone
 
 
-class ScannedSets(FittedSets):
-    """Fitted sets, and what a scan proposes to add to each.
+class Scan:
+    """What may be added to fitted sets.
 
     Parameters
     ----------
-    design, decisions, error_scale
-        See `FittedSets`.
+    fits : FittedSets
     refuted : container of Place
-        What no scan proposes: effects that bend the columns and were dropped where these were
+        What is not proposed: effects that bend the columns and were dropped where these were
         computed with them, which counts for more than that they seem to pay where they are not.
     """
 
-    def __init__(self, design: Design, decisions: Decisions,
-                 error_scale: Mapping[int, float] | None = None,
-                 refuted: Container[Place] = ()) -> None:
-        super().__init__(design, decisions, error_scale)
-        self.refuted = refuted
+    def __init__(self, fits: FittedSets, refuted: Container[Place] = ()) -> None:
+        self.fits, self.refuted = fits, refuted
 
     def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,
                   least: float = PROPOSED,
@@ -65,11 +59,11 @@ class ScannedSets(FittedSets):
             Only these.
         """
         scored: list[tuple[float, Candidates]] = []
-        for effect, found in self._offers(base, drive).items():
+        for effect, found in self.offers(base, drive).items():
             if effects is not None and effect not in effects:
                 continue
             old = next((c for c in base.effects if c.effect is effect), None)
-            score, chosen = self._best_drives(effect, found, old)
+            score, chosen = self.best_drives(effect, found, old)
             if score > least and chosen:
                 kept = tuple(c for c in base.candidates if c is not old)
                 scored.append((score, (*kept, EffectCandidate.of(
@@ -77,10 +71,10 @@ class ScannedSets(FittedSets):
         scored.sort(key=lambda one: -one[0])
         return [candidates for _, candidates in scored[:count]]
 
-    def _offers(self, base: CandidateSet, drive: int | None = None,
+    def offers(self, base: CandidateSet, drive: int | None = None,
                 ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
         """Return gains less prices of components, by effect; one for each drive."""
-        library, fit = self.library, base.fit
+        library, fit = self.fits.library, base.fit
         taken = {(one.effect, one.drive) for one in base.blocks}
         drives = tuple(library.local) if drive is None else (drive,)
         offered = each(lambda d: library.local[d].offers(fit), drives)
@@ -98,12 +92,12 @@ class ScannedSets(FittedSets):
             found.setdefault(effect, []).append(scored)
         return found
 
-    def _best_drives(
+    def best_drives(
         self, effect: type[CatalogueEffect], found: list[tuple[float, Component]],
         old: EffectCandidate | None,
     ) -> tuple[float, list[Component]]:
         """Return the drives on which an effect pays, and the score of all together."""
-        prices = self.prices
+        prices = self.fits.prices
         found = sorted(found, key=lambda one: -one[0])
         if not issubclass(effect, DriveEffect):
             return found[0][0] - prices.of_name(), [found[0][1]]

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The model that a fitted set stands for, and its forces: by the linear fit, and exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import (
+    ReversalShape,
+    move_numbers,
+    move_present,
+    within,
+)
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.terms import PlacedEffect
+from pprs_dynamics.inference.residuals.reconstruction import treated_forces
+from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model
+
+
+def parts_of(fits: FittedSets, found: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
+    """Return coefficients of the base columns, 0 for reversals, and effects with theirs."""
+    base = found.fit.coefficients[:len(fits.design.base)].copy()
+    base[[isinstance(column, ReversalShape) for column in fits.design.base]] = 0.0
+    effects = []
+    for one in found.blocks:
+        every = one.every(found.coefficients(one)).tolist()
+        effects.append(PlacedEffect(
+            one.effect, one.drive, one.parameters,
+            {c.name: value for c, value in zip(one.effect.coefficients, every, strict=False)}))
+    return base, tuple(effects)
+
+
+def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> ForceModel:
+    """Return the given model with its numbers as coefficients have them, and with effects.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    values: dict[str, Any] = dict(design.given.values)
+    move_numbers(values, design.base, base)
+    move_present(values, design.given, design.base, base)
+    names = list(values.get('effects.active', []))
+    for one in effects:
+        kind = one.effect
+        if kind.name not in names:
+            names.append(kind.name)
+        every = {**kind.from_coefficients(one.coefficients), **one.shape}
+        drive = '' if one.drive is None else f'{design.drives[one.drive]}.'
+        for parameter in kind.parameters:
+            if kind.is_of_one_place and every[parameter.name] == parameter.default:
+                continue  # of all the links or joints that it is not on
+            values[f'effects.{kind.name}.{drive}{parameter.name}'] = within(
+                parameter, every[parameter.name])
+    if names:
+        values['effects.active'] = names
+    return replace(build_model(values), source=design.given.source)
+
+
+def fitted_model(fits: FittedSets, found: CandidateSet) -> ForceModel:
+    """Return the given model with the effects of a set, and its numbers as the fit moves them.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    return model_at(fits.design, *parts_of(fits, found))
+
+
+def squared(fits: FittedSets, found: CandidateSet, forces: Array) -> float:
+    """Return the whitened squares of forces (M, D) under the noise of a set."""
+    total = 0.0
+    for d in fits.regression.drives:
+        white = fits.regression.whitened(found.fit, d, np.nan_to_num(forces[:, d]))
+        total += float(white @ white)
+    return total
+
+
+def linear_prediction(fits: FittedSets, found: CandidateSet) -> Array:
+    """Return the forces that the linear fit predicts, reversals as the model has them, (M, D)."""
+    design = fits.design
+    prediction = design.residuals.model.copy()
+    for column, c in zip(design.base, found.fit.coefficients, strict=False):
+        if not isinstance(column, ReversalShape):
+            for d, row in column.rows.items():
+                prediction[:, d] += c * row
+    for candidate in found.effects:
+        prediction += fits.library.force(found, candidate, prediction.shape)
+    return prediction
+
+
+def linear_residual(fits: FittedSets, found: CandidateSet) -> Array:
+    """Return measured minus what the linear fit predicts, (M, D) [N]."""
+    return fits.regression.residuals.measured - linear_prediction(fits, found)
+
+
+def linear_error(fits: FittedSets, found: CandidateSet) -> float:
+    """Return the rms of `linear_residual` over all drives [N]."""
+    return float(np.sqrt(np.nanmean(np.square(linear_residual(fits, found)))))
+
+
+def exact_forces(design: Design, model: ForceModel) -> Array:
+    """Return the treated forces of a model on the recordings of a design, (M, D) [N].
+
+    Raises
+    ------
+    PprsError
+        Where the model cannot follow them.
+    """
+    return np.concatenate([treated_forces(model, one)['total']
+                           for one in design.reconstructed(model)])
