@@ -80,6 +80,7 @@ setup(
                  'jsonschema>=4',  # ~/status against its schema
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
                  'colcon-common-extensions', 'colcon-ros',
+                 'ament-lint-flake8>=0.14', 'ament-lint-pep257>=0.14',  # as `colcon test` elsewhere
                  'ros-test-msgs==2.3.0',  # an action, which the wheels of `ros` have none of
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.
                  'setuptools<80'],

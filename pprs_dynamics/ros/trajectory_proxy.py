@@ -56,7 +56,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
     def __init__(self, **options: Any) -> None:
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
         parameters = (ACTION, TIMEOUT, *(one for one in parameters_for(drive_count(self))
-                                if one.name in SHARED))
+                                         if one.name in SHARED))
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, lambda: None)
         prepare(self._settings.model)

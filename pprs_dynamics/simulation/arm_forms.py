@@ -43,7 +43,7 @@ class JointMoment:
 
     @property
     def sign(self) -> Array:
-        """v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
+        """Direction v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
         width = STEEPNESS * self.speed
         sign: Array = self.velocity / np.sqrt(self.velocity ** 2 + width ** 2)
         return sign

@@ -16,9 +16,9 @@ SUBSTITUTES = {'…': '...', '±': '+/-', '²': '^2', '°': ' deg', '·': '*', '
 
 
 def displayed(name: object) -> str:
-    """Return a name, of a file or in one, without what cannot be shown or written as UTF-8.
+    r"""Return a name, of a file or in one, without what cannot be shown or written as UTF-8.
 
-    Bytes that are not UTF-8 become `\\xff`, control characters what Python writes for them.
+    Bytes that are not UTF-8 become `\xff`, control characters what Python writes for them.
     """
     return ''.join(character if character.isprintable() else _escaped(character)
                    for character in str(name))

@@ -184,5 +184,3 @@ def test_the_command_is_quiet_in_a_pipe(recordings: Path, reference: Path) -> No
          str(reference), '--workers', '1'], capture_output=True, text=True, check=True)
     assert result.stderr == ''
     assert result.stdout.splitlines()[0].startswith(f'{COUNT} recordings: 0 done')
-
-

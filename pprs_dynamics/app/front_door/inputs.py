@@ -23,7 +23,7 @@ from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+    from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
     from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
 
 File = str | PathLike[str]

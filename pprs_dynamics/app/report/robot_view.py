@@ -147,4 +147,3 @@ def _button(label: str, frames: Any, duration: int) -> dict[str, Any]:
 def _step(label: str, frame: int) -> dict[str, Any]:
     return {'label': label, 'method': 'animate', 'args': [[str(frame)], {
         'frame': {'duration': 0, 'redraw': True}, 'mode': 'immediate'}]}
-

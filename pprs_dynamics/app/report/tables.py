@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 # seldom fill.
 MOST_LINES, LINE = 9, 70
 
+
 def claims_table(claims: Iterable[Claim]) -> Any:
     """Return the paper's claims against what comes out."""
     from rich.markup import escape

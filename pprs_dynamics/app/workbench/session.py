@@ -414,7 +414,7 @@ class Session:
 
         def work(report: Callable[[float], None]) -> Diagnosis:
             found: Diagnosis = run_in_process(diagnosed, original(fits.model), fits.recordings,
-                                         report=report)
+                                              report=report)
             with self._lock:
                 if fits is self.fits:
                     self.diagnosis, self.noise_floors = found, found.noise_floors
@@ -490,7 +490,7 @@ class Session:
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
             found: DesignedMotion = run_in_process(designed, model, self.fits.recordings, duration,
-                                              seed, report=report)
+                                                   seed, report=report)
             self.experiment = found
             return found
         return self._begin('experiment', '', work)

@@ -244,5 +244,3 @@ def held_out_error(
 def price(drives: int, variables: int) -> float:
     """Return what choosing one curve among all costs [2 log odds]."""
     return 2.0 * float(np.log(drives * variables))
-
-

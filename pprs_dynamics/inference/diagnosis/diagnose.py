@@ -323,7 +323,7 @@ class _Answer:
 
     def _within_model_error(self, remainder: Remainder) -> WithinModelError:
         force = self.fits.library.force(remainder.found, remainder.candidate,
-                                          self.design.residuals.measured.shape)
+                                        self.design.residuals.measured.shape)
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
@@ -331,5 +331,3 @@ class _Answer:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.nanmean(values ** 2)))
-
-

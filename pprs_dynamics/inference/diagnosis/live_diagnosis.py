@@ -285,4 +285,4 @@ def change_point(time: Array, gains: Array) -> float | None:
 def _names(answer: Diagnosis, found: FoundEffect) -> frozenset[str]:
     """Return the names under which a window may know an effect: its own and its rivals'."""
     return frozenset({found.name}).union(*(names for names in answer.indistinguishable
-                                if found.name in names))
+                                           if found.name in names))

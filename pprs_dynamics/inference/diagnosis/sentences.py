@@ -158,7 +158,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         left = float(np.sqrt(np.nanmean(diagnosis.remaining ** 2)))
         lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
         above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
-                if left > AT_NOISE * diagnosis.noise_floor else '')
+                 if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)

@@ -227,8 +227,8 @@ class _System:
             tuple(OptionalEffect(
                 name, catalogue()[name].bends_columns,
                 tuple(self._optional(placement) for (of, _), placement in sorted(
-                    self.placements.items(), key=lambda item: item[0][1] or 0) if of == name))
-                for name in self.first_choice),
+                    self.placements.items(), key=lambda item: item[0][1] or 0) if of == name)
+            ) for name in self.first_choice),
             tuple(always), tuple(np.flatnonzero(self.equations.prior.limited).tolist()),
             self.gram, self.side, prices.of_name(), -2 * log(fits.decisions.wrong_sign_odds),
             tuple(prices.of_drives(count + 1) for count in range(len(fits.regression.drives))),

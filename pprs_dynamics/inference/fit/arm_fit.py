@@ -228,7 +228,7 @@ class _Problem:
         step = 1e-6
         before = self._residuals(at, weights)
         J: Array = np.column_stack([(self._residuals(at + step * unit, weights) - before) / step
-                             for unit in np.eye(len(at))])
+                                    for unit in np.eye(len(at))])
         covariance: Array = np.asarray(np.linalg.inv(J.T @ J), dtype=float)
         links = len(point)
         order = np.arange(own.size).reshape(own.shape).T.ravel() + links

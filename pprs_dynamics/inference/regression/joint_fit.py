@@ -126,7 +126,7 @@ class Regression:
             [self.columns[k].rows[d][series.index] for k in self.base_index[d]] + [series.error]))
             for d, series in self.series.items()}
         self.base_products = {d: self.series[d].products(rows, rows)
-                               for d, rows in self.base.items()}
+                              for d, rows in self.base.items()}
         self._products: dict[tuple[Block, Block | None, int], Array] = {}
         self._equations: dict[tuple[int, tuple[Block, ...]], DriveEquations] = {}
         self.error_scale = error_scale or {

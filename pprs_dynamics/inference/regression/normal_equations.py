@@ -226,6 +226,8 @@ class DriveEquations:
 
 @dataclass(frozen=True)
 class Solution:
+    """What the normal equations give: see `JointFit` for the quantities."""
+
     coefficients: Array
     covariance: Array
     deviance: float

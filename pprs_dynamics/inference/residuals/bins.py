@@ -24,6 +24,7 @@ def bin_edges(values: Array, bins: int) -> Array:
 
 
 def populated_edges(values: Array, edges: Array) -> Array:
+    """Return edges (B + 1,) without those between which too few values (N,) lie."""
     kept = [edges[0]]
     least = LEAST_SHARE * len(values)
     ordered = np.sort(values)

@@ -111,4 +111,3 @@ def _variance_of_mean(held: np.typing.NDArray[np.bool_], covariance: Array) -> f
     pairs = np.fft.irfft(power, 2 * n)[:n]
     total = pairs[0] * covariance[0] + 2 * float(pairs[1:] @ covariance[1:])
     return float(max(total, 0.0) / held.sum() ** 2)
-

@@ -219,5 +219,3 @@ def calibrations(fits: FittedSets, found: CandidateSet, widths: Mapping[int, flo
     return calibrated + [
         Calibration(*place_of(design, d), float(before[d]), width, 0.0, _units(design, d)('m/s'))
         for d, width in widths.items() if width != before[d]]
-
-

@@ -138,7 +138,7 @@ class FittedSets:
         if not all(one.is_within(found.coefficients(one)) for one in found.blocks):
             return False
         return all(discrepancy_ratio(self.design, self.regression, self.decisions, found,
-                                      candidate)[0] >= 1 for candidate in found.unknowns)
+                                     candidate)[0] >= 1 for candidate in found.unknowns)
 
     def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:
         """Return columns for what effects leave open, in proportion to their fitted force.
@@ -211,8 +211,7 @@ class FittedSets:
         return found
 
     def _moved(self, found: CandidateSet, longest: float) -> Candidates | None:
-        """Return candidates with shapes after one Gauss-Newton step, by `longest` reaches at most.
-        """
+        """Return candidates after a Gauss-Newton step in shapes, of `longest` reaches at most."""
         slopes = self.slopes(found)
         moved: dict[Component, Component] = {}
         for component in found.blocks:

@@ -82,4 +82,3 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
     # Numbers that are stretched beyond what is known of them cost their share in every block.
     losses += np.array([one.penalty for one in others]) / BLOCKS
     return HeldOut(float(np.sqrt(squares / max(count, 1))), losses)
-

@@ -50,8 +50,7 @@ class DriveLibrary:
 
     @lazy
     def score_test(self) -> ScoreTest[Component]:
-        """All shapes in all variants that the rows of a scan suffice for; computed when asked for.
-        """
+        """All shapes in all variants that the rows of a scan suffice for."""
         entries: list[Entry[Component]] = []
         parts: list[Array] = [np.zeros((0, len(self.series)), dtype=np.float32)]
         first = 0

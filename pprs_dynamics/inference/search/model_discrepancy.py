@@ -21,8 +21,8 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 
 def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisions,
-                       found: CandidateSet, candidate: Candidate,
-                       ) -> tuple[float, tuple[str, ...]]:
+                      found: CandidateSet, candidate: Candidate,
+                      ) -> tuple[float, tuple[str, ...]]:
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
     # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
     exact = isinstance(candidate, EffectCandidate) and not (

@@ -69,7 +69,7 @@ def _around_fitted(
         except PprsError:
             break  # values that no model may have: the linear form is all there is
         if last is search.fits or (not search.is_beyond_point
-                              and abs(moved.cost - kept.cost) < LEAST_CHANGE):
+                                   and abs(moved.cost - kept.cost) < LEAST_CHANGE):
             break
         starts = [one.candidates for one in dict.fromkeys((kept, best))]
         search.release()

@@ -72,7 +72,7 @@ class Scan:
         return [candidates for _, candidates in scored[:count]]
 
     def offers(self, base: CandidateSet, drive: int | None = None,
-                ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
+               ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
         """Return gains less prices of components, by effect; one for each drive."""
         library, fit = self.fits.library, base.fit
         taken = {(one.effect, one.drive) for one in base.blocks}

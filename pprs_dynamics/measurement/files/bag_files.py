@@ -312,7 +312,7 @@ def _ignored(
     others = sorted(blocks.names - set(drives))
     if others:
         findings.append(Defect('ignored_joints', len(others),
-                                f'{topic} also holds {", ".join(others)}'))
+                               f'{topic} also holds {", ".join(others)}'))
     skipped = messages - blocks.samples
     if skipped:
         findings.append(Defect(

@@ -227,5 +227,3 @@ def nested(values: Mapping[str, float]) -> dict[str, Any]:
         else:
             blocks[key] = value
     return blocks
-
-

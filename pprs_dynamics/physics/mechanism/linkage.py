@@ -242,4 +242,3 @@ def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion
         views = samples_last(m)
         _survey(t, views, column_of, gaps[:, None], J[..., None])
     return gaps, J[:, :len(columns)], m
-

@@ -467,5 +467,3 @@ def pose_frame(pose: tuple[float, ...]) -> Frame:
                   [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
                   [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
     return Frame(R, np.array(pose[:3], dtype=float))
-
-

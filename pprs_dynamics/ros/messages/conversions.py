@@ -165,4 +165,3 @@ def doubles(values: Array) -> array[float]:
 def _vector(values: Array) -> Vector3:
     x, y, z = values.tolist()
     return Vector3(x=x, y=y, z=z)
-

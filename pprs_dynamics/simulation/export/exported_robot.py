@@ -278,4 +278,3 @@ def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
     bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
     return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
                      robot.gravity)
-

@@ -182,7 +182,7 @@ def express(model: ForceModel, kind: str) -> Expressed:
             continue
         sorting.add(effect)
     reduced: Model = replace(changed, effects=(*own, *sorting.effects),
-                      reversal=Reversal(AT_ONCE, AT_ONCE))
+                             reversal=Reversal(AT_ONCE, AT_ONCE))
     if kind == URDF:
         reduced = _under_standard_gravity(reduced, sorting, first)
         sorting.left += _loops(model)

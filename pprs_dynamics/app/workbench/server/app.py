@@ -235,7 +235,7 @@ class Api:
         """Answer the ledger alone."""
         steps = [step.to_dict() for step in self.hub.the_session.steps]
         return attached('ledger.json', 'application/json',
-                         json.dumps({'steps': steps}, indent=2).encode())
+                        json.dumps({'steps': steps}, indent=2).encode())
 
     @staticmethod
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
