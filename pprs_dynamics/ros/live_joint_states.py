@@ -35,6 +35,7 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
@@ -66,6 +67,8 @@ class LiveJointStates(Node):
         super().__init__(NAME, **options)
         self.model = model
         self._comparison = LiveComparison(model)
+        # What drives there are, and how the machine calls them, stays.
+        self._states = MeasuredStates(RobotNames.of(model).joints)
         self._lock = threading.Lock()
         self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
         self._residuals: deque[tuple[float, Any]] = deque()
@@ -95,19 +98,19 @@ class LiveJointStates(Node):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            stamp, position, effort = conversions.read_measured(
-                data, RobotNames.of(self.model).joints)
+            samples = self._states.read(data)
         except Rejection as rejection:
             self._counters['rejected'] += 1
             self._trouble = str(rejection)
             return
         with self._lock:
-            self._arrived = time.monotonic()
-            if self._origin is None:
-                self._origin = stamp
-            self._ring.append((stamp, position, effort))
-            self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
-                                  effort)
+            for stamp, position, effort in samples:
+                self._arrived = time.monotonic()
+                if self._origin is None:
+                    self._origin = stamp
+                self._ring.append((stamp, position, effort))
+                self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
+                                      effort)
 
     def _on_error(self, data: bytes) -> None:
         with suppress(Rejection):

@@ -27,9 +27,11 @@ from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.feedforward_settings import FRAME
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS
+from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides
@@ -37,7 +39,6 @@ from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED, publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
-from pprs_dynamics.simulation.export.tree_positions import TreePositions
 from pprs_dynamics.system.plain_text import for_json
 
 PARAMETERS = (
@@ -72,6 +73,7 @@ class MonitorNode(ExplainsRefusals):
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])
         self._names = RobotNames.of(self._settings.model, own['frame_id'])
+        self._states = MeasuredStates(self._names.joints)
         self._begins_anew = self._cannot_begin = False
         self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(REJECTIONS, 0)}
         self._origin: int | None = None
@@ -81,7 +83,7 @@ class MonitorNode(ExplainsRefusals):
         self._residual = publisher(self, JointState, '~/residual')
         self._error = publisher(self, Float64MultiArray, '~/error')
         self._all_joints = publisher(self, JointState, '~/joint_states_full')
-        self._tree: TreePositions | None = None
+        self._joints = AllJoints()
         self._latest: tuple[int, Array] | None = None
         subscription(self, JointState, 'joint_states', self._on_state, raw=True,
                      profile=UNANSWERED)
@@ -99,18 +101,20 @@ class MonitorNode(ExplainsRefusals):
     def _on_state(self, data: bytes) -> None:
         self._counters['received'] += 1
         try:
-            stamp, position, effort = conversions.read_measured(data, self._names.joints)
+            samples = self._states.read(data)
         except Rejection as rejection:
             self._reject(rejection)
             return
-        self._latest = stamp, position
-        if self._cannot_begin:
-            return  # samples would pile up
-        if self._origin is None:
-            self._origin = stamp
-        # Counted from the first stamp: seconds since 1970 would cost digits.
-        self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position, effort)
-        self._windows.push(stamp, position, effort)
+        for stamp, position, effort in samples:
+            self._latest = stamp, position
+            if self._cannot_begin:
+                return  # samples would pile up
+            if self._origin is None:
+                self._origin = stamp
+            # Counted from the first stamp: seconds since 1970 would cost digits.
+            self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
+                                  effort)
+            self._windows.push(stamp, position, effort)
 
     def _draw(self) -> None:
         """Publish where all joints are, for programs that draw the robot."""
@@ -118,19 +122,18 @@ class MonitorNode(ExplainsRefusals):
             return
         (stamp, position), self._latest = self._latest, None
         try:
-            model = self._settings.model
-            self._tree = self._tree or TreePositions(model)
-            joints = self._tree.at(position - model.position_error)
+            found = self._joints.at(self._settings.model, position)
         except PprsError as error:
             self.get_logger().warning(f'not drawn: {error}', throttle_duration_sec=5.0)
             return
-        self._all_joints.publish(conversions.joint_positions(stamp, self._tree.names, joints))
+        if found is not None:
+            self._all_joints.publish(conversions.joint_positions(stamp, *found))
 
     def _judge(self) -> None:
         self._draw()
         try:
             if self._begins_anew:
-                self._cannot_begin, self._tree = True, None
+                self._cannot_begin = True
                 self._comparison.use_model(self._settings.model)
                 self._begins_anew = self._cannot_begin = False
             compared = self._comparison.evaluate()

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -59,6 +59,9 @@ PARAMETERS = (
 )
 
 
+# A node that was kept for longer than this [s] goes on from now instead of catching up.
+LONGEST_CATCH_UP = 0.1
+
 # Of an arm or a robot with loops: what goes with its model, given as to the other nodes.
 OF_JOINTS = tuple(
     replace(one, default=EXCITATION, choices=(EXCITATION,)) if one.name == 'source' else one
@@ -76,7 +79,8 @@ class PlayTrajectoryNode(Node):
         joints = is_mechanism(overrides(self))
         values = declare_own(self, OF_JOINTS if joints else PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
-        self._ahead = values['ahead']
+        self._ahead = round(values['ahead'] * conversions.NANOSECONDS)
+        self._beats = Beats(conversions.NANOSECONDS / self._rate)
         self._motion: Motion
         if joints:
             self._motion, self._write = _joints(self, values)
@@ -93,8 +97,17 @@ class PlayTrajectoryNode(Node):
         steady_timer(self, 1.0, self._look_at_clock)
 
     def _tick(self) -> None:
-        if self._next == 0 and not self._publisher.get_subscription_count():
+        if self._next == 0 and self._round == 1 and not self._publisher.get_subscription_count():
             return
+        now = self.get_clock().now().nanoseconds
+        if not self._beats.is_running:
+            self._beats.start(now)
+        # A timer leaves out what it was late for; the stamps behind it would stay late for good.
+        for beat in self._beats.due(now):
+            self._play(beat)
+
+    def _play(self, beat: int) -> None:
+        """Publish the next message, which belongs to a moment [ns]."""
         if self._next == len(self._motion):
             if self._round == self._repeat:
                 # Leave only when the last message has arrived; but a listener that is stuck must
@@ -106,19 +119,48 @@ class PlayTrajectoryNode(Node):
             self._next, self._round = 0, self._round + 1
         part = self._motion[self._next:self._next + self._points]
         offsets = [round(k * conversions.NANOSECONDS / self._rate) for k in range(len(part))]
-        self._publisher.publish(self._write(part, conversions.time(self._stamp()), offsets))
+        self._publisher.publish(self._write(part, conversions.time(beat + self._ahead), offsets))
         self._next += 1
 
     def _look_at_clock(self) -> None:
         if clock_is_missing(self):
             self.get_logger().warning(MISSING_CLOCK, throttle_duration_sec=5.0)
 
-    def _stamp(self) -> int:
-        """Return the moment that the next pose belongs to [ns], evenly spaced."""
-        if self._next == 0:
-            self._start = self.get_clock().now().nanoseconds + round(
-                self._ahead * conversions.NANOSECONDS)
-        return self._start + round(self._next * conversions.NANOSECONDS / self._rate)
+
+class Beats:
+    """Moments of a stream of messages, evenly spaced, whatever the timer misses.
+
+    Parameters
+    ----------
+    period : float
+        [ns].
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._start, self._count = 0, 0
+        self.is_running = False
+
+    def start(self, now: int) -> None:
+        """Begin, with the first moment now [ns]."""
+        self._start, self._count, self.is_running = now, 0, True
+
+    def due(self, now: int) -> Iterator[int]:
+        """Yield the moments that have come by now [ns].
+
+        After a standstill of more than `LONGEST_CATCH_UP`, and where the clock was set back, the
+        stream goes on from now.
+        """
+        late = now - self._next
+        if late > LONGEST_CATCH_UP * conversions.NANOSECONDS or late < -2 * self._period:
+            self.start(now)
+        while self._next <= now:
+            moment, self._count = self._next, self._count + 1
+            yield moment
+
+    @property
+    def _next(self) -> int:
+        return self._start + round(self._count * self._period)
 
 
 def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[..., Any]]:

@@ -58,5 +58,6 @@ class SetpointQueue:
         self._told = (self._present, following)
         time, setpoint = self._present
         if following is None:
-            return self._control.command(time - lag, setpoint)
-        return self._control.command(time - lag, setpoint, following[1], following[0] - time)
+            return self._control.command(time - lag, setpoint, taken=now - lag)
+        return self._control.command(time - lag, setpoint, following[1], following[0] - time,
+                                     taken=now - lag)

@@ -22,6 +22,9 @@ from pprs_dynamics.simulation.closed_chains import ClosedChains
 # what overflowed are no numbers.
 LARGEST = 1e9
 
+# What was due longer ago [s] tells nothing of the present by its velocity.
+LONGEST_LATE = 0.1
+
 NoteCode = Literal['HOLD', 'REFUSED', 'SATURATED', 'STOPPED']
 
 
@@ -150,12 +153,13 @@ class DriveControl:
         return self._held
 
     def command(self, now: float, setpoint: Setpoint, following: Setpoint | None = None,
-                after: float = 0.0) -> bool:
+                after: float = 0.0, taken: float | None = None) -> bool:
         """Take a command; return False where it is refused.
 
         Parameters
         ----------
         now : float
+            When it holds [s].
         setpoint : Setpoint
         following : Setpoint, optional
             The next one where it is known already: the drives then interpolate (positions by a
@@ -163,12 +167,18 @@ class DriveControl:
             and keep the effort.
         after : float
             How long until then [s].
+        taken : float, optional
+            The present where that is later, of a command that comes late [s]: the timeout counts
+            from then, and the drives go on from where it would have led by then, or within
+            `LONGEST_LATE` of its time.
         """
         reason = self._fault(setpoint)
         if reason:
             self._note(now, 'REFUSED', f'a command was refused: {reason}')
             return False
-        self._since, self._setpoint, self._held = now, setpoint, False
+        self._taken = now if taken is None else taken
+        self._since = max(now, self._taken - LONGEST_LATE)
+        self._setpoint, self._held = setpoint, False
         if following is not None and self._fault(following):
             following = None  # refused when its time comes
         self._following, self._after = following, after
@@ -187,11 +197,11 @@ class DriveControl:
         position, velocity : (D,) arrays
             As measured.
         """
-        age = now - self._since
-        if not self._held and age > self.settings.command_timeout + 1e-9:
-            self._note(now, 'HOLD', f'no command for {age:.3g} s: the drives hold')
+        silence = now - self._taken
+        if not self._held and silence > self.settings.command_timeout + 1e-9:
+            self._note(now, 'HOLD', f'no command for {silence:.3g} s: the drives hold')
             self._hold(position)
-            age = 0.0
+        age = now - self._since
         setpoint = self._setpoint
         wanted = self._nothing if setpoint.effort is None else setpoint.effort
         if self._following is not None and self._after > 0 and self._following.effort is not None:
@@ -235,7 +245,8 @@ class DriveControl:
         return smooth
 
     def _hold(self, position: Array) -> None:
-        self._since, self._held = 0.0, True
+        self._since = self._taken = 0.0
+        self._held = True
         self._following, self._after = None, 0.0
         self._setpoint = Setpoint(np.array(position), self._nothing)
         # Holding against gravity without it would sag by millimetres.

@@ -22,6 +22,7 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.request_reader import reader_for
 from pprs_dynamics.ros.messages.robot_names import RobotNames
@@ -209,5 +210,5 @@ def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
                                 'left_lift_2', 'z_axis']
     assert state.header.frame_id == 'left_base'
     measured = conversions.joint_state(NOW, answer.effort[0], np.arange(6.0), np.zeros(6), names)
-    _, position, _ = conversions.read_measured(serialize_message(measured), names.joints)
-    assert position.tolist() == list(range(6))
+    [found] = MeasuredStates(names.joints).read(serialize_message(measured))
+    assert found.position.tolist() == list(range(6))

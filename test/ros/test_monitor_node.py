@@ -128,7 +128,6 @@ def test_an_effort_that_is_not_a_number_is_no_measurement(monitor: MonitorBench)
 def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survived(
     monitor: MonitorBench,
 ) -> None:
-    monitor.send(200)
     good = conversions.joint_state(START, monitor.effort[0], monitor.position[0],
                                    monitor.position[0])
     for code, change in (('NAMES', {'name': ['a', 'b']}), ('SIZE', {'position': [0.0] * 5}),
@@ -143,6 +142,29 @@ def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survive
     monitor.node._counters['received'] = monitor.sent
     monitor.send(300)
     assert monitor.bench.status[-1]['code'] == 'OK'
+
+
+def test_drives_spread_over_messages_are_compared_as_those_in_one(monitor: MonitorBench) -> None:
+    """Three broadcasters: slides, lifts a quarter of a period later, and a gripper."""
+    monitor.effort[:, 4] += OFFSET
+    for row in range(500):
+        stamp = START + row * 1_000_000_000 // RATE
+        for names, columns, late in ((DRIVES[:3], slice(0, 3), 0),
+                                     (DRIVES[3:], slice(3, 6), 500_000)):
+            message = JointState(name=names, position=monitor.position[row, columns],
+                                 effort=monitor.effort[row, columns])
+            message.header.stamp = conversions.time(stamp + late)
+            monitor.publisher.publish(message)
+        monitor.publisher.publish(JointState(name=['gripper'], position=[0.01]))
+        if row % 20 == 0:
+            assert monitor.arrived(3 * row + 3)
+    assert monitor.arrived(1500)
+    monitor.bench.spin_for(0.2)
+    # The first message, before the others were there, is all that is refused.
+    assert monitor.node._counters['NAMES'] == 1
+    assert monitor.node._counters['compared'] > 300
+    assert monitor.bench.status[-1]['code'] == 'OK'
+    np.testing.assert_allclose(monitor.error[-1].data, [0, 0, 0, 0, OFFSET, 0], atol=0.02)
 
 
 def test_a_node_that_is_kept_for_a_second_misses_no_measurement(monitor: MonitorBench) -> None:
@@ -181,7 +203,10 @@ def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBenc
     joints = monitor.bench.listen(JointState, '/monitor/joint_states_full', 1000)
     assert monitor.bench.connected()
     monitor.send(200)
+    assert monitor.bench.spin_until(lambda: monitor.node._joints._made)  # beside the node
+    monitor.send(200)
     assert monitor.bench.spin_until(lambda: joints)
+    monitor.bench.spin_for(0.2)
     found = dict(zip(joints[-1].name, joints[-1].position, strict=True))
     assert {'hinge_1', 'hinge_2', 'hinge_3', 'ball_1_x', *DRIVES} <= set(found)
     row = (stamps(joints)[-1] - START) * RATE // 1_000_000_000

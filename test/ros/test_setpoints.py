@@ -18,9 +18,11 @@ class Drives:
 
     def __init__(self) -> None:
         self.told: list[tuple[float, Setpoint, Any]] = []
+        self.taken: list[float | None] = []
 
     def command(self, now: float, setpoint: Setpoint, following: Any = None,
-                after: float = 0.0) -> bool:
+                after: float = 0.0, taken: float | None = None) -> bool:
+        self.taken.append(taken)
         self.told.append((now, setpoint, following))
         return True
 
@@ -50,3 +52,4 @@ def test_a_setpoint_is_told_at_its_time_with_the_one_after_it() -> None:
     assert queue.advance(1.1, lag=0.25)
     assert queue.advance(1.6, lag=0.25)
     assert drives.told == [(0.75, first, second), (1.25, second, None)]
+    assert drives.taken == [1.1 - 0.25, 1.6 - 0.25]  # late by 0.1 s each

@@ -20,6 +20,7 @@ from pprs_dynamics.errors import MissingLibraryError, MotionError
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.drive_control import (
+    LONGEST_LATE,
     ControlSettings,
     DriveControl,
     Setpoint,
@@ -246,6 +247,22 @@ def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
     for time in np.arange(0.0, period + 0.0015, step):
         effort = control.effort(time, np.full(6, 0.1 + speed * time), np.full(6, speed))
         np.testing.assert_allclose(effort, 0.0, atol=1e-9)  # a goal at rest costs up to 1.2 N
+
+
+@pytest.mark.parametrize('late', [0.05, 0.15, 1e4])
+def test_setpoints_that_come_late_are_followed_as_long_as_they_come(late: float) -> None:
+    speed, period, model = 0.2, 0.01, DriveModel.load()
+    control = DriveControl(model.limits, WeightModel(model.values), ControlSettings(), period)
+    led = min(late, LONGEST_LATE) * speed  # its velocity leads on from its own time
+    for now in np.arange(late, late + 0.5, period):
+        goal = np.full(6, 0.1 + speed * (now - late))
+        assert control.command(now - late, Setpoint(goal, np.full(6, speed)), taken=now)
+        np.testing.assert_allclose(control.effort(now, goal + led, np.full(6, speed)), 0.0,
+                                   atol=1e-6)
+    assert not control.notes
+    control.effort(now + 0.11, goal, np.zeros(6))
+    assert [note.code for note in control.notes] == ['HOLD']
+    assert 'no command for 0.11 s' in control.notes[0].message
 
 
 # Hidden effects.

@@ -23,7 +23,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import BASE, RobotNames
 
@@ -117,21 +116,6 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False,
     if not np.all(np.isfinite(found)):
         raise Rejection('NON_FINITE', f'{field} is {found.tolist()}, must be finite')
     return found
-
-
-def read_measured(
-    data: bytes, drives: Sequence[str] = DRIVES,
-) -> tuple[int, Array, Array]:
-    """Return stamp [ns], positions and efforts, NaN where unknown, of a JointState's bytes.
-
-    Raises
-    ------
-    Rejection
-        As `message_in` and `read_drives`.
-    """
-    message = message_in(data, JointState)
-    return (nanoseconds(message.header.stamp), read_drives(message, 'position', drives=drives),
-            read_drives(message, 'effort', may_be_nan=True, drives=drives))
 
 
 def nanoseconds(moment: Time | Duration) -> int:
