@@ -11,10 +11,11 @@ ended by itself.
 from __future__ import annotations
 
 import os
+import signal
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from threading import Thread
 from typing import Any, NamedTuple
 
@@ -92,6 +93,7 @@ class DiagnosisWorker:
         """Begin with a window; with another model than before all is forgotten."""
         if self._process is None or not self._process.is_alive():
             self.close()
+            _start_tracker()
             context = get_context('spawn')
             self._pipe, theirs = context.Pipe()
             self._process = context.Process(target=_work, args=(theirs,), daemon=True)
@@ -130,6 +132,19 @@ class DiagnosisWorker:
                 self._sending.join()
             self._pipe.close()
         self._process, self.busy = None, False
+
+
+def _start_tracker() -> None:
+    """Start what multiprocessing has beside its processes, without what it does to signals.
+
+    It leaves SIGINT and SIGTERM unblocked in this thread, where they would end the node without a
+    last word: `StopSignals` waits for them in another.
+    """
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
 def _send(pipe: Any, window: Any) -> None:

@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -174,3 +177,27 @@ def waited_for(worker: DiagnosisWorker) -> dict[str, Any]:
             return answer
         time.sleep(0.05)
     raise AssertionError('no answer')
+
+
+NODE = """
+import os, signal
+import numpy as np
+from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow
+if __name__ == '__main__':
+    signals = {signal.SIGINT, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    worker = DiagnosisWorker()
+    worker.submit({}, '', StreamWindow(np.zeros(1, dtype=np.int64), np.zeros((1, 6)),
+                                       np.zeros((1, 6))))
+    os.kill(os.getpid(), signal.SIGTERM)
+    print(signal.sigtimedwait(signals, 5).si_signo == signal.SIGTERM)
+    worker.close()
+"""
+
+
+def test_a_node_with_a_diagnosis_still_waits_for_its_stop_signals(tmp_path: Path) -> None:
+    """Unblocked by multiprocessing, SIGTERM would end the node on the spot, without a last word."""
+    script = tmp_path / 'node.py'
+    script.write_text(NODE)
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert ended.stdout == 'True\n', ended

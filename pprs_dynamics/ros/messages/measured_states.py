@@ -97,6 +97,7 @@ class MeasuredStates:
         self._joints, self._clock = tuple(joints), clock
         self._heard = dict.fromkeys(joints, -np.inf)
         self._whole = -np.inf  # when a message with all drives came last
+        self._read_last = clock()
         self._forget()
 
     def read(self, data: bytes) -> list[Measured]:
@@ -110,6 +111,11 @@ class MeasuredStates:
         """
         message = message_in(data, JointState)
         now, stamp = self._clock(), nanoseconds(message.header.stamp)
+        if (silent := now - self._read_last) > PATIENCE:
+            # Nothing came, or nobody read: this tells nothing of single drives.
+            self._heard = {joint: heard + silent for joint, heard in self._heard.items()}
+            self._whole += silent
+        self._read_last = now
         names = set(message.name)
         present = [joint for joint in self._joints if joint in names]
         absent = [joint for joint in self._joints
