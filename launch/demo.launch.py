@@ -8,13 +8,14 @@
     ros2 launch pprs_dynamics demo.launch.py model:=/path/share/pprs_dynamics/config/hexapod.yaml
 """
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
+from pprs_dynamics.system.input_files import require_file
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -30,9 +31,15 @@ def generate_launch_description() -> LaunchDescription:
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
     common = {'package': 'pprs_dynamics', 'namespace': given['namespace'], 'output': 'screen'}
+
+    def check(context: LaunchContext) -> None:
+        # Launch would leave a missing file out: that is the paper's robot.
+        require_file(given['model'].perform(context))
+
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=value, description=text)
           for name, (value, text) in arguments.items()),
+        OpaqueFunction(function=check),
         Node(executable='simulated_robot', parameters=[given['model'], {
             'hidden_effects': ParameterValue(given['hidden_effects'], value_type=list[str])}],
              **common),

@@ -15,6 +15,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
+from pprs_dynamics.system.input_files import require_file
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -29,7 +30,11 @@ def generate_launch_description() -> LaunchDescription:
     given = {name: LaunchConfiguration(name) for name in ('urdf', *arguments)}
 
     def monitor(context: LaunchContext) -> list[Node]:
-        own = {'joint_prefix': given['prefix']} if given['prefix'].perform(context) else {}
+        # Launch would leave a missing file out: that is the paper's robot.
+        require_file(given['model'].perform(context))
+        own = {}
+        if given['prefix'].perform(context):
+            own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         return [Node(package='pprs_dynamics', executable='monitor', output='screen',
                      parameters=[given['model'], own],
                      remappings=[('joint_states', given['joint_states'])])]

@@ -10,9 +10,11 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
+from pprs_dynamics.system.input_files import require_file
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -31,9 +33,11 @@ def generate_launch_description() -> LaunchDescription:
     given = {name: LaunchConfiguration(name) for name in arguments}
 
     def nodes(context: LaunchContext) -> list[Node]:
+        # Launch would leave a missing file out: that is the paper's robot.
+        require_file(given['model'].perform(context))
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):
-            own['joint_prefix'] = given['prefix']
+            own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         parameters = [given['model'], own]
         return [
             Node(package='pprs_dynamics', executable='feedforward', namespace=given['namespace'],

@@ -13,6 +13,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
+from pprs_dynamics.system.input_files import require_file
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -31,9 +32,11 @@ def generate_launch_description() -> LaunchDescription:
     given = {name: LaunchConfiguration(name) for name in arguments}
 
     def nodes(context: LaunchContext) -> list[Node]:
+        # Launch would leave a missing file out: that is the paper's robot.
+        require_file(given['model'].perform(context))
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):
-            own['joint_prefix'] = given['prefix']
+            own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         if given['diagnose_every'].perform(context):
             own['diagnose_every'] = ParameterValue(given['diagnose_every'], value_type=float)
         return [Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],

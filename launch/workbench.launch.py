@@ -22,9 +22,12 @@ def generate_launch_description() -> LaunchDescription:
             description='model file, with a path'),
         DeclareLaunchArgument('topic', default_value='joint_states',
                               description='of the measurements'),
+        DeclareLaunchArgument('namespace', default_value='/',
+                              description='of topic, monitor and feedforward'),
         DeclareLaunchArgument('port', default_value='8080', description='of the workbench'),
         ExecuteProcess(cmd=[pprs, 'workbench', '--live', '--no-browser', '--model',
                             LaunchConfiguration('model'), '--live-topic',
-                            LaunchConfiguration('topic'), '--port',
+                            LaunchConfiguration('topic'), '--namespace',
+                            LaunchConfiguration('namespace'), '--port',
                             LaunchConfiguration('port')], output='screen'),
     ])
