@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
-from node_bench import bench
+from node_bench import bench, overrides
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -286,3 +286,19 @@ def test_what_only_counts_at_the_start_is_refused_while_the_node_runs(
         assert 'stay as it was when the node started' in result.reason
         if made.has_parameter(name):  # the same value again is no change
             assert made.set_parameters([made.get_parameter(name)])[0].successful
+
+
+@pytest.mark.parametrize(('node', 'name', 'value'), [
+    (FeedforwardNode, 'window', 0.3), (FeedforwardNode, 'hidden_effects', ['payload_mass']),
+    (MonitorNode, 'command_timeout', 5.0), (MonitorNode, 'timeout_action', 'zero')])
+def test_a_change_for_another_node_is_refused_as_nothing_would_come_of_it(
+    node: Any, name: str, value: Any,
+) -> None:
+    with bench() as running:
+        # A model file may hold parameters of all nodes.
+        made = running.add(node, parameter_overrides=overrides(**{name: value}))
+        other = 0.4 if isinstance(value, float) else 'silent' if name.endswith('action') else ['x']
+        result, = made.set_parameters([Parameter(name, value=other)])
+        assert not result.successful
+        assert f'{made.get_name()} has no such parameter' in result.reason
+        assert made.set_parameters([Parameter(name, value=value)])[0].successful

@@ -145,3 +145,11 @@ def test_what_breaks_a_rule_in_a_part_is_refused_and_the_rest_goes_on(robot: Rob
     assert len(robot.said) == 2
     assert robot.said[1].startswith('NON_FINITE')
     robot.check([k * PERIOD for k in range(6) if k != 3])
+
+
+def test_numbers_that_no_drive_has_are_refused_or_no_measurement(robot: Robot) -> None:
+    robot.send(JOINTS, 0, position=[0.0, 1e308, 0.0])
+    assert robot.said == ['WORKSPACE: position is [0.0, 1e+308, 0.0], must be between -1e+09 and '
+                          '1e+09']
+    robot.send(JOINTS, PERIOD, effort=[1.0, -1e300, float('inf')])
+    np.testing.assert_array_equal(robot.read[0].effort, [1.0, np.nan, np.nan])

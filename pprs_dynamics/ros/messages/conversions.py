@@ -29,6 +29,7 @@ from pprs_dynamics.ros.messages.robot_names import BASE, RobotNames
 PLATFORM = 'platform'
 PAPER = RobotNames(DRIVES, BASE)
 NANOSECONDS = 1_000_000_000
+LARGEST = 1e9  # [m, N, ...]: no drive's, and squares of what is far larger overflow
 LATEST_SECOND = 2 ** 31 - 1
 
 
@@ -100,7 +101,7 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False,
     ------
     Rejection
         Where a drive is missing, the field's length is not that of `name`, or a value is not
-        finite.
+        finite, or is beyond `LARGEST`.
     """
     names, values = list(message.name), getattr(message, field)
     missing = [drive for drive in drives if drive not in names]
@@ -111,10 +112,13 @@ def read_drives(message: JointState, field: str, may_be_nan: bool = False,
                         f'{len(names)}, as name')
     found = np.array([values[names.index(drive)] for drive in drives], dtype=float)
     if may_be_nan:
-        # Not a number, and no measurement either.
-        return np.where(np.isfinite(found), found, np.nan)
+        # Not a number, or none that a drive has, and no measurement either.
+        return np.where(np.abs(found) <= LARGEST, found, np.nan)
     if not np.all(np.isfinite(found)):
         raise Rejection('NON_FINITE', f'{field} is {found.tolist()}, must be finite')
+    if np.any(np.abs(found) > LARGEST):
+        raise Rejection('WORKSPACE', f'{field} is {found.tolist()}, must be between {-LARGEST:g} '
+                        f'and {LARGEST:g}')
     return found
 
 

@@ -18,6 +18,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     KEYS,
     NAMES,
+    NODE_KEYS,
     NODE_PREFIXES,
     drives_key,
     is_mechanism,
@@ -35,6 +36,7 @@ from pprs_dynamics.ros.node.parameters import (
 )
 
 NodeModel = DriveModel | ArmModel
+OF_OTHERS = NODE_KEYS - {'use_sim_time', 'start_type_description_service'}  # those are ROS 2's
 
 
 class Checks(Protocol):
@@ -122,7 +124,8 @@ class ModelParameters:
         now = self._staying(model, own)
         for name, before in self._stays.items():
             if now[name] != before:
-                raise ModelError(name, now[name], f'stay as it was when the node started: {before}')
+                raise ModelError(name, now[name], 'stay as it was when the node started: '
+                                 f'{"empty" if before == "" else before}')
         model.initial_state()  # an effect that cannot even begin is refused
         return model, own
 
@@ -138,10 +141,25 @@ class ModelParameters:
         if are_of_topics(changes):
             return SetParametersResult(successful=True)
         try:
+            self._refuse_foreign(changes)
             self._checked = self._validated(changes)
         except PprsError as error:
             return SetParametersResult(successful=False, reason=with_hint(error))
         return SetParametersResult(successful=True)
+
+    def _refuse_foreign(self, changes: Iterable[Parameter]) -> None:
+        """Refuse new values for other nodes, which a model file may hold: nothing would come of it.
+
+        Raises
+        ------
+        ModelError
+        """
+        own, before = {each.name for each in self._declared}, current_values(self._node)
+        for change in changes:
+            value = current_values(self._node, [change]).get(change.name)
+            if change.name in OF_OTHERS - own and before.get(change.name) != value:
+                raise ModelError(change.name, value, 'be set on the node that has it: '
+                                 f'{self._node.get_name()} has no such parameter')
 
     def _apply(self, changes: list[Parameter]) -> None:
         if are_of_topics(changes):
