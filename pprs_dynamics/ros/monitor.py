@@ -149,11 +149,12 @@ class MonitorNode(ExplainsRefusals):
         self._publish(compared)
         running = self._comparison.running_error()
         self._error.publish(Float64MultiArray(data=running.tolist()))
-        worst = float(np.nanmax(running)) if np.isfinite(running).any() else float('nan')
         self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
                                        for value in running.tolist()]
         unit = common_effort(self._settings.model.units)
-        text = f'largest running error {worst:.4g} {unit}'
+        text = (f'largest running error {np.nanmax(running):.4g} {unit}'
+                if np.isfinite(running).any() else
+                'no running error: efforts are not measured, or all joints stand')
         if self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
         else:

@@ -45,13 +45,20 @@ def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
     folder: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(folder)
-    assert main(['compare', 'run.csv', '--mcap', 'out.mcap']) == 0
+    assert main(['compare', 'run.csv', '--mcap', 'out.mcap', '--json', 'said.json']) == 0
     found: dict[str, list[tuple[int, np.ndarray]]] = {}
+    said = []
     with AnyReader([folder / 'out.mcap']) as reader:
         for connection, _, data in reader.messages():
             message = reader.deserialize(data, connection.msgtype)
+            if connection.topic == '/findings':
+                said.append(message.msg)
+                continue
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             found.setdefault(connection.topic, []).append((stamp, message.effort))
+    content = json.loads((folder / 'said.json').read_text())
+    assert said == [content['verdict'], *(each['text'] for each in content['where'])]
+    assert len(said) > 1
     parts = {topic for topic in found if topic.startswith('/parts/')}
     assert parts == {'/parts/rigid_body', '/parts/active_friction', '/parts/passive_friction'}
     stamps = [stamp for stamp, _ in found['/measured']]

@@ -167,6 +167,14 @@ def test_drives_spread_over_messages_are_compared_as_those_in_one(monitor: Monit
     np.testing.assert_allclose(monitor.error[-1].data, [0, 0, 0, 0, OFFSET, 0], atol=0.02)
 
 
+def test_without_measured_efforts_the_status_says_so_in_words(monitor: MonitorBench) -> None:
+    monitor.effort[:] = np.nan
+    monitor.send(300)
+    assert monitor.bench.spin_until(
+        lambda: 'efforts are not measured' in monitor.bench.status[-1]['message'])
+    assert np.isnan(monitor.error[-1].data).all()
+
+
 def test_a_node_that_is_kept_for_a_second_misses_no_measurement(monitor: MonitorBench) -> None:
     for row in range(RATE):
         monitor.publisher.publish(conversions.joint_state(

@@ -114,6 +114,7 @@ class ComparisonResult(Result):
 
         report, bag = progress or (lambda what, share: None), Path(path)
         write_comparison(bag, self.inputs.model, self.inputs.fitted,
+                         [self.verdict, *(statement.text for statement in self.where)],
                          lambda share: report('bag', share))
         written = [bag]
         for suffix, layout in (('.plotjuggler.xml', plotjuggler_layout),

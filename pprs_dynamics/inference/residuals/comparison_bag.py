@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A comparison as a bag: measured effort, model, its parts and residual at the measured stamps."""
+"""A comparison as a bag: measured effort, model, its parts and residual at the measured stamps.
+
+What there is to say of it in words stands at its beginning.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +25,12 @@ from pprs_dynamics.measurement.files.samples import Samples
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MEASURED, MODEL, RESIDUAL, PARTS = '/measured', '/model', '/residual', '/parts'
+FINDINGS = '/findings'
 
 
 def write_comparison(
     path: Path, model: ForceModel, recordings: Sequence[Recording],
-    progress: Callable[[float], None] = lambda share: None,
+    findings: Sequence[str], progress: Callable[[float], None] = lambda share: None,
 ) -> int:
     """Write joint states of measured and modelled efforts, and return how many samples.
 
@@ -37,6 +41,8 @@ def write_comparison(
     model : ForceModel
     recordings : sequence of Recording
         One after the other, at their own stamps.
+    findings : sequence of str
+        What the comparison says, a message each.
     progress : callable, optional
         Called with the share that is done.
 
@@ -53,7 +59,8 @@ def write_comparison(
                 recording.drives, reconstruction.time, reconstruction.position,
                 reconstruction.velocity, effort, recording.epoch))
         progress((number + 0.5) / len(recordings))
-    write_bag(path, {name: _joined(parts) for name, parts in found.items()})
+    write_bag(path, {name: _joined(parts) for name, parts in found.items()},
+              {FINDINGS: findings})
     progress(1.0)
     return sum(len(part.time) for part in found[MEASURED])
 

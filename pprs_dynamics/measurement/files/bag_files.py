@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rosbags.rosbag2 import Reader
 
 MESSAGE_TYPE = JOINT_STATE
+LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
 CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
 # First bytes of a bare storage file, and the suffix by which rosbags knows it.
@@ -129,10 +130,12 @@ def _merged(path: Path, reader: Reader, connections: list[Connection], drives: t
         f'rosbag2, {topics}', (*findings, *merged.findings))
 
 
-def write_bag(path: Path, topics: Mapping[str, Samples]) -> None:
+def write_bag(path: Path, topics: Mapping[str, Samples],
+              texts: Mapping[str, Sequence[str]] | None = None) -> None:
     """Write a bare .mcap or .db3 file by the suffix, or else a bag directory with MCAP.
 
-    Every topic gets joint states. Stamps are rounded to 1 ns; they stand in the headers.
+    Every topic of `topics` gets joint states. Stamps are rounded to 1 ns; they stand in the
+    headers. Those of `texts` get rcl_interfaces/Log, at the first stamp of the joint states.
 
     Raises
     ------
@@ -150,11 +153,11 @@ def write_bag(path: Path, topics: Mapping[str, Samples]) -> None:
                 f'{samples.epoch + samples.time.max():.6g} s')
     if path.suffix not in STORAGE:
         with new_folder(path) as folder:
-            _write_directory(folder, topics, '.mcap')
+            _write_directory(folder, topics, texts or {}, '.mcap')
         return
     target = writable_file(path)
     with scratch_folder(target) as scratch:
-        _write_directory(scratch / 'bag', topics, path.suffix)
+        _write_directory(scratch / 'bag', topics, texts or {}, path.suffix)
         (scratch / 'bag' / f'bag{path.suffix}').replace(target)
 
 
@@ -163,18 +166,30 @@ def _stamps(samples: Samples) -> Indices:
     return stamps
 
 
-def _write_directory(path: Path, topics: Mapping[str, Samples], suffix: str) -> None:
+def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[str, Sequence[str]],
+                     suffix: str) -> None:
     _require_rosbags('writing rosbag2 files')
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
+    typestore = get_typestore(Stores.ROS2_KILTED)
+    starts = [int(_stamps(samples).min()) for samples in topics.values() if len(samples.time)]
     with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
+        for topic, sentences in texts.items():
+            connection = writer.add_connection(topic, LOG, typestore=typestore)
+            first = min(starts, default=0)
+            stamp = typestore.types['builtin_interfaces/msg/Time'](*divmod(first, 10**9))
+            for sentence in sentences:
+                message = typestore.types[LOG](
+                    stamp=stamp, level=LOG_INFO, name=topic.strip('/'), msg=sentence, file='',
+                    function='', line=0)
+                writer.write(connection, first, typestore.serialize_cdr(message, LOG))
         for topic, samples in topics.items():
             stamps = _stamps(samples)
             # A bag is read in the order of recording: it must not follow a clock that is set back.
             recorded = np.maximum.accumulate(stamps)
             connection = writer.add_connection(
-                topic, MESSAGE_TYPE, typestore=get_typestore(Stores.ROS2_KILTED))
+                topic, MESSAGE_TYPE, typestore=typestore)
             for start in range(0, len(stamps), BLOCK):
                 part = slice(start, start + BLOCK)
                 velocity = None if samples.velocity is None else samples.velocity[part]
