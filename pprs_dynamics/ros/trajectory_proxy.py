@@ -12,6 +12,7 @@ goes, or falls silent, in the middle of it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -55,8 +56,10 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
-        parameters = (ACTION, TIMEOUT, *(one for one in parameters_for(drive_count(self))
-                                         if one.name in SHARED))
+        # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
+        parameters = (ACTION, TIMEOUT, *(
+            replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
+            for one in parameters_for(drive_count(self)) if one.name in SHARED))
         own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, lambda: None)
         prepare(self._settings.model)
@@ -131,7 +134,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def _request(self, model: Any, goal: Any) -> TrajectoryRequest:
         now = self.get_clock().now().nanoseconds
-        missing = self._settings.own['missing_derivatives'] or SPLINE
+        missing = self._settings.own['missing_derivatives']
         if not isinstance(model, DriveModel):
             return reader_for(model).read(serialize_message(goal.trajectory), now, 0.0, missing)
         if not goal.trajectory.points:
