@@ -19,8 +19,7 @@ from pprs_dynamics.inference.search.estimates import Calibration, Estimate, cali
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import relinearised
-from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.inference.search.relinearisation import relinearised, settled
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -112,13 +111,13 @@ def fit_effect(
     evidence = without.cost - found.cost
     last, found = relinearised(fits, found)
     report(0.8)
+    after = hold_out(last, found)
+    final_set = settled(last, found)
+    last, found = final_set.fits, final_set.found
     candidate = found.effects[0]
     said = estimate(last, found, candidate)
-    after = hold_out(last, found)
-    widths = estimate_widths(last, found)
-    moved = [one for one in calibrations(last, found, widths) if _is_move(design, one)]
-    fitted = with_widths(fitted_model(last, found), last.design, widths)
-    final = _with_numbers(fitted, model, moved)
+    moved = [one for one in calibrations(last, found, final_set.widths) if _is_move(design, one)]
+    final = _with_numbers(final_set.model, model, moved)
     prefix = f'effects.{request.name}.'
     parameters = {key: Estimate(float(final.values[prefix + key]), one.std, one.unit)
                   for key, one in said.parameters.items() if prefix + key in final.values}

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -29,18 +29,25 @@ from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.estimates import Calibration, calibrations, estimate
-from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_error
+from pprs_dynamics.inference.search.estimates import (
+    Calibration,
+    Estimates,
+    averaged,
+    calibrations,
+    estimate,
+)
+from pprs_dynamics.inference.search.fitted_model import exact_forces, linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.ranking import Ranking, select
-from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.inference.search.relinearisation import SettledSet, settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 MOST_SETS = 8  # that are told with their costs
+MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
 @dataclass(frozen=True)
@@ -194,10 +201,10 @@ class _Answer:
         first = self.ranking.first.design
         unconfirmed: list[FoundEffect] = []
         while True:
-            widths = estimate_widths(self.fits, self.kept)
-            adopted = self._model(self.kept, widths)
+            final = settled(self.fits, self.kept)
+            adopted = final.model
             remaining = first.residuals.measured - exact_forces(self.design, adopted)
-            effects = self._effects(adopted, remaining)
+            effects = self._effects(final, adopted, remaining)
             weak = [one for one in effects if not one.is_confirmed]
             if not weak:
                 break
@@ -214,7 +221,7 @@ class _Answer:
         is_left = unconfirmed and not effects and self._is_above_noise(remaining)
         verdict = ('unknown' if depends or is_left else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
-        moved = [one for one in calibrations(fits, self.kept, widths)
+        moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
         return Diagnosis(
             verdict, tuple(effects), sets, tuple(unconfirmed), self._candidates(),
@@ -225,11 +232,8 @@ class _Answer:
             float(np.sqrt(np.mean(np.square(list(floors.values()))))),
             'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
-    def _model(self, found: CandidateSet, widths: Mapping[int, float]) -> ForceModel:
-        """Return the fitted model of a set, where friction turns over in widths [m/s] by drive."""
-        return with_widths(fitted_model(self.fits, found), self.design, widths)
-
-    def _effects(self, adopted: ForceModel, remaining: Array) -> list[FoundEffect]:
+    def _effects(self, final: SettledSet, adopted: ForceModel, remaining: Array,
+                 ) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
         fits, ordered, steps = self.fits, self.ranking.order, self.ranking.path
         if not ordered:
@@ -238,25 +242,31 @@ class _Answer:
                   *(linear_error(fits, step) for step in steps[1:-1]), _rms(remaining)]
         if self.validate:
             given = self.ranking.first.design.given
-            models = [given, *(self._model(one, estimate_widths(fits, one))
-                               for one in steps[1:-1]), adopted]
+            models = [given, *(settled(fits, one).model for one in steps[1:-1]), adopted]
             held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
         else:
             # Nothing is fitted in the model as given: all of its error is held out.
             held_out = [errors[0], *(hold_out(fits, step).error for step in steps[1:])]
-        near = self.ranking.near(self.decisions.rival_margin)
         found = []
         for k, candidate in enumerate(ordered):
-            said = estimate(fits, self.kept, candidate, near)
+            last = next(c for c in final.found.effects if c.effect is candidate.effect)
+            said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                fits.library.force(self.kept, candidate, remaining.shape), said.at_bound,
+                final.fits.library.force(final.found, last, remaining.shape), said.at_bound,
                 self.ranking.shares[k],
                 errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(k)))))
         return found
+
+    def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
+        """Return what sets that are nearly as good say of an effect, and what they cost more."""
+        near = self.ranking.near(self.decisions.rival_margin)[:MOST_AVERAGED]
+        return [(one.cost - self.kept.cost, estimate(self.fits, one, same))
+                for one in near if one is not self.kept
+                for same in one.effects if same.effect is candidate.effect]
 
     def _is_predicted(self, k: int) -> bool:
         """Return whether held-out blocks are predicted better for certain with an effect more."""

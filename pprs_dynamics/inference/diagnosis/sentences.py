@@ -269,7 +269,7 @@ def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
     rows = []
     for key, estimate in found.parameters.items():
         drive, name = found.effect.place_and_parameter(key)
-        if estimate.value or estimate.std:
+        if estimate.value:
             rows.append((drive, known[name], estimate))
     return sorted(rows, key=lambda row: order.index(row[0]))
 

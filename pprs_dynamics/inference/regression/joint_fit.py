@@ -231,6 +231,15 @@ class Regression:
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
 
+    def stated(self, fit: JointFit, blocks: Sequence[Block]) -> JointFit:
+        """Return a fit with further blocks at its noise, its covariance as it is to be told.
+
+        See `NormalEquations.uncertainty`.
+        """
+        found = self.at((*fit.blocks, *blocks), fit.amplitudes)
+        return replace(found, covariance=NormalEquations(self, found.blocks).uncertainty(
+            found.spectra))
+
     def held(self, fit: JointFit, index: Integers, values: Array) -> JointFit:
         """Return a fit with some coefficients (k,) as given, the others fitted beside them.
 

@@ -255,16 +255,34 @@ class NormalEquations:
                 np.arange(self.places[one].start, self.places[one].stop) for one in acting)]))
             self._pairs.append(np.add.outer(place * self.indices[-1], self.indices[-1]).ravel())
 
-    def solve(self, spectra: Array, counts: Array) -> Solution:
-        """Return the solution under noise spectra (D, B)."""
+    def weighted(self, weights: Array) -> tuple[Array, Array]:
+        """Return X^T S^-1 X and X^T S^-1 y of all drives, for weights (D, B)."""
         gram, side = np.zeros_like(self.prior.precision), np.zeros(len(self.prior.mean))
-        weights = 1 / spectra
         for k, (drive, index, pairs) in enumerate(zip(
                 self.drives, self.indices, self._pairs, strict=True)):
             products, with_error = drive.weighted(weights[k])
             gram.reshape(-1)[pairs] += products.reshape(-1)
             side[index] += with_error
-        found = self.prior.posterior(gram, side)
+        return gram, side
+
+    def uncertainty(self, spectra: Array) -> Array:
+        """Return the covariance (P, P) that is told of coefficients, under noise spectra (D, B).
+
+        A tolerance +-a says nothing of where within it a number lies: a variance of a^2 / 3 (Guide
+        to the Expression of Uncertainty in Measurement, 4.3.7). The fit takes less, so that few
+        lie beyond.
+        """
+        precision = self.prior.precision * np.where(
+            np.diag(self.prior.limited), 3 / DEVIATIONS ** 2, 1.0)
+        H = self.weighted(1 / spectra)[0] + precision
+        scale = 1 / np.sqrt(np.diag(H))
+        covariance: Array = np.linalg.inv(H * np.outer(scale, scale)) * np.outer(scale, scale)
+        return covariance
+
+    def solve(self, spectra: Array, counts: Array) -> Solution:
+        """Return the solution under noise spectra (D, B)."""
+        weights = 1 / spectra
+        found = self.prior.posterior(*self.weighted(weights))
         squares = np.stack([drive.left(found.coefficients[index])
                             for drive, index in zip(self.drives, self.indices, strict=True)])
         leverage = np.stack([

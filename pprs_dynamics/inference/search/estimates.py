@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,14 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ModelNumber, PresentCoefficient, within
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.reversal_widths import place_of
+from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-MOST_AVERAGED = 4  # further sets that estimates are averaged over
+TOLD = 0.5  # of a coefficient's prior variance, below which the recordings tell it
 
 
 @dataclass(frozen=True)
@@ -73,13 +75,11 @@ class Estimates:
     at_bound: tuple[str, ...]
 
 
-def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
-             near: Sequence[CandidateSet] = ()) -> Estimates:
+def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate) -> Estimates:
     """Return the parameters of an effect, in the values that the set has.
 
-    Their uncertainty is that of the whole fit: shapes take part by their derivatives, priors and
-    noise as they are, and sets that are nearly as good by exp(-cost / 2), with what they say
-    differently.
+    Their uncertainty is that of the whole fit: shapes take part by their derivatives, tolerances
+    and noise as they are.
 
     Parameters
     ----------
@@ -87,35 +87,10 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
     found : CandidateSet
     candidate : EffectCandidate
         Of the set.
-    near : sequence of CandidateSet
-        Of the same fits.
     """
-    own, bound = _of_set(fits, found, candidate)
-    weights = [1.0]
-    mixed: dict[str, list[tuple[float, float]]] = {
-        key: [(one.value, one.std)] for key, one in own.items()}
-    for other in sorted(near, key=lambda one: one.cost)[:MOST_AVERAGED]:
-        same = next((c for c in other.effects if c.effect is candidate.effect), None)
-        if same is None or other is found:
-            continue
-        weights.append(float(np.exp(-0.5 * max(other.cost - found.cost, 0.0))))
-        said, _ = _of_set(fits, other, same)
-        for key, one in own.items():
-            there = said.get(key, one)
-            mixed[key].append((there.value, there.std))
-    share = np.array(weights) / sum(weights)
-    parameters = {}
-    for key, one in own.items():
-        values, stds = np.array(mixed[key]).T
-        spread = float(np.sqrt(share @ (stds ** 2 + (values - one.value) ** 2)))
-        parameters[key] = Estimate(one.value, spread, one.unit)
-    return Estimates(parameters, bound)
-
-
-def _of_set(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
-            ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
     slopes = dict(fits.slopes(found))
-    fit = fits.regression.at((*found.fit.blocks, *slopes.values()), found.fit.amplitudes)
+    elsewhere = _told_elsewhere(fits, found, candidate)
+    fit = fits.regression.stated(found.fit, [*slopes.values(), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
     for component in candidate.components:
@@ -127,11 +102,81 @@ def _of_set(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
         some, held = _of_component(fits, component, c, covariance)
         parameters.update(some)
         bound += held
-    return parameters, tuple(bound)
+    for key, one in _left_out(fits, found, candidate).items():
+        parameters[key] = replace(parameters[key], std=one.std)
+    return Estimates(parameters, tuple(bound))
+
+
+def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:
+    """Return estimates whose uncertainty has what other sets say differently.
+
+    Parameters
+    ----------
+    own : Estimates
+        Their values stay.
+    others : sequence of (float, Estimates)
+        Each with what its set costs more, which weighs it by exp(-cost / 2).
+    """
+    weights = np.array([1.0, *(np.exp(-0.5 * max(more, 0.0)) for more, _ in others)])
+    share = weights / weights.sum()
+    parameters = {}
+    for key, one in own.parameters.items():
+        there = [one, *(said.parameters.get(key, one) for _, said in others)]
+        squares = [other.std ** 2 + (other.value - one.value) ** 2 for other in there]
+        parameters[key] = replace(one, std=float(np.sqrt(share @ squares)))
+    return replace(own, parameters=parameters)
+
+
+def _told_elsewhere(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+                    ) -> list[Block]:
+    """Return an effect's columns on the drives that it was not found on, where these are told.
+
+    That it is on some drives is a choice, and less certain than values given that choice: gains
+    of some drives are known as well as those of the others are known to be none. Not where the
+    recordings say nothing (a zero of one lift, which shifts the robot); shapes are those of one
+    drive alone.
+    """
+    effect, drives = candidate.effect, candidate.drives
+    if drives is None or effect.shape or found.blocks[candidate.components[0]].mean is not None:
+        return []
+    names = candidate.components[0].names
+    blocks = [fits.library.block(Component.of(effect, d, {}, names))
+              for d in fits.regression.drives
+              if d not in drives and fits.design.acts_on(effect, d)]
+    fit = fits.regression.at((*found.fit.blocks, *blocks), found.fit.amplitudes)
+    return [block for block in blocks if np.all(
+        np.diag(fit.covariance[fit.places[block], fit.places[block]])
+        < TOLD * np.diag(np.linalg.inv(block.precision)))]
+
+
+def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+              ) -> dict[str, Estimate]:
+    """Return how well the numbers are known that a set leaves at 0, where they may be others.
+
+    Of bodies only those that were found are told.
+    """
+    if issubclass(candidate.effect, AddedBody):
+        return {}
+    estimates = {}
+    for component in candidate.components:
+        every = tuple(c.name for c in candidate.effect.coefficients)
+        rest = tuple(name for name in every if name not in component.names)
+        if not component.names or not rest:
+            continue
+        block = fits.library.block(replace(component, names=rest))
+        fit = fits.regression.stated(found.fit, [block])
+        place = fit.places[block]
+        some, _ = _of_component(fits, replace(component, names=rest), np.zeros(len(rest)),
+                                fit.covariance[place, place], with_shape=False)
+        prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
+        fitted = {prefix + p.name for p in candidate.effect.linear
+                  if component.values(found.coefficients(component))[p.name]}
+        estimates.update({key: one for key, one in some.items() if key not in fitted})
+    return estimates
 
 
 def _of_component(fits: FittedSets, component: Component, c: Array, covariance: Array,
-                  ) -> tuple[dict[str, Estimate], list[str]]:
+                  with_shape: bool = True) -> tuple[dict[str, Estimate], list[str]]:
     effect, shape = component.effect, component.parameters
     prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
     unit_of = _units(fits.design, component.drive)
@@ -153,7 +198,7 @@ def _of_component(fits: FittedSets, component: Component, c: Array, covariance: 
         found[prefix + parameter.name] = Estimate(
             within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
             unit_of(parameter.unit))
-    for k, parameter in enumerate(effect.shape):
+    for k, parameter in enumerate(effect.shape if with_shape else ()):
         value = float(shape[parameter.name])
         amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
         found[prefix + parameter.name] = Estimate(

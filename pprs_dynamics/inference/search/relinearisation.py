@@ -11,8 +11,8 @@ search goes on from the set that was found. Costs of both searches mean the same
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffec
 from pprs_dynamics.inference.search.candidates import CandidateSet, bends
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
+    fitted_model,
     linear_prediction,
     linear_residual,
     model_at,
@@ -29,8 +30,10 @@ from pprs_dynamics.inference.search.fitted_model import (
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import beyond_lack_of_fit
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.physics.model.force_model import ForceModel
 
 # What the exact model may differ from the linear one by, in whitened squares, and the cost of a set
 # after it was relinearised around, from before: less changes no cost by more than a rival's margin.
@@ -209,3 +212,52 @@ def relinearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, Can
     """
     fits, found = linearised(fits, found)
     return fits, fits.refined(found)
+
+
+@dataclass(frozen=True)
+class SettledSet:
+    """A set around its own fitted model, in which friction turns over in widths of its own.
+
+    Parameters
+    ----------
+    fits : FittedSets
+    found : CandidateSet
+    widths : mapping of drive to float
+        That differ from the given model's for certain [m/s].
+    """
+
+    fits: FittedSets
+    found: CandidateSet
+    widths: Mapping[int, float]
+
+    @property
+    def model(self) -> ForceModel:
+        """The fitted model.
+
+        Raises
+        ------
+        ModelError
+            For values that no model may have.
+        """
+        return with_widths(fitted_model(self.fits, self.found), self.fits.design, self.widths)
+
+
+def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
+    """Return a set around its fitted model, fitted widths of reversal included.
+
+    Columns for widths are linear about the model's; far from it, what they leave over looks like
+    a delay.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    widths = estimate_widths(fits, found)
+    if widths and found.effects:
+        base, effects = parts_of(fits, found)
+        target = with_widths(model_at(fits.design, base, effects), fits.design, widths)
+        fits = FittedSets(fits.design.around(OperatingPoint(target, base, effects)),
+                          fits.decisions, fits.regression.error_scale)
+        found = fits.refined(fits.evaluate(found.candidates))
+    return SettledSet(fits, found, widths)
