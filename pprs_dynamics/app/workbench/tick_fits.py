@@ -243,7 +243,8 @@ class TickFits:
                 values += [wanted[name] for name in placement.names]
         if not blocks:
             return found
-        fit = self.fits.regression.held(found.fit, found.fit.index_of(blocks), np.array(values))
+        fit = self.fits.regression.held(self.fits.regression.stated(found.fit),
+                                        found.fit.index_of(blocks), np.array(values))
         return replace(found, fit=fit, total=found.total + fit.deviance - found.fit.deviance)
 
     # What a set says
@@ -265,7 +266,7 @@ class TickFits:
 
     def estimates(self, found: CandidateSet) -> dict[str, dict[str, Estimate]]:
         """Return the parameters of every effect of a set with their uncertainty."""
-        return {candidate.name: estimate(self.fits, found, candidate).parameters
+        return {candidate.name: estimate(self.fits, found, candidate, True).parameters
                 for candidate in found.effects}
 
     def key(self, drive: int | None, name: str) -> str:
@@ -286,7 +287,7 @@ class TickFits:
         fits, parameters = self.fits, None
         if is_free and any(c.effect.bends_columns for c in found.effects):
             fits, found = relinearised(fits, found)
-            parameters = {c.name: estimate(fits, found, c).parameters for c in found.effects}
+            parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
         return Exact(model, self.measured - exact_forces(fits.design, model), parameters)
 

@@ -115,7 +115,7 @@ def fit_effect(
     final_set = settled(last, found)
     last, found = final_set.fits, final_set.found
     candidate = found.effects[0]
-    said = estimate(last, found, candidate)
+    said = estimate(last, found, candidate, request.drives is not None)
     moved = [one for one in calibrations(last, found, final_set.widths) if _is_move(design, one)]
     final = _with_numbers(final_set.model, model, moved)
     prefix = f'effects.{request.name}.'

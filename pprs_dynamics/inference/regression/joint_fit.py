@@ -231,12 +231,12 @@ class Regression:
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
 
-    def stated(self, fit: JointFit, blocks: Sequence[Block]) -> JointFit:
-        """Return a fit with further blocks at its noise, its covariance as it is to be told.
+    def stated(self, fit: JointFit, blocks: Sequence[Block] = ()) -> JointFit:
+        """Return a fit, or one with further blocks at its noise, its covariance as it is told.
 
         See `NormalEquations.uncertainty`.
         """
-        found = self.at((*fit.blocks, *blocks), fit.amplitudes)
+        found = self.at((*fit.blocks, *blocks), fit.amplitudes) if blocks else fit
         return replace(found, covariance=NormalEquations(self, found.blocks).uncertainty(
             found.spectra))
 

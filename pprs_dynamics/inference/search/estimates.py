@@ -75,7 +75,8 @@ class Estimates:
     at_bound: tuple[str, ...]
 
 
-def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate) -> Estimates:
+def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+             are_drives_known: bool = False) -> Estimates:
     """Return the parameters of an effect, in the values that the set has.
 
     Their uncertainty is that of the whole fit: shapes take part by their derivatives, tolerances
@@ -87,9 +88,11 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate) 
     found : CandidateSet
     candidate : EffectCandidate
         Of the set.
+    are_drives_known : bool
+        It is on these drives for certain: somebody chose them.
     """
     slopes = dict(fits.slopes(found))
-    elsewhere = _told_elsewhere(fits, found, candidate)
+    elsewhere = [] if are_drives_known else _told_elsewhere(fits, found, candidate)
     fit = fits.regression.stated(found.fit, [*slopes.values(), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
@@ -153,9 +156,9 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
               ) -> dict[str, Estimate]:
     """Return how well the numbers are known that a set leaves at 0, where they may be others.
 
-    Of bodies only those that were found are told.
+    Of links and joints only those that it is on are told, and of bodies what was found.
     """
-    if issubclass(candidate.effect, AddedBody):
+    if candidate.effect.is_of_one_place or issubclass(candidate.effect, AddedBody):
         return {}
     estimates = {}
     for component in candidate.components:
