@@ -211,6 +211,18 @@ def test_short_gaps_are_bridged_and_long_ones_start_anew() -> None:
     assert shapes.at_bands.shape == (len(shapes.corners) + 1, len(series.bands))
 
 
+@pytest.mark.parametrize('samples', [541, 1000, 1013])
+@pytest.mark.parametrize('first', [0, 1])
+def test_efforts_at_half_the_rate_are_bridged(samples: int, first: int) -> None:
+    noise = np.random.default_rng(11).normal(size=(samples, 1))
+    noise[first::2] = np.nan
+    residuals = replace(recording(noise), measured=noise)
+    series = DriveSeries(residuals, 0, FrequencyBands.for_residuals(residuals))
+    assert series.known[[0, -1]].all()
+    assert len(series) > 0.9 * samples
+    assert np.isfinite(series.error).all()
+
+
 @pytest.mark.parametrize(('settings', 'most'), [
     (SensorSettings(white_noise=0.08, coloured_noise=0.0), 0.0),
     (SensorSettings(white_noise=0.04, coloured_noise=0.07, noise_correlation=0.999), 0.04),

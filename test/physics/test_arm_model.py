@@ -216,6 +216,12 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
     assert fingerprint(heavier) != fingerprint(models[0])
 
 
+def test_a_body_of_negative_mass_is_refused(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path, arm.urdf().replace('value="1.5"', 'value="-1.5"'))
+    with pytest.raises(UnreadableFileError, match=r'-1\.5 kg.* none may be negative'):
+        load_model(path)
+
+
 def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:
     with pytest.raises(UnreadableFileError, match=r'made_up\.urdf'):
         load_model(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))

@@ -111,6 +111,9 @@ def _inertial(link: ElementTree.Element) -> np.ndarray:
     mass = _number(inertial.find('mass'), 'value', 0.0)
     xx, xy, xz, yy, yz, zz = (_number(inertia, f'i{axes}', 0.0)
                               for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz'))
+    if mass < 0 or min(xx, yy, zz) < 0:
+        raise ValueError(f'the mass of {_named(link)} is {mass:g} kg, its moments of inertia '
+                         f'{xx:g}, {yy:g}, {zz:g} kg m^2: none may be negative')
     R = rotation_of(_numbers(origin, 'rpy', '0 0 0'))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return body_at(mass, _numbers(origin, 'xyz', '0 0 0'), R @ tensor @ R.T)
