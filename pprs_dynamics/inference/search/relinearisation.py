@@ -246,18 +246,22 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     """Return a set around its fitted model, fitted widths of reversal included.
 
     Columns for widths are linear about the model's; far from it, what they leave over looks like
-    a delay.
+    a delay. The set as it is where the exact error rises by more than the cost falls.
 
     Raises
     ------
     ModelError
         For values that no model may have.
     """
-    widths = estimate_widths(fits, found)
-    if widths and found.effects:
-        base, effects = parts_of(fits, found)
-        target = with_widths(model_at(fits.design, base, effects), fits.design, widths)
-        fits = FittedSets(fits.design.around(OperatingPoint(target, base, effects)),
-                          fits.decisions, fits.regression.error_scale)
-        found = fits.refined(fits.evaluate(found.candidates))
-    return SettledSet(fits, found, widths)
+    before = SettledSet(fits, found, estimate_widths(fits, found))
+    if not (before.widths and found.effects):
+        return before
+    base, effects = parts_of(fits, found)
+    around = FittedSets(fits.design.around(OperatingPoint(before.model, base, effects)),
+                        fits.decisions, fits.regression.error_scale)
+    after = SettledSet(around, around.refined(around.evaluate(found.candidates)), before.widths)
+
+    def loss(one: SettledSet) -> float:
+        left = fits.regression.residuals.measured - exact_forces(fits.design, one.model)
+        return one.found.total + squared(fits, found, left)
+    return min(before, after, key=loss)
