@@ -34,7 +34,8 @@ from pprs_dynamics.inference.search.estimates import Calibration, Estimate, esti
 from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import settled
+from pprs_dynamics.inference.search.relinearisation import SettledSet
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -203,7 +204,7 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     fits, name = FittedSets(design, case.decisions), case.request.name
     found = fits.evaluate(())
     try:
-        fitted = settled(fits, found).model
+        fitted = SettledSet(fits, found, estimate_widths(fits, found)).model
     except ModelError as error:
         return case.without_model(str(error))
     before, after = case.residuals(fitted)

@@ -19,7 +19,8 @@ from pprs_dynamics.inference.search.estimates import Calibration, Estimate, cali
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import relinearised, settled
+from pprs_dynamics.inference.search.relinearisation import SettledSet, relinearised
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -112,12 +113,11 @@ def fit_effect(
     last, found = relinearised(fits, found)
     report(0.8)
     after = hold_out(last, found)
-    final_set = settled(last, found)
-    last, found = final_set.fits, final_set.found
+    widths = estimate_widths(last, found)
     candidate = found.effects[0]
     said = estimate(last, found, candidate, request.drives is not None)
-    moved = [one for one in calibrations(last, found, final_set.widths) if _is_move(design, one)]
-    final = _with_numbers(final_set.model, model, moved)
+    moved = [one for one in calibrations(last, found, widths) if _is_move(design, one)]
+    final = _with_numbers(SettledSet(last, found, widths).model, model, moved)
     prefix = f'effects.{request.name}.'
     parameters = {key: Estimate(float(final.values[prefix + key]), one.std, one.unit)
                   for key, one in said.parameters.items() if prefix + key in final.values}
