@@ -196,7 +196,7 @@ def test_parameters_within_two_deviations_of_nothing_are_told_by_nothing() -> No
     # A force that may be 0 is none, however sure the velocity of it.
     refused, = said(force=(1.9, 1.0), velocity=(0.5, 0.1))
     assert refused == ('its parameters are not identifiable from these recordings: '
-                       'lift_2.force = 1.9 ± 1 N')
+                       'lift_2.force = 1.9 ± 2.0 N')
     # A drive that tells its own is enough; and 0 is a value that nobody fitted.
     two = fit('coulomb_friction', ('lift_1', 'lift_2'), parameters={
         'lift_1.force': Estimate(1.0, 1.0, 'N'), 'lift_2.force': Estimate(3.0, 1.0, 'N')})
@@ -225,7 +225,7 @@ def test_a_mass_must_not_be_negative_beyond_doubt() -> None:
         return objections.of_physics(one, made_up_residuals())
 
     assert said(-0.19) == []
-    assert said(-0.21) == ['lift_2.mass would be -0.21 ± 0.1 kg, must not be negative']
+    assert said(-0.21) == ['lift_2.mass would be -0.21 ± 0.20 kg, must not be negative']
 
 
 def friction_residuals(push: float, moving: float = 1.0) -> Residuals:
@@ -250,8 +250,8 @@ def test_friction_must_not_push_in_a_tenth_of_the_moving_time(moving: float) -> 
     one = fit('coulomb_friction', parameters=low, model=FRICTION)
     assert objections.of_physics(one, friction_residuals(0.09, moving)) == []
     refused, = objections.of_physics(one, friction_residuals(0.2, moving))
-    assert refused == ('lift_2.force would be -1 ± 0.1 N: with all friction of the model, friction '
-                       'on lift_2 would push along the motion in 20% of the moving time')
+    assert refused == ('lift_2.force would be -1.00 ± 0.20 N: with all friction of the model, '
+                       'friction on lift_2 would push along the motion in 20% of the moving time')
     # Of a drive whose own value is not negative, nothing is said.
     other = fit('coulomb_friction', ('lift_1', 'lift_2'), parameters={
         'lift_1.force': Estimate(-1.0, 0.1, 'N'), 'lift_2.force': Estimate(1.0, 0.1, 'N')},

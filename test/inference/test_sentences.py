@@ -30,6 +30,7 @@ from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
 from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.error_steps import error_steps
@@ -45,6 +46,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
 from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
+from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -189,6 +191,12 @@ def test_a_number_within_its_tolerance_is_calibrated_and_one_beyond_is_not() -> 
     assert 'beyond its tolerance' in told[1]
 
 
+def test_a_width_of_reversal_that_moved_is_not_told_as_what_it_was() -> None:
+    moved = Calibration('friction.reversal_velocities', 0, 0.001, 0.0009962, 0.0, 'm/s')
+    told = word_diagnosis(made_up_diagnosis('adequate', calibrated=(moved,))).calibrated[0]
+    assert told == 'friction.reversal_velocities[1]: 1 mm/s becomes about 0.996 mm/s: calibrated'
+
+
 def test_negative_friction_is_said_to_be_impossible() -> None:
     for value, sure in ((-0.6, True), (-0.015, False)):
         diagnosis = made_up_diagnosis(effects=(found_effect('coulomb_friction', value=value),))
@@ -290,6 +298,19 @@ def test_verdict_fall_and_next_step_fit_25_lines_of_80_columns(make: Any) -> Non
     for part in (words.headline, words.following, words.command,
                  'Runner-up hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'):
         assert part in in_one_line(text)
+
+
+def test_what_is_within_model_error_stands_by_name_in_the_short_view() -> None:
+    """The runner-up is told against the best set, which holds it."""
+    def said(**options: bool) -> str:
+        diagnosis = one_effect(within_model_error=(within_model_error(),))
+        return as_text(diagnosis_view(diagnosis, word_diagnosis(diagnosis), **options), 80)
+
+    name = within_model_error().name
+    line = next(one for one in said().splitlines() if one.startswith('Within the model error'))
+    assert name in line
+    assert 'pprs adopt' in said()
+    assert 'pprs adopt' not in said(next_step=False)
 
 
 def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:

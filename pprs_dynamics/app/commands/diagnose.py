@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
         require_open_numbers(inputs.model)
     with staged_bar(screen) as progress:
         result = diagnose(inputs.model, inputs, progress=progress)
-    tell(result, options, screen)
+    tell(result, options, screen,
+         view=result.view(options.details, next_step=not options.adopt_all))
     return _adopt_all(result, options, screen) if options.adopt_all else 0
 
 

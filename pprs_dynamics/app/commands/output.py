@@ -40,9 +40,9 @@ def write_json(path: str | PathLike[str], content: Any) -> None:
 
 
 def tell(result: Result, options: argparse.Namespace, screen: Any,
-         page: Callable[[], Page] | None = None) -> None:
-    """Print a result, and write what --json and --report ask for: its page by default."""
-    screen.print(result.view(options.details))
+         page: Callable[[], Page] | None = None, view: Any = None) -> None:
+    """Print a result, and write what --json and --report ask for: its view and page by default."""
+    screen.print(result.view(options.details) if view is None else view)
     if options.json:
         write_json(options.json, result.to_dict())
     if options.report:

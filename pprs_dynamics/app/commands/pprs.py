@@ -142,8 +142,9 @@ def _summary(command: str) -> str:
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser, with the arguments of the command that is called."""
     parser = OneLineParser(
-        prog='pprs', description='Dynamics of the 3-PPRS parallel robot: what the model says, '
-        'what was measured, and which physical effect is missing.')
+        prog='pprs', description='Dynamics with friction of a 3-PPRS, an arm, a robot with '
+        'loops or a single axis: what the model says, what was measured, and which physical '
+        'effect is missing.')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
     for name in COMMANDS:

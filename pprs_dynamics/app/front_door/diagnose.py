@@ -62,11 +62,11 @@ class DiagnosisResult(Result):
         """Return what `pprs diagnose --json` writes."""
         return self.diagnosis.to_dict()
 
-    def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows."""
+    def view(self, details: bool = False, next_step: bool = True) -> Any:
+        """Return what the terminal shows, with the command to go on with, or without."""
         from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
 
-        return diagnosis_view(self.diagnosis, self._words, details)
+        return diagnosis_view(self.diagnosis, self._words, details, next_step)
 
     def page(self) -> Page:
         """Return the page of `pprs diagnose --report`."""

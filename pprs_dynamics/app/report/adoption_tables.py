@@ -96,8 +96,8 @@ def _parts(answer: Adoption) -> Iterator[Any]:
     if answer.adopted and answer.calibrated:
         clear = [one for one in answer.calibrated if abs(one.after - one.before) > 2 * one.std]
         told = f', clearly {", ".join(one.label for one in clear)}' if clear else ''
-        yield escape(f'{counted(len(answer.calibrated), "number of the model")} moved within '
-                     f'tolerance{told}')
+        yield escape(f'{counted(len(answer.calibrated), "number of the model")} moved as well'
+                     f'{told}')
     for remark in answer.remarks:
         yield f'[yellow]![/] {escape(remark)}'
 

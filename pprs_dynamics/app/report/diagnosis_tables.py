@@ -18,7 +18,7 @@ from rich.table import Table
 
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RankedEffect
-from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain
+from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain, with_drives
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     FittedValue,
@@ -28,16 +28,31 @@ from pprs_dynamics.inference.diagnosis.sentences import (
 from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
-MOST_LISTED = 2  # places of effects whose parameters the sentences give
+MOST_LISTED = 2  # places of effects whose parameters the sentences give; names in one line
 WIDTH = 80
 LONGEST = 160  # characters of values that are shown without --details: two lines
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
+ELSEWHERE = '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
 
 
-def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False) -> Group:
-    """Return what the terminal shows, most important first; all there is with `details`."""
-    return Group(*(_parts if details else _brief)(diagnosis, words))
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
+                   next_step: bool = True) -> Group:
+    """Return what the terminal shows, most important first.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    words : Sentences
+        The diagnosis in words.
+    details : bool
+        Whether all is shown that there is.
+    next_step : bool
+        Whether the command to go on with is told; not where it runs already.
+    """
+    return Group(*(_parts if details else _brief)(diagnosis, words),
+                 *(_following(words) if next_step else ()),
+                 *(() if details else (ELSEWHERE,)))
 
 
 def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
@@ -56,13 +71,24 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     if second := runner_up(diagnosis):
         yield f'[bold]Runner-up[/] {escape(second)}'
     if words.within_model_error:
-        yield f'Within the model error of what was found: {len(words.within_model_error)} more'
+        yield f'Within the model error of what was found: {escape(_within_model_error(diagnosis))}'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
+
+
+def _within_model_error(diagnosis: Diagnosis) -> str:
+    """Return the names of what was fitted as the model error of other effects, the first ones."""
+    every = diagnosis.residuals.drives
+    names = [with_drives(one.name, one.drives, every) for one in diagnosis.within_model_error]
+    more = len(names) - MOST_LISTED
+    return listed([*names[:MOST_LISTED], f'{more} more'] if more > 0 else names)
+
+
+def _following(words: Sentences) -> Iterator[Any]:
+    """Yield what to do next, and the command for it."""
     yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
     if words.command:
         yield f'  [bold cyan]{escape(words.command)}[/]'
-    yield '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
 
 
 def _verdict(diagnosis: Diagnosis, words: Sentences) -> Panel:
@@ -96,9 +122,6 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     yield from _list('Suspects', words.suspects, 'yellow')
     yield from _list('Within model error', words.within_model_error, 'blue')
     yield from _list('Warnings', words.warnings, 'yellow')
-    yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
-    if words.command:
-        yield f'  [bold cyan]{escape(words.command)}[/]'
 
 
 def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from rich.table import Table
 from pprs_dynamics.inference.diagnosis.quantities import counted, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
 
+MOST_LISTED = 3  # numbers of the model that a line names
 BAR = 24  # characters, of the largest error
 
 
@@ -54,13 +55,18 @@ def details(step: Step) -> list[str]:
                  step.recordings, step.sha256, step.spans[::2], step.spans[1::2], strict=False)]
     found = [', '.join(values), f'from {", ".join(spans)}; {step.date}, version {step.version}']
     if step.calibrated:
-        found.append(f'{counted(len(step.calibrated), "number of the model")} moved within '
-                     'tolerance, the file holds which')
+        found.append(f'{counted(len(step.calibrated), "number of the model")} moved as well: '
+                     f'{_first_of(step.calibrated)}')
     if step.rivals:
         found.append(f'{", ".join(step.rivals)} would explain the recordings as well')
     if step.forced:
         found.append(f'forced, in spite of this: {"; ".join(step.objections)}')
     return [one for one in found if one]
+
+
+def _first_of(labels: Sequence[str]) -> str:
+    more = len(labels) - MOST_LISTED
+    return ', '.join([*labels[:MOST_LISTED], f'{more} more'] if more > 0 else labels)
 
 
 def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:

@@ -14,6 +14,7 @@ from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.adoption.fit_effect import EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.inference.residuals.paired_errors import certainty
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
@@ -133,7 +134,7 @@ def of_identifiability(fitted: EffectFit) -> list[str]:
     linear = {p.name for p in fitted.request.effect.linear or fitted.request.effect.shape}
     sizes = [key for key in told if effect.place_and_parameter(key)[1] in linear] or list(told)
     if sizes and all(key in vague for key in sizes):
-        shown = '; '.join(f'{key} = {_with_std(told[key])}' for key in sizes[:3])
+        shown = '; '.join(f'{key} = {_with_interval(told[key])}' for key in sizes[:3])
         return [f'its parameters are not identifiable from these recordings: {shown}']
     return []
 
@@ -149,7 +150,7 @@ def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
     if not low:
         return []
     first = next(iter(low))
-    told = f'{first} would be {_with_std(low[first])}'
+    told = f'{first} would be {_with_interval(low[first])}'
     if not fitted.request.effect.is_friction:
         return [f'{told}, must not be negative']
     pushing = _pushing_drives(fitted.model, after)
@@ -198,5 +199,5 @@ def _share(true: Any, among: Any) -> float:
     return float((true & among).sum()) / count if count else 0.0
 
 
-def _with_std(one: Estimate) -> str:
-    return f'{one.value:.3g} ± {one.std:.2g} {one.unit}'
+def _with_interval(one: Estimate) -> str:
+    return with_uncertainty(one.value, one.std, one.unit)

@@ -360,10 +360,18 @@ def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
             'gives it. Not adopted')
 
 
+def _rounded(after: float, before: float) -> float:
+    """Return a width of reversal with two digits, or as many as show that it has moved.
+
+    Widths come without an uncertainty: no more digits than they can have.
+    """
+    return next((value for digits in range(2, 7)
+                 if (value := float(f'{after:.{digits}g}')) != before), after)
+
+
 def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
-    # Widths of reversals come without an uncertainty: no more digits than they can have.
     after = with_uncertainty(one.after, one.std, one.unit) if one.std else (
-        f'about {with_uncertainty(float(f"{one.after:.2g}"), 0.0, one.unit)}')
+        f'about {with_uncertainty(_rounded(one.after, one.before), 0.0, one.unit)}')
     moved = f'{one.label}: {with_uncertainty(one.before, 0.0, one.unit)} becomes {after}'
     tolerance = diagnosis.model.values.get(f'tolerances.{one.key}')
     if not tolerance:
