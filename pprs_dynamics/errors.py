@@ -71,21 +71,26 @@ class UnknownNameError(ModelError):
         Names that exist, of which one or all are suggested.
     place : str, optional
         The key under which the name stands, where it is not a key itself.
+    instead : str, optional
+        What to write, where that is known better than by likeness.
     """
 
     def __init__(
         self, kind: str, name: str, known: Iterable[str], place: str = '', source: str = '',
+        instead: str = '',
     ) -> None:
         super().__init__(place or name, name, f'be a known {kind}', source)
         self.kind, self.known = kind, tuple(known)
-        self.args = (kind, name, self.known, place, source)
-        self.place = place
+        self.args = (kind, name, self.known, place, source, instead)
+        self.place, self.instead = place, instead
 
     @property
     def sentence(self) -> str:
         """The error without its source."""
         close = difflib.get_close_matches(self.value, self.known, 1)
-        if close and len(self.known) > FEW:
+        if self.instead:
+            hint = f' (use {self.instead})'
+        elif close and len(self.known) > FEW:
             hint = f' (did you mean {close[0]}?)'
         else:
             hint = f' (known: {", ".join(self.known)})' if len(self.known) <= MANY else ''

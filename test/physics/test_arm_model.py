@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -220,6 +221,38 @@ def test_a_body_of_negative_mass_is_refused(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path, arm.urdf().replace('value="1.5"', 'value="-1.5"'))
     with pytest.raises(UnreadableFileError, match=r'-1\.5 kg.* none may be negative'):
         load_model(path)
+
+
+DAMAGED = {
+    'two links of a name': ('</robot>', '<link name="beam"/></robot>', 'two links beam'),
+    'no name': ('</robot>', '<link/></robot>', 'a <link> has no name'),
+    'no number': ('value="1.5"', 'value="heavy"', 'value of <mass> is "heavy", must be a finite'),
+    'limits turned over': ('<limit lower="-3', '<limit lower="9', 'lower limit is 9'),
+    'a mass without a value': ('<mass value="1.5"/>', '', 'without a <mass value')}
+
+
+@pytest.mark.parametrize(('old', 'new', 'sentence'), DAMAGED.values(), ids=DAMAGED)
+def test_a_damaged_urdf_is_told_with_link_value_and_rule(
+    tmp_path: Path, old: str, new: str, sentence: str,
+) -> None:
+    assert old in arm.urdf()
+    path = arm.write_arm(tmp_path, arm.urdf().replace(old, new, 1))
+    with pytest.raises(UnreadableFileError, match=re.escape(sentence)):
+        load_model(path)
+
+
+def test_links_and_mimics_in_a_ring_are_told(tmp_path: Path) -> None:
+    hang = ('<link name="{0}"/><joint name="to_{0}" type="revolute"><parent link="{1}"/>'
+            '<child link="{0}"/></joint>')
+    ring = hang.format('a', 'b') + hang.format('b', 'a')
+    with pytest.raises(UnreadableFileError, match='hang on one another'):
+        load_model(arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{ring}</robot>')))
+    mimics = ''.join(
+        f'<link name="{name}"/><joint name="{name}" type="revolute"><parent link="stand"/>'
+        f'<child link="{name}"/><axis xyz="0 0 1"/><mimic joint="{other}"/></joint>'
+        for name, other in (('c', 'd'), ('d', 'c')))
+    with pytest.raises(UnreadableFileError, match='must mimic none that mimics it'):
+        load_model(arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{mimics}</robot>')))
 
 
 def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:

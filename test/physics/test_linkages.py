@@ -380,5 +380,5 @@ def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r'robot\.urdf'):
         load_model(path)
     path.write_text(text.replace('base: base', 'base: base\n      mjcf: bar.xml'))
-    with pytest.raises(ModelError, match='instead'):
+    with pytest.raises(ModelError, match='not stand beside'):
         load_model(path)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
-from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
@@ -62,6 +62,9 @@ class EffectRequest:
         """
         effect = find_effect(name)
         if effect is None:
+            if name in REPLACED:
+                raise EffectRequestError(f'unknown effect {name!r}, must be one of the catalogue: '
+                                         f'use {REPLACED[name]}')
             close = difflib.get_close_matches(name, list(catalogue()), 1)
             hint = f' (did you mean {close[0]}?)' if close else ''
             raise EffectRequestError(f'unknown effect {name!r}{hint}, must be one of '

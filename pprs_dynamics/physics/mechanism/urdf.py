@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import hashlib
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +32,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.system.input_files import require_file
 
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
+Item = TypeVar('Item')
 KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
 
 
@@ -66,11 +69,8 @@ def _described(content: bytes, path: str) -> Description:
         raise UnreadableFileError(path, f'not XML: {error}') from None
     if robot.tag != 'robot':
         raise UnreadableFileError(path, f'not a URDF: its root is <{robot.tag}>, must be <robot>')
-    try:
-        links = {_named(link): _inertial(link) for link in robot.findall('link')}
-        joints = {_named(joint): _joint(joint) for joint in robot.findall('joint')}
-    except (KeyError, ValueError) as error:
-        raise UnreadableFileError(path, f'not a URDF that can be read: {error}') from None
+    links = _read(path, robot.findall('link'), _inertial)
+    joints = _read(path, robot.findall('joint'), _joint)
     _require_tree(path, links, joints)
     return Description(path, links, joints, hashlib.sha256(content).hexdigest())
 
@@ -83,18 +83,34 @@ def transmissions(path: str) -> list[tuple[str, list[str]]]:
             for each in robot.findall('transmission')]
 
 
-def _named(element: ElementTree.Element) -> str:
-    name = element.get('name')
-    if not name:
-        raise ValueError(f'a <{element.tag}> without a name')
-    return name
+def _read(path: str, elements: list[ElementTree.Element],
+          reader: Callable[[ElementTree.Element], Item]) -> dict[str, Item]:
+    """Return what a reader makes of links or joints, by name."""
+    found: dict[str, Item] = {}
+    for element in elements:
+        name = element.get('name')
+        if not name:
+            raise UnreadableFileError(path, f'a <{element.tag}> has no name')
+        if name in found:
+            raise UnreadableFileError(path, f'has two {element.tag}s {name}, must name each once')
+        try:
+            found[name] = reader(element)
+        except ValueError as error:
+            raise UnreadableFileError(path, f'{element.tag} {name}: {error}') from None
+    return found
 
 
 def _numbers(element: ElementTree.Element | None, key: str, default: str) -> tuple[float, ...]:
     text = default if element is None else element.get(key, default)
-    numbers = tuple(float(word) for word in text.split())
-    if len(numbers) != len(default.split()) or not np.all(np.isfinite(numbers)):
-        raise ValueError(f'{key}="{text}" is not {len(default.split())} finite numbers')
+    try:
+        numbers = tuple(float(word) for word in text.split())
+    except ValueError:
+        numbers = ()
+    count = len(default.split())
+    if len(numbers) != count or not np.all(np.isfinite(numbers)):
+        asked = 'a finite number' if count == 1 else f'{count} finite numbers'
+        tag = '' if element is None else f' of <{element.tag}>'
+        raise ValueError(f'{key}{tag} is "{text}", must be {asked}')
     return numbers
 
 
@@ -108,33 +124,40 @@ def _inertial(link: ElementTree.Element) -> np.ndarray:
     if inertial is None:
         return np.zeros(PARAMETERS)
     origin, inertia = inertial.find('origin'), inertial.find('inertia')
+    if inertial.find('mass[@value]') is None:
+        raise ValueError('<inertial> is without a <mass value="...">, must have one [kg]')
     mass = _number(inertial.find('mass'), 'value', 0.0)
     xx, xy, xz, yy, yz, zz = (_number(inertia, f'i{axes}', 0.0)
                               for axes in ('xx', 'xy', 'xz', 'yy', 'yz', 'zz'))
     if mass < 0 or min(xx, yy, zz) < 0:
-        raise ValueError(f'the mass of {_named(link)} is {mass:g} kg, its moments of inertia '
-                         f'{xx:g}, {yy:g}, {zz:g} kg m^2: none may be negative')
+        raise ValueError(f'its mass is {mass:g} kg, its moments of inertia {xx:g}, {yy:g}, '
+                         f'{zz:g} kg m^2: none may be negative')
     R = rotation_of(_numbers(origin, 'rpy', '0 0 0'))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return body_at(mass, _numbers(origin, 'xyz', '0 0 0'), R @ tensor @ R.T)
 
 
 def _joint(joint: ElementTree.Element) -> Joint:
-    name, kind = _named(joint), joint.get('type', '')
+    name, kind = joint.get('name', ''), joint.get('type', '')
     if kind not in KINDS:
-        raise ValueError(f'{name} is of the type {kind}, must be one of {", ".join(KINDS)}')
+        raise ValueError(f'its type is "{kind}", must be one of {", ".join(KINDS)}')
     parent, child, origin = joint.find('parent'), joint.find('child'), joint.find('origin')
     if parent is None or child is None:
-        raise ValueError(f'{name} has no parent or no child')
+        raise ValueError('it is without <parent> or <child>, must have both')
     axis = np.array(_numbers(joint.find('axis'), 'xyz', '1 0 0'))
     length = float(np.linalg.norm(axis))
     if kind not in (FIXED, FLOATING) and not length > 0:
-        raise ValueError(f'the axis of {name} has no length')
+        raise ValueError('its axis has no length')
     limit, mimic = joint.find('limit'), joint.find('mimic')
     lower, upper = _number(limit, 'lower', 0.0), _number(limit, 'upper', 0.0)
+    if lower > upper and kind != CONTINUOUS:
+        raise ValueError(f'its lower limit is {lower:g}, must be below its upper one, {upper:g}')
     if not lower < upper:  # a URDF may leave them out
         lower, upper = -np.inf, np.inf
     speed, effort = (_number(limit, key, 0.0) or np.inf for key in ('velocity', 'effort'))
+    if min(speed, effort) < 0:
+        raise ValueError(f'its limits are {speed:g} of velocity and {effort:g} of effort, must be '
+                         'at least 0')
     return Joint(
         name, kind, parent.get('link', ''), child.get('link', ''),
         Frame.of(_numbers(origin, 'xyz', '0 0 0'), _numbers(origin, 'rpy', '0 0 0')),
@@ -145,7 +168,10 @@ def _joint(joint: ElementTree.Element) -> Joint:
 
 
 def _require_tree(path: str, links: dict[str, np.ndarray], joints: dict[str, Joint]) -> None:
-    """Raise UnreadableFileError where joints do not make one tree of the links."""
+    """Raise UnreadableFileError where joints do not make one tree of the links.
+
+    Nor may joints mimic one another in a ring.
+    """
     children: dict[str, str] = {}
     for joint in joints.values():
         for link in (joint.parent, joint.child):
@@ -164,3 +190,27 @@ def _require_tree(path: str, links: dict[str, np.ndarray], joints: dict[str, Joi
         raise UnreadableFileError(
             path, f'has {len(roots)} links that hang on none '
             f'({", ".join(roots[:6]) or "a ring"}), must have one')
+    hanging = {joint.child: joint.parent for joint in joints.values()}
+    if ring := _ring(hanging):
+        raise UnreadableFileError(
+            path, f'{", ".join(ring[:6])} hang on one another: a URDF is a tree, close loops by '
+            'robot.loops')
+    if ring := _ring({name: joint.mimic.joint for name, joint in joints.items()
+                      if joint.mimic is not None}):
+        raise UnreadableFileError(path, f'{", ".join(ring[:6])}: a joint must mimic none that '
+                                  'mimics it')
+
+
+def _ring(following: dict[str, str]) -> list[str]:
+    """Return names of which each follows the next and the last the first, [] for none."""
+    done: set[str] = set()
+    for start in following:
+        path: list[str] = []
+        name: str | None = start
+        while name is not None and name not in done:
+            done.add(name)
+            path.append(name)
+            name = following.get(name)
+        if name in path:
+            return path[path.index(name):]
+    return []

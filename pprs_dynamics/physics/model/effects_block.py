@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -34,14 +34,14 @@ def added_effects(
         raise ModelError('effects.active', list(active), 'name each effect once')
     for name in active:
         if find_effect(name) is None:
-            raise UnknownNameError('effect', name, catalogue(), 'effects.active')
+            raise _unknown(name, 'effects.active')
     blocks = _nested('effects', {key: value for key, value in parameters.items()
                                  if key.startswith('effects.') and key not in LISTS})
     of_sensors = _effects_of_sensors(parameters)
     for name, block in blocks.items():
         found = find_effect(name)
         if found is None:
-            raise UnknownNameError('effect', name, catalogue(), 'effects')
+            raise _unknown(name, 'effects')
         _check_place(name, block, found, kind, drives, title_of(parameters))
         found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
@@ -53,6 +53,10 @@ def added_effects(
     missing = [name for name in active if name not in blocks]
     if missing:
         raise ModelError(f'effects.{missing[0]}', MISSING, 'be given: effects.active names it')
+
+
+def _unknown(name: str, place: str) -> UnknownNameError:
+    return UnknownNameError('effect', name, catalogue(), place, instead=REPLACED.get(name, ''))
 
 
 def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: type[ForceModel],

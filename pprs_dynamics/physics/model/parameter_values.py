@@ -13,10 +13,13 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.model.effects_block import check_tolerances
 from pprs_dynamics.physics.model.keys import (
     ADDED,
+    NAMED_BLOCKS,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
+    ROBOT,
     keys_of,
+    mechanism_block,
 )
 
 
@@ -49,13 +52,21 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
+    named = NAMED_BLOCKS if mechanism_block(parameters) == ROBOT else ()
+    blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
     for name, value in parameters.items():
-        block = name.split('.')[0]
-        if name == block and value in (None, {}) and any(
-                key.startswith(f'{block}.') for key in (*keys, *ADDED)):
-            continue  # a block that somebody left empty says nothing
-        if name not in keys and not _is_for_others(name):
-            raise UnknownNameError('key', name, (*keys, *NODE_KEYS))
+        if name in keys or _is_for_others(name):
+            continue
+        if name not in blocks:
+            raise UnknownNameError('key', name, (*keys, *NODE_KEYS, *sorted(blocks)))
+        if value not in (None, {}):  # a block that somebody left empty says nothing
+            raise ModelError(name, value, 'be a mapping, of names to what they hold')
+
+
+def _prefixes(key: str) -> Iterator[str]:
+    """Yield the blocks that a key is in: a and a.b of a.b.c."""
+    parts = key.split('.')
+    yield from ('.'.join(parts[:count]) for count in range(1, len(parts)))
 
 
 def is_known(name: str) -> bool:

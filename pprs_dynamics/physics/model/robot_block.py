@@ -43,9 +43,10 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
     """
     block = mechanism_block(values)
     given = [key for key in (f'{block}.urdf', f'{block}.mjcf') if values.get(key)]
-    if len(given) != 1:
-        raise ModelError(f'{block}.urdf', MISSING if not given else values[given[0]],
-                         f'be given, or {block}.mjcf instead')
+    if not given:
+        raise ModelError(f'{block}.urdf', MISSING, f'be given, or {block}.mjcf instead')
+    if len(given) > 1:
+        raise ModelError(given[1], values[given[1]], f'not stand beside {given[0]}')
     values[given[0]] = str((folder / values[given[0]]).resolve())
     if given[0].endswith('mjcf'):
         from pprs_dynamics.physics.mechanism.mjcf import read_mjcf
@@ -112,5 +113,10 @@ def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterato
         if name not in friction_rows(structure):
             raise UnknownNameError('joint', name, friction_rows(structure),
                                    'friction.joints')
+        joint = friction_rows(structure)[name][0]
+        turns = joint < 0 or structure.tables.turns[joint]
+        if turns and blocks[name]['coulomb'] and not blocks[name]['radius']:
+            raise ModelError(f'friction.joints.{name}.radius', blocks[name]['radius'],
+                             'be greater than 0 beside coulomb: the load rubs at it [m]')
     if blocks:
         yield LinkageFriction(structure, blocks)
