@@ -53,7 +53,11 @@ def test_friction_of_one_passive_joint_is_named_and_adopted(tmp_path: Path) -> N
     found = json.loads(answer.read_text())['effects']
     assert [one['name'] for one in found] == ['joint_friction']
     torque = found[0]['parameters'][key]
-    assert torque['value'] == pytest.approx(hidden, rel=0.15)
+    assert torque['std'] < 0.03 * hidden
+    assert abs(torque['value'] - hidden) < 3 * torque['std']
+    # It turns over in less than the model's width, and that is no viscous friction.
+    viscous = found[0]['parameters'][f'{joint}.viscous']
+    assert abs(viscous['value']) <= 3 * viscous['std']
     assert main(['adopt', 'joint_friction', str(run), '--model', HEXAPOD, '--output',
                  str(model)]) == 0
     block = yaml.safe_load(model.read_text())['/**']['ros__parameters']['effects']

@@ -23,8 +23,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.design import FREE, Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
-from pprs_dynamics.inference.regression.platform_sensitivities import PASSIVE_WIDTHS
-from pprs_dynamics.inference.regression.sensitivities import model_numbers
+from pprs_dynamics.inference.regression.sensitivities import PASSIVE_WIDTHS, model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS

@@ -17,15 +17,18 @@ from pprs_dynamics.inference.regression.sensitivities import (
     HOMING,
     NUMBERS,
     OF_DRIVES,
+    OF_JOINTS,
     PRESENT,
     RELATIVE_STEP,
     Number,
     Sensitivities,
     following,
+    passive_reversal_columns,
     reversal_columns,
 )
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState
 from pprs_dynamics.physics.model.arm_model import ArmForces, ArmModel
@@ -75,6 +78,10 @@ class ArmSensitivities(Sensitivities):
         widths = np.stack([self.sensed(column, state) for column in reversal_columns(
             dry, state.velocity, state.direction, np.asarray(self.model.reversal.velocity))])
         columns = {NUMBERS: numbers, OF_DRIVES: widths, HOMING: self._homing(state, reference)}
+        for friction in self._following:
+            if isinstance(friction, LinkageFriction):
+                columns[OF_JOINTS] = np.stack([self.sensed(column, state) for column in
+                                               passive_reversal_columns(friction, state)])
         for effect in self.searched:
             full, bare = self._of_structure(effect, state, reference, {})
             columns[effect.name] = full

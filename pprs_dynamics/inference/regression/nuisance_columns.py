@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nuisance columns: what the form of an effect on a drive leaves open, in proportion to its force.
+"""Nuisance columns: what the form of an effect leaves open, in proportion to its force.
 
 Friction turns over at reversals in a width that nobody knows, and real effects depart from the
 catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Each gives a column
@@ -10,15 +10,22 @@ whose coefficient has unit prior.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.sensitivities import reversal_columns
+from pprs_dynamics.inference.regression.sensitivities import (
+    passive_reversal_columns,
+    reversal_columns,
+)
 from pprs_dynamics.inference.regression.terms import Term
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.inference.residuals.reconstruction import treated_forces
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
+from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
 
 def nuisance_rows(design: Design, term: Term, coefficients: Array) -> Array:
@@ -69,3 +76,28 @@ def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
     return np.concatenate([
         recording.treat(np.stack([coefficients @ np.stack(one) for one in columns], axis=-1)).T
         for recording, columns in zip(design.recordings, found, strict=True)], axis=1)
+
+
+def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dict[int, Array]:
+    """Return what friction in passive joints changes by where it turns over otherwise, by drive.
+
+    By units of coefficients k and widths w, (k, w, M) [N] each; {} for what is no such friction.
+    """
+    effect, model = term.effect, design.model
+    if not (effect.is_friction and issubclass(effect, PassiveJointEffect)):
+        return {}
+    units = [effect.at({name: 1.0}) for name in names]
+    sensors = [one for one in model.effects if isinstance(one, MeasurementEffect)]
+
+    def rows(forces: Any) -> dict[str, Array]:
+        state = forces.mechanism
+        columns = np.stack([passive_reversal_columns(unit, state) for unit in units])
+        for sensor in sensors:
+            columns = np.stack([[sensor.sensed(column, state.time, design.drives)
+                                 for column in one] for one in columns])
+        return {'rows': columns.transpose(2, 0, 1, 3)}
+
+    stacked = np.concatenate([
+        treated_forces(model, one, more=rows)['rows'] * one.recorded_share(model)
+        for one in design.reconstructed(model)]).transpose(3, 1, 2, 0)
+    return {d: one for d, one in enumerate(stacked) if np.any(one)}

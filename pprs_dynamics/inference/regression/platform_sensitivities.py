@@ -29,6 +29,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     Number,
     Sensitivities,
     following,
+    passive_reversal_columns,
     reversal_columns,
 )
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
@@ -37,14 +38,12 @@ from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solve_forward_motion
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 HOMING_STEP = 3e-5  # of a rod's length
 HOMING_STRIDE = 5  # samples; these columns change slowly
-PASSIVE_WIDTHS = (0.25, 4.0)
 # Numbers that act on the drives of one chain, or on one drive, only: all at once, then split.
 PER_DRIVE = ('friction.drives.viscous', 'friction.drives.coulomb')
 PER_CHAIN = ('masses.slides', 'masses.lifts')
@@ -213,10 +212,8 @@ class ChunkSensitivities:
     def of_passive_widths(self) -> Array:
         """Return the same for the passive joints, all at once, (W, N, 6)."""
         friction = next(e for e in self.model.effects if isinstance(e, PassiveFriction))
-        reversal, before = self.model.reversal, friction.force(self.state)
-        return np.stack([self.sensed(friction.force(replace(
-            self.state, reversal=Reversal(reversal.velocity, factor * reversal.rate))) - before)
-            for factor in PASSIVE_WIDTHS])
+        return np.stack([self.sensed(column) for column in
+                         passive_reversal_columns(friction, self.state)])
 
     def of_homing(self, samples: np.ndarray) -> Array:
         """Return the change per metre that each drive's measured position is too large.

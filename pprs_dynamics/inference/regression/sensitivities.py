@@ -11,7 +11,7 @@ those of effects in its drives is behind `Sensitivities`; the rest of the diagno
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ DEVIATIONS = 2.5
 # Friction that turns over in another width than the model's is no effect: multiples of the
 # width whose differences span what is between 0.2 and 5 times the model's.
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
+PASSIVE_WIDTHS = (0.05, 0.25, 4.0)
 # Names of columns; those of effects outside the drives have the effects' names.
 NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
 OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
@@ -164,3 +165,14 @@ def reversal_columns(dry: Array, velocity: Array, direction: Array, width: Array
     """
     odd = [dry * (smooth_sign(velocity, factor * width) - direction) for factor in DRIVE_WIDTHS]
     return [*odd, dry * (1 - np.abs(direction))]
+
+
+def passive_reversal_columns(friction: Effect, state: Any) -> Array:
+    """Return what friction in passive joints that turns over otherwise changes, (W, N, D) [N].
+
+    A row for each of `PASSIVE_WIDTHS`, times the width of the state.
+    """
+    before = friction.force(state)
+    return np.stack([friction.force(replace(state, reversal=replace(
+        state.reversal, rate=factor * state.reversal.rate))) - before
+        for factor in PASSIVE_WIDTHS])

@@ -162,11 +162,10 @@ class FittedSets:
         unloaded = self.library.unloaded(component)
         if unloaded is not None:
             blocks.append(Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1)))
-        left_open = self.library.nuisance_rows(component)
-        if left_open is not None:
-            assert component.drive is not None
-            blocks.append(Block({component.drive: np.tensordot(c, left_open, 1)},
-                                np.eye(left_open.shape[1])))
+        left_open = {d: np.tensordot(c, rows, 1)
+                     for d, rows in self.library.nuisance_rows(component).items()}
+        if left_open:
+            blocks.append(Block(left_open, np.eye(len(next(iter(left_open.values()))))))
         return tuple(blocks)
 
     def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:

@@ -15,7 +15,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.regression.nuisance_columns import nuisance_rows
+from pprs_dynamics.inference.regression.nuisance_columns import (
+    joint_reversal_rows,
+    nuisance_rows,
+)
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.search.body_centres import about_centre, find_centre, has_centre
@@ -98,7 +101,7 @@ class Library:
         self._terms: dict[Hashable, Term] = {}
         self._centres: dict[Hashable, tuple[float, ...]] = {}
         self._blocks: dict[Component, Block] = {}
-        self._nuisance: dict[Component, Array | None] = {}
+        self._nuisance: dict[Component, dict[int, Array]] = {}
         self._prices: dict[Component, float] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
         self.spanning = [Component.of(effect, d, {}, names)
@@ -204,20 +207,22 @@ class Library:
         return {d: self.regression.series[d].transform((values - term.rows[d])[chosen])
                 for d, values in term.bare.items() if d in self.regression.series}
 
-    def nuisance_rows(self, component: Component) -> Array | None:
-        """Return what its form leaves open, by its coefficients, (k, w, n); None for nothing.
+    def nuisance_rows(self, component: Component) -> dict[int, Array]:
+        """Return what its form leaves open, by its coefficients, (k, w, n) by drive.
 
         How friction turns over where it knows no past, and the effect's own deviations.
         """
-        d = component.drive
-        if d is None or not component.names:
-            return None
         if component not in self._nuisance:
-            rows = np.stack([
-                nuisance_rows(self.design, self.term(component), component.every(unit))
-                for unit in np.eye(len(component.names))])
-            self._nuisance[component] = (
-                self.regression.series[d].transform(rows) if np.any(rows) else None)
+            term, d = self.term(component), component.drive
+            rows = {}
+            if d is None:
+                rows = joint_reversal_rows(self.design, term, component.names)
+            elif component.names:
+                rows = {d: np.stack([nuisance_rows(self.design, term, component.every(unit))
+                                     for unit in np.eye(len(component.names))])}
+            self._nuisance[component] = {
+                d: self.regression.series[d].transform(values) for d, values in rows.items()
+                if np.any(values) and d in self.regression.series}
         return self._nuisance[component]
 
     def price(self, candidate: Candidate) -> float:
