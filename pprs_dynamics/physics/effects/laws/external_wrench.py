@@ -38,7 +38,7 @@ class ExternalWrench(BodyEffect):
                     -1e6, 1e6, scale=1.0) for name in FORCES),
         *(Parameter(name, f'M_{name[-1]}', 'N m', f'moment to overcome about {name[-1]} of base',
                     -1e6, 1e6, 0.0, scale=0.1) for name in MOMENTS))
-    variants = (FORCES, MOMENTS, FORCES + MOMENTS)
+    variants = (('force_z',), FORCES, MOMENTS, FORCES + MOMENTS)
     card = Card(
         'Q = [J]^T (F, M), F and M in base at o',
         'errors that depend on the pose alone, whatever the speed: nearly constant on a small '
