@@ -19,9 +19,12 @@ import json
 import sys
 import tempfile
 import time
+import zlib
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from benchmarks.scores.cases import (
     Each,
@@ -38,12 +41,12 @@ from pprs_dynamics.simulation.arm_forms import NAMES
 
 
 def run_case(case: tuple[str, int], model: Path, duration: float) -> Outcome:
-    """Simulate and diagnose the recording of an effect, empty for nothing, and a seed."""
+    """Simulate and diagnose the recording of effects, joined by +, and a seed."""
     effect, seed = case
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         run, truth, said = (str(Path(folder) / name) for name in (
             'run.csv', 'truth.json', 'said.json'))
-        hidden = ['--effect', effect] if effect else []
+        hidden = [word for name in effect.split('+') if name for word in ('--effect', name)]
         status = pprs(['simulate', '--model', str(model), '--output', run, '--seed', str(seed),
                        '--path-seed', str(seed), '--duration', str(duration), '--json', truth,
                        *hidden])
@@ -66,13 +69,17 @@ def judge(outcome: Outcome) -> dict[str, bool]:
     name = outcome['effect']
     if not name:
         return {'claimed': bool(named) or outcome['verdict'] != 'adequate'}
+    if '+' in name:
+        true, size = name.split('+'), str(name.count('+') + 1)
+        matched = len(true) == len(named) and all(
+            one in named or any(one in alike and set(alike) & set(named)
+                                for alike in outcome['sets']) for one in true)
+        return {'exact ' + size: sorted(true) == sorted(named), 'matched ' + size: matched}
     in_set = any(name in one for one in outcome['sets'])
     first = named[:1] == [name]
     told = next((one['drives'] for one in outcome['effects'] if one['name'] == name), None)
     true = outcome['truth'][0]['drives']
-    # A payload that is not at the tool's origin has a first moment, too.
-    whole = {name}
-    judged = {'first_or_set': first or in_set, 'exact': first and set(named) <= whole,
+    judged = {'first_or_set': first or in_set, 'exact': named == [name],
               'wrong_alone': bool(named) and name not in named and not in_set}
     if told is not None and true is not None:
         judged['drives'] = set(told) == set(true)
@@ -83,11 +90,18 @@ def described(outcome: Outcome) -> str:
     """Return what was hidden and what was said, in a line."""
     if 'failed' in outcome:
         return f'FAILED {outcome["effect"]} {outcome["seed"]}'
-    named = '; '.join(one['name'] + (f'({",".join(one["drives"])})' if one['drives'] else '')
-                      for one in outcome['effects']) or '-'
-    drives = outcome['truth'][0]['drives'] if outcome['truth'] else None
-    return (f'{outcome["effect"] or "nothing"} {outcome["seed"]} {drives or ""} -> '
-            f'{outcome["verdict"]}: {named} {outcome["sets"] or ""} {outcome["seconds"]:.0f} s')
+    return (f'{outcome["effect"] or "nothing"} {outcome["seed"]} {_on(outcome)} -> '
+            f'{outcome["verdict"]}: {_said(outcome) or "-"} {outcome["sets"] or ""} '
+            f'{outcome["seconds"]:.0f} s')
+
+
+def _on(outcome: Outcome) -> str:
+    return '; '.join(', '.join(one['drives'] or ()) for one in outcome['truth']).strip('; ')
+
+
+def _said(outcome: Outcome) -> str:
+    return '; '.join(one['name'] + (f'({", ".join(one["drives"])})' if one['drives'] else '')
+                     for one in outcome['effects'])
 
 
 def table(found: Sequence[Outcome]) -> str:
@@ -99,7 +113,11 @@ def table(found: Sequence[Outcome]) -> str:
             ('exactly the true effect, nothing added', '', 'exact'),
             ('a wrong effect alone', '≤ 1 %', 'wrong_alone'),
             ('right joints', '≥ 95 %', 'drives'),
-            ('nothing missing: something claimed', '≤ 5 %', 'claimed')):
+            ('nothing missing: something claimed', '≤ 5 %', 'claimed'),
+            ('exact set of two effects', '≥ 85 %', 'exact 2'),
+            ('the same, named sets counted', '', 'matched 2'),
+            ('exact set of three effects', '≥ 75 %', 'exact 3'),
+            ('the same, named sets counted', '', 'matched 3')):
         known = [judged[what] for _, judged in told if what in judged]
         if known:
             lines.append(f'| {text} | {goal} | {sum(known)} of {len(known)} |')
@@ -108,15 +126,14 @@ def table(found: Sequence[Outcome]) -> str:
         lines.append(f'| refused or failed | 0 | {failed} |')
     lines += ['', '| hidden | on | said |', '|---|---|---|']
     for one, judged in told:
-        if not judged.get('exact', not judged.get('claimed')):
-            drives = one['truth'][0]['drives'] if one['truth'] else None
-            said = ', '.join(named['name'] for named in one['effects']) or 'nothing'
-            lines.append(f'| {one["effect"] or "nothing"} | {", ".join(drives or ["the arm"])} | '
-                         f'{one["verdict"]}: {said} |')
+        if judged.get('claimed') or not all(
+                right for what, right in judged.items() if what.startswith('exact')):
+            lines.append(f'| {one["effect"] or "nothing"} | {_on(one) or "the robot"} | '
+                         f'{one["verdict"]}: {_said(one) or "nothing"} |')
     return '\n'.join(lines) + '\n'
 
 
-def todo(model: Path, seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
+def todo(model: Path, seeds: int, nothing: int, sets: int) -> Iterator[tuple[str, int]]:
     """Yield effects that a robot can have and seeds, every effect once before any twice."""
     structure = ArmModel.load(model).robot.structure
     has_passive = any(row >= 0 and name not in structure.drives
@@ -127,12 +144,17 @@ def todo(model: Path, seeds: int, nothing: int) -> Iterator[tuple[str, int]]:
             yield from ((name, seed) for name in names)
         if seed < nothing:
             yield '', seed
+    for seed in range(sets):
+        rng = np.random.default_rng((seed, zlib.crc32(b'sets')))
+        for size in (2, 3):
+            yield '+'.join(rng.choice(sorted(names), size, replace=False)), seed
 
 
-def run(model: Path, seeds: int, nothing: int, duration: float, file: Path, each: Each) -> None:
+def run(model: Path, seeds: int, nothing: int, sets: int, duration: float, file: Path,
+        each: Each) -> None:
     """Run the cases that are not in a file of outcomes yet; append and print theirs."""
     run_missing(each, partial(run_case, model=model.resolve(), duration=duration),
-                {case: case for case in todo(model, seeds, nothing)}, file,
+                {case: case for case in todo(model, seeds, nothing, sets)}, file,
                 lambda outcome: (outcome['effect'], outcome['seed']), described)
 
 
@@ -142,11 +164,14 @@ def main() -> int:
     parser.add_argument('--model', type=Path, required=True, help='model file of an arm')
     parser.add_argument('--seeds', type=int, default=2, help='per effect (default 2)')
     parser.add_argument('--nothing', type=int, default=10, help='recordings without (default 10)')
+    parser.add_argument('--sets', type=int, default=0, metavar='N',
+                        help='pairs, and triples, of effects drawn at random (default 0)')
     parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
     options = parser.parse_args()
     with engine(options) as each:
-        run(options.model, options.seeds, options.nothing, options.duration, options.file, each)
+        run(options.model, options.seeds, options.nothing, options.sets,
+            options.duration, options.file, each)
     text = table(read_outcomes(options.file))
     if options.table:
         options.table.write_text(text)

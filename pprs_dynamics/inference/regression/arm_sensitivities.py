@@ -104,7 +104,8 @@ class ArmSensitivities(Sensitivities):
 
     def _state(self, model: ArmModel, state: LinkageState) -> LinkageState:
         """Return the same motion with the bodies of another model."""
-        found = replace(state, robot=model.robot, reversal=model.reversal, load=None)
+        found = replace(state, robot=model.robot, reversal=model.reversal, load=None,
+                        known=state.linkage)
         for effect in model.effects:
             if isinstance(effect, BodyEffect):
                 found = effect.apply(found)

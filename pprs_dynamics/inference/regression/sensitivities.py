@@ -173,6 +173,6 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
     A row for each of `PASSIVE_WIDTHS`, times the width of the state.
     """
     before = friction.force(state)
-    return np.stack([friction.force(replace(state, reversal=replace(
+    return np.stack([friction.force(state.turning_over(replace(
         state.reversal, rate=factor * state.reversal.rate))) - before
         for factor in PASSIVE_WIDTHS])

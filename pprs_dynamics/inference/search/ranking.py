@@ -262,20 +262,18 @@ def _falling(fits: FittedSets, best: CandidateSet, kept: CandidateSet,
              ) -> tuple[tuple[EffectCandidate, ...], tuple[CandidateSet, ...]]:
     """Return the effects of a set, what lowers the error most first, and the sets on the way.
 
-    As a multiple of each drive's noise, since drives may be of different sizes and units.
+    As a multiple of each drive's noise, since drives may be of different sizes and units. Without
+    the patterns: one over a position takes most of what a weight does there.
     """
     order: list[EffectCandidate] = []
-    path = [fits.evaluate(kept.unknowns)]
     left = list(kept.effects)
     while left:
-        with_each = {one: kept if len(left) == 1 else fits.evaluate(
-            (*order, one, *kept.unknowns)) for one in left}
-        following = min(left, key=lambda one: _over_noise(
-            fits, best, linear_residual(fits, with_each[one])))
+        following = left[0] if len(left) == 1 else min(left, key=lambda one: _over_noise(
+            fits, best, linear_residual(fits, fits.evaluate((*order, one)))))
         order.append(following)
-        path.append(with_each[following])
         left.remove(following)
-    return tuple(order), tuple(path)
+    path = [fits.evaluate((*order[:count], *kept.unknowns)) for count in range(len(order))]
+    return tuple(order), (*path, kept)
 
 
 def _over_noise(fits: FittedSets, best: CandidateSet, left: Array) -> float:

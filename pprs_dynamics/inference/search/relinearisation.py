@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
 from pprs_dynamics.inference.search.candidates import CandidateSet, bends
 from pprs_dynamics.inference.search.fitted_model import (
@@ -45,24 +46,35 @@ def around_fitted(first: Search, best: CandidateSet, report: Callable[[float], N
                   ) -> tuple[Search, CandidateSet]:
     """Return the search around the fitted model where that matters, and its best set."""
     found = _around_fitted(first, best, report, _bending_alone)
-    if _stands_out(found[0].fits, found[1]) and not all(map(bends, best.candidates)):
-        found = min(found, _around_fitted(first, best, report, _as_it_is, found[1].total),
-                    key=lambda one: beyond_lack_of_fit(one[0].fits, one[1])[0].total)
+    search, after = found
+    if ((search.is_beyond_point or _stands_out(search.fits, after))
+            and not all(map(bends, best.candidates))):
+        found = min(found, _around_fitted(first, best, report, _as_it_is, after.total),
+                    key=lambda one: _exact_total(
+                        one[0].fits, beyond_lack_of_fit(one[0].fits, one[1])[0]))
     return found
 
 
 def _around_fitted(
-    search: Search, best: CandidateSet, report: Callable[[float], None],
+    first: Search, at_first: CandidateSet, report: Callable[[float], None],
     first_step: Callable[[Search, CandidateSet], CandidateSet], rival: float = np.inf,
 ) -> tuple[Search, CandidateSet]:
     """Search again around the fitted model, until that is where columns were computed.
 
     `first_step` returns the set around which to expand where effects bend the columns that did
-    not yet; `rival` is the cost that each search has to reach for another one.
+    not yet; `rival` is the cost that each search has to reach for another one. A search whose
+    set costs more by its exact forces than that of the one before is not gone on from.
     """
-    decisions, scale = search.fits.decisions, search.fits.regression.error_scale
+    search, best = first, at_first
+    reached = _exact_total(first.fits, best)
     costs: dict[Hashable, float] = {}
-    refuted: set[Place] = set()
+    refuted: frozenset[Place] = frozenset()
+
+    def around(design: Design, number: int) -> Search:
+        fits = FittedSets(design, first.fits.decisions, first.fits.regression.error_scale)
+        return Search(fits, [one.around(fits.regression) for one in first.patterns], refuted,
+                      _share_of(report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
+
     for number in range(MOST_SEARCHES):
         kept, _ = beyond_lack_of_fit(search.fits, best)
         if search.is_beyond_point:
@@ -76,19 +88,34 @@ def _around_fitted(
             break
         starts = [one.candidates for one in dict.fromkeys((kept, best))]
         search.release()
-        design, patterns = last.design, search.patterns
+        design, before, accepted = last.design, search.fits.design.point, best.candidates
         del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
-        fits = FittedSets(design, decisions, scale)
-        search = Search(fits, [one.around(fits.regression) for one in patterns],
-                        frozenset(refuted), _share_of(
-                            report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
+        search = around(design, number)
         best = search.run(*starts)
+        now = _exact_total(search.fits, best)
+        if now > reached:
+            # Beyond where its columns hold: the search before it, once more.
+            if before is None:
+                return first, at_first
+            search = around(first.fits.design.around(before), number)
+            return search, search.run(accepted)
+        reached = now
         refuted |= _bent_in_vain(search, best)
         placed = frozenset((one.name, one.drives) for one in best.candidates)
         if best.total > rival or abs(costs.get(placed, np.inf) - best.cost) < LEAST_CHANGE:
             break  # found before: what follows would be what followed then
         costs[placed] = best.cost
     return search, best
+
+
+def _exact_total(fits: FittedSets, found: CandidateSet) -> float:
+    """Return the cost of a set by the exact forces of what of it would be adopted."""
+    kept, _ = beyond_lack_of_fit(fits, found)
+    try:
+        exact = exact_forces(fits.design, fitted_model(fits, kept))
+    except PprsError:
+        return np.inf
+    return found.total + squared(fits, kept, exact - linear_prediction(fits, kept))
 
 
 def _bent_in_vain(search: Search, best: CandidateSet) -> set[Place]:

@@ -9,7 +9,7 @@ of sums that are known. It proposes; a fit with its own noise decides (`search.s
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Hashable, Sequence
 
 import numpy as np
 
@@ -25,6 +25,7 @@ SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
 
 Place = tuple[type[CatalogueEffect], int | None]  # an effect, and the drive that it acts on alone
+Scored = tuple[float, Component]  # its gain less its price
 
 
 class Scan:
@@ -63,37 +64,40 @@ class Scan:
             if effects is not None and effect not in effects:
                 continue
             old = next((c for c in base.effects if c.effect is effect), None)
-            score, chosen = self.best_drives(effect, found, old)
-            if score > least and chosen:
-                kept = tuple(c for c in base.candidates if c is not old)
-                scored.append((score, (*kept, EffectCandidate.of(
-                    [*(old.components if old else ()), *chosen]))))
+            # A body on another link is another explanation where all are asked for.
+            for offered in [found] if count is not None else _by_place(effect, found):
+                score, chosen = self.best_drives(effect, offered, old)
+                if score > least and chosen:
+                    kept = tuple(c for c in base.candidates if c is not old)
+                    scored.append((score, (*kept, EffectCandidate.of(
+                        [*(old.components if old else ()), *chosen]))))
         scored.sort(key=lambda one: -one[0])
         return [candidates for _, candidates in scored[:count]]
 
     def offers(self, base: CandidateSet, drive: int | None = None,
-               ) -> dict[type[CatalogueEffect], list[tuple[float, Component]]]:
-        """Return gains less prices of components, by effect; one for each drive."""
+               ) -> dict[type[CatalogueEffect], list[Scored]]:
+        """Return gains less prices of components, by effect; one for each drive or place."""
         library, fit = self.fits.library, base.fit
         taken = {(one.effect, one.drive) for one in base.blocks}
         drives = tuple(library.local) if drive is None else (drive,)
         offered = each(lambda d: library.local[d].offers(fit), drives)
         offers = [offer for of_drive in offered for offer in of_drive.values()]
         offers += library.shared_offers(fit) if drive is None else []
-        best: dict[Place, tuple[float, Component]] = {}
+        best: dict[Hashable, Scored] = {}
         for one, gain in offers:
-            key = (one.effect, one.drive)
+            place = (one.effect, one.drive)
+            key = (*place, one.effect.places_of(one.names))
             net = gain - library.component_price(one)
-            if key not in taken and key not in self.refuted and (
+            if place not in taken and place not in self.refuted and (
                     key not in best or net > best[key][0]):
                 best[key] = (net, one)
-        found: dict[type[CatalogueEffect], list[tuple[float, Component]]] = {}
-        for (effect, _), scored in best.items():
-            found.setdefault(effect, []).append(scored)
+        found: dict[type[CatalogueEffect], list[Scored]] = {}
+        for scored in best.values():
+            found.setdefault(scored[1].effect, []).append(scored)
         return found
 
     def best_drives(
-        self, effect: type[CatalogueEffect], found: list[tuple[float, Component]],
+        self, effect: type[CatalogueEffect], found: Sequence[Scored],
         old: EffectCandidate | None,
     ) -> tuple[float, list[Component]]:
         """Return the drives on which an effect pays, and the score of all together."""
@@ -107,6 +111,11 @@ class Scan:
         scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
         best = int(np.argmax(scores))
         return float(scores[best]), [one for _, one in found[:best + 1]]
+
+
+def _by_place(effect: type[CatalogueEffect], found: Sequence[Scored]) -> list[Sequence[Scored]]:
+    """Return one list for each link or joint of an effect that is on one, else one of all."""
+    return [[one] for one in found] if effect.is_of_one_place else [found]
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:

@@ -308,6 +308,12 @@ class LinkageState(JointMotion):
         return friction_efforts(linkage.structure.tables, linkage.motion, self.reactions, friction,
                                 linkage.twists[0])
 
+    def turning_over(self, reversal: Reversal) -> LinkageState:
+        """Return the state with a sgn of other widths; all else is computed once for both."""
+        state = replace(self, reversal=reversal, known=self.linkage)
+        vars(state)['reactions'] = self.reactions
+        return state
+
     def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> LinkageState:
         """Return a state of this motion with other bodies, and with an additional load."""
         if load is None:

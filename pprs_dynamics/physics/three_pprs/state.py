@@ -194,6 +194,12 @@ class MechanismState:
         """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
 
+    def turning_over(self, reversal: Reversal) -> MechanismState:
+        """Return the state with a sgn of other widths; all else is computed once for both."""
+        state = replace(self, reversal=reversal)
+        vars(state)['rigid_body'] = self.rigid_body
+        return state
+
     def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
         """Return a state of this motion with other bodies, and with an additional load.
 
