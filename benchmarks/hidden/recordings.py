@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmarks.hidden.driven_motion import DrivenMotion
 from benchmarks.hidden.motions import draw_motion
+from benchmarks.hidden.off_forms import off_form
 from benchmarks.hidden.prescribed import PrescribedPlant, Readings
 from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
 from pprs_dynamics import DriveModel
@@ -31,7 +32,7 @@ from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effect import DriveForce, HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.hidden_forces import Vibration
 from pprs_dynamics.simulation.plant import PlantSettings
@@ -262,6 +263,9 @@ def _draw(case: Case, place: Scene, name: str) -> _Drawn:
 def _effect(case: Case, name: str, what: str, scale: float) -> HiddenEffect:
     """Return the effect that a case draws; in the row `vibration` at any frequency."""
     effect = draw_effect(name, case.rng(what), scale)
+    if case.row == 'forms':
+        assert isinstance(effect, DriveForce)
+        return off_form(effect, case.rng(f'form {what}'))
     if case.row != 'vibration':
         return effect
     frequency = float(np.exp(case.rng(f'frequency {what}').uniform(*np.log(VIBRATIONS))))
