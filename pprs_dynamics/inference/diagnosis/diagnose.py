@@ -299,9 +299,17 @@ class _Answer:
                 statements.append(word_statement(
                     self.drives[d], libraries[d], candidate, self.kept.fit.of(block),
                     self._evidence(candidate), ()))
-        statements += levels(self.fits.regression.residuals, dict(noise),
-                             self.decisions).values()
+        drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
+        statements += [one for name, one in drifting.items()
+                       if one.amplitude > self._lack_of_fit(self.drives.index(name))]
         return tuple(sorted(statements, key=lambda one: -one.evidence))
+
+    def _lack_of_fit(self, d: int) -> float:
+        """Return what the forms of the adopted effects may leave on a drive, rms [N]."""
+        forces = [self.fits.library.force(self.kept, one, self.design.residuals.measured.shape)
+                  for one in self.kept.effects if one.effect.idealised]
+        return self.decisions.form_share * float(np.sqrt(sum(
+            np.mean(np.square(force[:, d])) for force in forces)))
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""
