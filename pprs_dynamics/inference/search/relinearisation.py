@@ -24,7 +24,6 @@ from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
-    linear_residual,
     model_at,
     parts_of,
     squared,
@@ -63,10 +62,9 @@ def _around_fitted(
 
     `first_step` returns the set around which to expand where effects bend the columns that did
     not yet; `rival` is the cost that each search has to reach for another one. A search whose
-    set costs more by its exact forces than that of the one before is not gone on from.
+    set stands out by its exact forces is far from where its columns hold: it is not gone on from.
     """
     search, best = first, at_first
-    reached = _exact_total(first.fits, best)
     costs: dict[Hashable, float] = {}
     refuted: frozenset[Place] = frozenset()
 
@@ -92,14 +90,11 @@ def _around_fitted(
         del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
         search = around(design, number)
         best = search.run(*starts)
-        now = _exact_total(search.fits, best)
-        if now > reached:
-            # Beyond where its columns hold: the search before it, once more.
+        if _stands_out(search.fits, best):
             if before is None:
                 return first, at_first
-            search = around(first.fits.design.around(before), number)
+            search = around(first.fits.design.around(before), number)  # the one before, again
             return search, search.run(accepted)
-        reached = now
         refuted |= _bent_in_vain(search, best)
         placed = frozenset((one.name, one.drives) for one in best.candidates)
         if best.total > rival or abs(costs.get(placed, np.inf) - best.cost) < LEAST_CHANGE:
@@ -146,13 +141,15 @@ def _as_it_is(search: Search, best: CandidateSet) -> CandidateSet:
 def _stands_out(fits: FittedSets, best: CandidateSet) -> bool:
     """Return whether what will be adopted leaves a drive much more than its fit does.
 
-    The fit has columns for what forms leave open, which a model has not.
+    The fit has columns for what forms leave open, which a model has not; and it is linear.
     """
     kept, _ = beyond_lack_of_fit(fits, best)
-    if kept is best:
-        return False
     regression = fits.regression
-    left = np.sqrt(np.nanmean(np.square(linear_residual(fits, kept)), axis=0))
+    try:
+        forces = exact_forces(fits.design, fitted_model(fits, kept))
+    except PprsError:
+        return True
+    left = np.sqrt(np.nanmean(np.square(regression.residuals.measured - forces), axis=0))
     promised = fits.decisions.left_ratio * regression.left(kept.fit)
     return bool(np.any(left[list(regression.drives)] > promised))
 
