@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
@@ -24,6 +25,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
+    linear_residual,
     model_at,
     parts_of,
     squared,
@@ -49,8 +51,7 @@ def around_fitted(first: Search, best: CandidateSet, report: Callable[[float], N
     if ((search.is_beyond_point or _stands_out(search.fits, after))
             and not all(map(bends, best.candidates))):
         found = min(found, _around_fitted(first, best, report, _as_it_is, after.total),
-                    key=lambda one: _exact_total(
-                        one[0].fits, beyond_lack_of_fit(one[0].fits, one[1])[0]))
+                    key=lambda one: _exact_total(one[0].fits, one[1]))
     return found
 
 
@@ -62,7 +63,7 @@ def _around_fitted(
 
     `first_step` returns the set around which to expand where effects bend the columns that did
     not yet; `rival` is the cost that each search has to reach for another one. A search whose
-    set stands out by its exact forces is far from where its columns hold: it is not gone on from.
+    set is far from where its columns hold is not gone on from.
     """
     search, best = first, at_first
     costs: dict[Hashable, float] = {}
@@ -90,7 +91,7 @@ def _around_fitted(
         del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
         search = around(design, number)
         best = search.run(*starts)
-        if _stands_out(search.fits, best):
+        if _is_far(search.fits, best):
             if before is None:
                 return first, at_first
             search = around(first.fits.design.around(before), number)  # the one before, again
@@ -103,14 +104,14 @@ def _around_fitted(
     return search, best
 
 
-def _exact_total(fits: FittedSets, found: CandidateSet) -> float:
-    """Return the cost of a set by the exact forces of what of it would be adopted."""
-    kept, _ = beyond_lack_of_fit(fits, found)
+def _exact_total(fits: FittedSets, best: CandidateSet) -> float:
+    """Return the cost, by its exact forces, of what will be adopted of a set."""
+    kept, _ = beyond_lack_of_fit(fits, best)
     try:
         exact = exact_forces(fits.design, fitted_model(fits, kept))
     except PprsError:
         return np.inf
-    return found.total + squared(fits, kept, exact - linear_prediction(fits, kept))
+    return kept.total + squared(fits, kept, exact - linear_prediction(fits, kept))
 
 
 def _bent_in_vain(search: Search, best: CandidateSet) -> set[Place]:
@@ -138,20 +139,33 @@ def _as_it_is(search: Search, best: CandidateSet) -> CandidateSet:
     return best
 
 
-def _stands_out(fits: FittedSets, best: CandidateSet) -> bool:
-    """Return whether what will be adopted leaves a drive much more than its fit does.
-
-    The fit has columns for what forms leave open, which a model has not; and it is linear.
-    """
+def _is_far(fits: FittedSets, best: CandidateSet) -> bool:
+    """Return whether exact forces leave a drive much more than what will be adopted promises."""
     kept, _ = beyond_lack_of_fit(fits, best)
-    regression = fits.regression
     try:
         forces = exact_forces(fits.design, fitted_model(fits, kept))
     except PprsError:
-        return True
-    left = np.sqrt(np.nanmean(np.square(regression.residuals.measured - forces), axis=0))
-    promised = fits.decisions.left_ratio * regression.left(kept.fit)
-    return bool(np.any(left[list(regression.drives)] > promised))
+        return True  # values that no model may have
+    left, promised = (_rms_by_drive(fits, error) for error in (
+        fits.regression.residuals.measured - forces, linear_residual(fits, kept)))
+    return bool(np.any(left > fits.decisions.left_ratio * promised))
+
+
+def _rms_by_drive(fits: FittedSets, error: Array) -> Array:
+    found: Array = np.sqrt(np.nanmean(np.square(error), axis=0))[list(fits.regression.drives)]
+    return found
+
+
+def _stands_out(fits: FittedSets, best: CandidateSet) -> bool:
+    """Return whether what will be adopted leaves a drive much more than its fit does.
+
+    The fit has columns for what forms leave open, which a model has not.
+    """
+    kept, _ = beyond_lack_of_fit(fits, best)
+    if kept is best:
+        return False
+    left = _rms_by_drive(fits, linear_residual(fits, kept))
+    return bool(np.any(left > fits.decisions.left_ratio * fits.regression.left(kept.fit)))
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,
