@@ -40,7 +40,7 @@ class Decisions:
         0.01, '1', 'prior odds of a form that is in no catalogue, against one that is',
         'a free curve imitates effects; it has to be much better to be believed')
     form_share: float = _number(
-        0.1, '1', 'share of the force of an idealised effect that its lack of fit may leave',
+        0.15, '1', 'share of the force of an idealised effect that its lack of fit may leave',
         'forms of friction and springs in the literature differ by 5 to 15 %')
     own_form_share: float = _number(
         0.02, '1', "the same for the model's own friction",
