@@ -171,9 +171,10 @@ class Library:
         known = {c.name: c for c in component.effect.coefficients}
         for k, name in enumerate(component.names):
             expected = known[name].expected
-            if component.drive is not None and expected is not None:
+            if expected is not None:
                 limit = given.values.get(f'tolerances.{component.effect.name}.{name}')
-                usual = expected[given.units[component.drive].turns]
+                usual = expected[component.drive is not None
+                                 and given.units[component.drive].turns]
                 precision[k] = (limit / DEVIATIONS if limit else usual) ** -2
         return np.diag(precision)
 
@@ -240,10 +241,11 @@ class Library:
             usual = self._expected(component)
             if np.any(usual):
                 decisions, both = self.prices.decisions, self.block(component).precision
-                odds = (decisions.zero_odds if component.effect.shifts_positions()
-                        else decisions.gain_odds)
-                price += float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1]
-                               - 2 * np.log(odds))
+                price += float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
+                if component.drive is not None:
+                    price -= 2 * float(np.log(
+                        decisions.zero_odds if component.effect.shifts_positions()
+                        else decisions.gain_odds))
             self._prices[component] = price
         return self._prices[component]
 

@@ -20,7 +20,11 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
-from pprs_dynamics.inference.search.candidates import CandidateSet, bends
+from pprs_dynamics.inference.search.candidates import (
+    CandidateSet,
+    EffectCandidate,
+    bends,
+)
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
@@ -130,8 +134,38 @@ def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:
 
     What was found beside them may only make good that columns were not bent.
     """
+    best = _rebent(search.fits, best)
     alone = search.rescanned(search.fits.evaluate(tuple(filter(bends, best.candidates))))
     return search.fits.at_noise_of(best, alone.candidates)
+
+
+def _rebent(fits: FittedSets, best: CandidateSet) -> CandidateSet:
+    """Return a set with the effect on the structure that bends it least in vain.
+
+    Tilts, wrenches and offsets of a payload are nearly one thing where columns are not bent, and
+    quite others where they are: each is tried around its own fitted model.
+    """
+    own = [one for one in best.effects if _bends_structure(one)]
+    if len(own) != 1:
+        return best
+    rivals: dict[str, CandidateSet] = {}
+    for one in sorted(fits.sets, key=lambda one: one.cost):
+        if len(one.effects) == len(one.candidates) == 1 and _bends_structure(one.effects[0]):
+            rivals.setdefault(one.effects[0].name, one)
+    rivals.pop(own[0].name, None)
+
+    def around_itself(found: CandidateSet) -> float:
+        try:
+            return linearised(fits, found)[1].total
+        except PprsError:
+            return np.inf
+    rest = best.without(*own)
+    others = [fits.evaluate((*rest, *one.candidates)) for one in rivals.values()]
+    return min((best, *others), key=around_itself) if others else best
+
+
+def _bends_structure(candidate: EffectCandidate) -> bool:
+    return bends(candidate) and candidate.drives is None
 
 
 def _as_it_is(search: Search, best: CandidateSet) -> CandidateSet:

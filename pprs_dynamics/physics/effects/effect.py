@@ -37,7 +37,7 @@ class Parameter:
         True for a phase: its size says nothing about how strong the effect is.
     expected : (float, float), optional
         How large it usually is, as a standard deviation, in a drive that pushes and in one that
-        turns; without it any size is as likely as another.
+        turns, the same in the structure; without it any size is as likely as another.
     """
 
     name: str

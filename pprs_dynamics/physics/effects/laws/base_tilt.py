@@ -30,7 +30,7 @@ class BaseTilt(BodyEffect):
     bends_columns: ClassVar[bool] = True
     linear = tuple(
         Parameter(axis, f'alpha_{axis}', 'rad', f'turn of gravity about {axis} of base', -3.2, 3.2,
-                  scale=0.01)
+                  scale=0.01, expected=(0.1, 0.1))
         for axis in 'xy')
     card = Card(
         'g -> R_y(alpha_y) R_x(alpha_x) g, in base',
