@@ -140,10 +140,9 @@ def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:
 
 
 def _rebent(fits: FittedSets, best: CandidateSet) -> CandidateSet:
-    """Return a set with the effect on the structure that bends it least in vain.
+    """Return a set with that effect on the structure which costs least around its own model.
 
-    Tilts, wrenches and offsets of a payload are nearly one thing where columns are not bent, and
-    quite others where they are: each is tried around its own fitted model.
+    Tilts, wrenches and offsets of a payload look nearly alike where columns are not bent by them.
     """
     own = [one for one in best.effects if _bends_structure(one)]
     if len(own) != 1:
