@@ -16,6 +16,7 @@ from pprs_dynamics import AxisModel, DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search import relinearisation
 from pprs_dynamics.inference.search import search as search_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -150,6 +151,30 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     # Around the last point the linear forces are those of the model that is handed on.
     exact = exact_forces(last.design, fitted_model(last, found))
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
+
+
+TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
+
+
+@pytest.mark.parametrize(('tilt', 'is_far'), [(0.02, False), (0.9, True)])
+def test_a_set_is_far_where_exact_forces_leave_more_than_linear_ones(
+        tilt: float, is_far: bool) -> None:
+    recording = recording_of({'base_tilt': {'x': tilt, 'y': 0.0}})
+    fits = FittedSets(Design.of(MODEL, [recording]), DECISIONS)
+    found = fits.evaluate((TILTED,))
+    assert names(found) == ['base_tilt']
+    assert relinearisation._is_far(fits, found) is is_far
+
+
+def test_a_search_that_is_far_is_not_gone_on_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = recording_of({'base_tilt': {'x': 0.05, 'y': 0.0}})
+    first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
+    best = first.run()
+    search, found = relinearisation.around_fitted(first, best, lambda share: None)
+    assert search is not first
+    assert names(found) == ['base_tilt']
+    monkeypatch.setattr(relinearisation, '_is_far', lambda fits, found: True)
+    assert relinearisation.around_fitted(first, best, lambda share: None) == (first, best)
 
 
 @pytest.mark.parametrize(('viscous', 'stands_out'), [(0.02, False), (0.08, True)])
