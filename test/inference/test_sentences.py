@@ -356,6 +356,13 @@ def test_one_pattern_on_all_drives_is_one_finding() -> None:
     assert 'place' not in words.headline
 
 
+def test_a_rival_on_another_link_is_named_with_it() -> None:
+    diagnosis = replace(ambiguous(), indistinguishable=(('base_tilt', 'link_mass:bar_upper'),))
+    words = word_diagnosis(diagnosis)
+    assert 'base_tilt or link_mass on bar_upper: this data cannot tell which' in words.headline
+    assert 'link_mass:' not in words.headline
+
+
 def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:
     found = found_effect('external_wrench', None)
     rival = RivalEffect('base_tilt', found.effect, None, found.parameters, 0.0521, 0.0533, 3.24,

@@ -199,7 +199,10 @@ def _doubt(diagnosis: Diagnosis) -> str:
 def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     # One number for each, in the order of which they stand.
     several = f' ({percent(-effect.share)})' if len(diagnosis.effects) > 1 else ''
-    return listed([_title(diagnosis, effect), *_rivals(diagnosis, effect)], 'or') + several
+    title, rivals = _title(diagnosis, effect), _rivals(diagnosis, effect)
+    if rivals and ' or ' in title:
+        return f'{title}; or {listed(rivals, "or")}{several}'
+    return listed([title, *rivals], 'or') + several
 
 
 def _title(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
@@ -210,8 +213,8 @@ def _title(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
 
 
 def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
-    return [name for names in diagnosis.indistinguishable if names[0] == effect.name
-            for name in names[1:]]
+    return [name.replace(':', ' on ') for names in diagnosis.indistinguishable
+            if names[0] == effect.name for name in names[1:]]
 
 
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
