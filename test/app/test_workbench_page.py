@@ -97,7 +97,7 @@ def page(browser: Any, bench: Workbench) -> Iterator[Page]:
         if effect['is_ticked']:
             bench.post('/api/tick', effect=effect['name'], is_ticked=False,
                        revision=bench.screen()['revision'])
-    bench.settled()
+    bench.at_rest()
     found = Page(browser, bench)
     found.settled()
     yield found
@@ -246,8 +246,8 @@ def test_what_did_not_change_is_not_sent_again(page: Page, bench: Workbench) -> 
     assert 'verdict' not in tick.header
     page.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
     # The page, by changes alone, shows what a page shows that is opened now.
+    whole = bench.settled()
     state = page.settled()
-    whole = bench.get('/api/screen').header
     for key in ('effects', 'errors', 'overall', 'recordings', 'revision', 'stage'):
         assert state[key] == whole[key]
 

@@ -113,6 +113,11 @@ class Workbench:
     def settled(self) -> dict[str, Any]:
         return self.wait(lambda screen: screen.get('is_settled'))
 
+    def at_rest(self) -> dict[str, Any]:
+        """Return the screen once nothing changes it any more: the diagnosis has ended as well."""
+        return self.wait(lambda screen: screen.get('is_settled') and screen['verdict'] and not any(
+            job['is_running'] for job in screen['jobs'].values()))
+
 
 @contextmanager
 def workbench(*arguments: object, folder: Path) -> Iterator[Workbench]:
