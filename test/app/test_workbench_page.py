@@ -225,6 +225,8 @@ def test_an_answer_that_comes_after_the_mark_was_forgotten_is_not_shown(page: Pa
     page.mark(3, 0.3, 0.6)
     page.tab.wait_for_function("document.getElementById('brush-drive').value === 'lift_1'")
     page.tab.keyboard.press('Escape')
+    while not held:
+        page.tab.wait_for_timeout(10)
     with page.tab.expect_response('**/api/shares'):
         held[0].continue_()
     page.tab.evaluate('new Promise((done) => requestAnimationFrame(() => setTimeout(done)))')
@@ -384,6 +386,27 @@ def test_a_button_stays_while_it_is_pressed(page: Page) -> None:
     page.tab.mouse.up()
     assert page.tab.evaluate('window.pressed') is True
     assert page.tab.get_by_role('progressbar', name='designing').evaluate('bar => bar.value') == 0.6
+
+
+def test_nothing_moves_under_a_press(page: Page, bench: Workbench) -> None:
+    """A fit that ends in between, or another browser, would carry the button away."""
+    page.tick('payload_mass')
+    field = page.tab.locator('[id="payload_mass-mass"]')
+    field.fill('1.5')
+    field.press('Enter')
+    page.tab.wait_for_function('bench.state.departure > 10')
+    page.settled()
+    release = page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Best')
+    release.hover()
+    box = release.bounding_box()
+    page.tab.mouse.down()
+    assert bench.post('/api/release', effect='payload_mass',
+                      revision=bench.screen()['revision']).status == 200
+    page.tab.wait_for_function('bench.state.departure === 0 && bench.state.is_settled')
+    assert release.bounding_box() == box
+    with page.tab.expect_response('**/api/release'):
+        page.tab.mouse.up()
+    release.wait_for(state='hidden')
 
 
 def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:

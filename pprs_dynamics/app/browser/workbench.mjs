@@ -24,6 +24,8 @@ let view = 'curves';
 let mark = null; // what somebody asks about
 let latest = []; // what is left now, by drive
 let pending; // when the tick was made whose fit is awaited
+let isPressed = false; // whether something that can be clicked is
+let held = null; // what came meanwhile
 
 const unit = (drive, quantity) => unitOf(server.state, drive, quantity);
 const tabs = [...document.querySelectorAll('[role=tab]')];
@@ -37,7 +39,12 @@ const tell = (text, isGood = false) => {
   $('message').classList.toggle('good', isGood);
 };
 
+/* A button that moves between press and release is never clicked: what comes then is shown after. */
 const show = (last, state, arrays) => {
+  if (isPressed) {
+    held = {last: held ? held.last : last, state, arrays: {...held?.arrays, ...arrays}};
+    return;
+  }
   if (state.failure) tell(state.failure);
   $('live-tab').hidden = !state.has_live;
   if (state.is_empty) {
@@ -290,6 +297,17 @@ document.addEventListener('keydown', (event) => {
   else if (event.key === 'a') curves.all();
   else if (tab) open(tab.dataset.view);
 });
+document.addEventListener('pointerdown', (event) => {
+  isPressed = Boolean(event.target.closest('button, a, label, [type=checkbox]'));
+}, {capture: true});
+for (const end of ['pointerup', 'pointercancel']) {
+  document.addEventListener(end, () => setTimeout(() => { // the click comes first
+    isPressed = false;
+    const came = held;
+    held = null;
+    if (came) show(came.last, came.state, came.arrays);
+  }), {capture: true});
+}
 whenDark(() => { if (server.state?.errors) showErrors($('errors'), server.state); });
 drawScale($('robot-scale'));
 const events = new EventSource('/api/events');
