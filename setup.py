@@ -80,7 +80,8 @@ setup(
                  'jsonschema>=4',  # ~/status against its schema
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',
                  'colcon-common-extensions', 'colcon-ros',
-                 'ament-lint-flake8>=0.14', 'ament-lint-pep257>=0.14',  # as `colcon test` elsewhere
+                 # As `colcon test`; its wheel asks for a flake8 that ends with Python 3.11
+                 'ament-lint-flake8>=0.14; python_version < "3.12"', 'ament-lint-pep257>=0.14',
                  'ros-test-msgs==2.3.0',  # an action, which the wheels of `ros` have none of
                  # colcon build --symlink-install calls `setup.py develop`, gone from 80 on.
                  'setuptools<80'],

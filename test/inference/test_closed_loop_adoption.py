@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import subprocess
 from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
 import pytest
 from closed_loop import RATE, Case, Tracking, execute, run_case
 from ros_processes import executable
@@ -23,6 +25,8 @@ pytestmark = pytest.mark.nodes
 HIDDEN = 'coulomb_friction'
 DURATION = 6.0  # [s]
 PATH = ['source:=excitation', f'duration:={DURATION}', 'seed:=1']
+LONGEST_GAP = 0.05  # [s] between commands; the spline through them is another path beyond it
+RUNS = 3  # until one has no longer gap: a machine may be too busy for commands at 200 Hz
 
 
 @dataclass
@@ -39,7 +43,7 @@ class Runs:
 def runs(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Runs:
     folder = tmp_path_factory.mktemp('closed_loop')
     known, hidden = Case('known', 'friction'), Case('hidden', 'friction', (HIDDEN,))
-    first = run_case(hidden, PATH, DURATION, ros_domain, folder)
+    first = _run_without_gaps(hidden, ros_domain, folder)
     # Where commands come late, the error is theirs, and of the recording little is left.
     on_time = execute(hidden, first.commands)
     write_recording(folder / 'run.mcap', on_time.recording('run'))
@@ -48,10 +52,18 @@ def runs(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Runs:
          str(folder / 'adopted.yaml')], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     adopted = Case('adopted', 'friction', (HIDDEN,), folder / 'adopted.yaml')
-    second = run_case(adopted, PATH, DURATION, ros_domain, folder)
+    second = _run_without_gaps(adopted, ros_domain, folder)
     # Commands do not depend on the robot: those of the first run are those of the paper's model.
     return Runs(execute(known, first.commands), on_time,
                 execute(adopted, second.commands), (len(first.commands), len(second.commands)))
+
+
+def _run_without_gaps(case: Case, domain: int, folder: Path) -> Tracking:
+    for _ in range(RUNS):
+        run = run_case(case, PATH, DURATION, domain, folder)
+        if np.max(np.diff(run.commands[:, 0])) < LONGEST_GAP:
+            break
+    return run
 
 
 def test_every_command_went_over_the_topics(runs: Runs) -> None:
