@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import around_fitted, linearised
+from pprs_dynamics.inference.search.relinearisation import around_fitted, linearised_anew
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import PatternLibrary
 from pprs_dynamics.measurement.files.recording import Recording
@@ -109,7 +109,7 @@ class Ranking:
         """
         last, best, kept = self.last, self.best, self.last.pruned(self.without[gone])
         if bends(gone):
-            around, kept = linearised(last, kept)
+            around, kept = linearised_anew(self.first, last, kept)
             last = FittedSets(around.design, around.decisions, around.regression.error_scale)
             best = kept = last.refined(last.evaluate(kept.candidates))
         return self._keeping(self.first, last, tuple(

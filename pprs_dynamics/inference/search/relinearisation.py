@@ -226,6 +226,22 @@ def linearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, Candi
     return fits, found
 
 
+def linearised_anew(first: FittedSets, last: FittedSets, found: CandidateSet,
+                    ) -> tuple[FittedSets, CandidateSet]:
+    """Return a set that an effect was taken out of around its own fitted model.
+
+    What the effect bent may be too far for steps back: the way from the model as given is gone as
+    well, and the lower exact cost counts.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    return min((linearised(fits, fits.evaluate(found.candidates)) for fits in (last, first)),
+               key=lambda one: _exact_total(*one))
+
+
 def next_operating_point(fits: FittedSets, found: CandidateSet) -> OperatingPoint | None:
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Any, ClassVar, Self
 
@@ -37,10 +38,15 @@ def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: flo
           for axes in (*MOMENTS, *PRODUCTS)))
 
 
-def body_coefficients(prefix: str, link: str) -> tuple[Parameter, ...]:
-    """Return what efforts are linear in: the first moment instead of the centre."""
+def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, ...]:
+    """Return what efforts are linear in: the first moment instead of the centre.
+
+    `moved` is the mass of all that the mechanism moves, as which a body is usually no heavier:
+    on a link that turns about a fixed axis a recording decides the first moment, not the mass.
+    """
     mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
-    return (mass, *(Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
+    usual = replace(mass, expected=(moved, moved) if moved > 0 else None)
+    return (usual, *(Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
                               f'mass times its place along {axis} of {link}, from the centre',
                               -1e3, 1e3, 0.0, scale=0.05) for axis in AXES), *rest[3:])
 
@@ -65,8 +71,8 @@ class AddedBody(BodyEffect):
     @classmethod
     @cache
     def on(cls, places: tuple[Place, ...],
-           alike: tuple[tuple[str, ...], ...]) -> type[Self]:
-        """Return the effect with these places.
+           alike: tuple[tuple[str, ...], ...], moved: float) -> type[Self]:
+        """Return the effect with these places on a mechanism that moves so much mass.
 
         Of links that are alike the first stands for all with a body anywhere; with a mass more
         at its own centre each of them is a hypothesis of its own.
@@ -74,7 +80,7 @@ class AddedBody(BodyEffect):
         stand_ins = {name for group in alike for name in group[1:]}
         linear = tuple(one for place in places for one in body_parameters(*place))
         coefficients = tuple(one for prefix, link, _, _ in places
-                             for one in body_coefficients(prefix, link))
+                             for one in body_coefficients(prefix, link, moved))
         names: list[tuple[str, ...]] = []
         for prefix, link, _, _ in places:
             mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
@@ -86,7 +92,7 @@ class AddedBody(BodyEffect):
         made: type[Self] = type(cls.__name__, (cls,), {
             'places': places, 'linear': linear, 'coefficients': coefficients,
             'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
-            'made_by': (cls.on, (places, alike))})
+            'made_by': (cls.on, (places, alike, moved))})
         return made
 
     @classmethod

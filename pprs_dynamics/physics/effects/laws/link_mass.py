@@ -56,4 +56,4 @@ class LinkMass(AddedBody):
         # What the link that carries the tool does as well is a payload.
         groups = tuple(tuple(robot.body_names[k] for k in sorted(
             group, key=lambda k: k != robot.carrier)) for group in alike_bodies(robot))
-        return cls.on(tuple(places), groups)
+        return cls.on(tuple(places), groups, float(robot.masses.sum()))

@@ -55,7 +55,8 @@ class PayloadMass(BodyEffect):
         if not isinstance(robot, Mechanism):
             return cls
         carried = float(robot.masses[robot.carrier]) if robot.carrier >= 0 else 0.0
-        return _ToolBody.on((('', robot.structure.tool, (0.0, 0.0, 0.0), carried),), ())
+        return _ToolBody.on((('', robot.structure.tool, (0.0, 0.0, 0.0), carried),), (),
+                            float(robot.masses.sum()))
 
     def changed(self, robot: Robot) -> Robot:
         """Return the robot with the other payload."""
