@@ -153,6 +153,26 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
+def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> None:
+    """What else was found may only have made good what that one did."""
+    delayed = {drive: {'delay': 0.01} for drive in DRIVES}
+    ranking = select(MODEL, [recording_of({
+        'time_delay': delayed, 'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}})],
+        DECISIONS)
+    delay, stribeck = (next(one for one in ranking.kept.effects if one.name == name)
+                       for name in ('time_delay', 'stribeck_friction'))
+    without = ranking.less(delay)
+    assert without.refuted == {(delay.effect, d) for d in range(6)}
+    assert 'time_delay' not in {name for found in without.sets for name in names(found)}
+    # As if it had never been found.
+    assert without.nothing.cost == pytest.approx(ranking.nothing.cost)
+    assert without.last is not ranking.last
+    # One that bends none takes along what paid beside it, and the search stands.
+    simpler = ranking.less(stribeck)
+    assert simpler.last is ranking.last
+    assert names(simpler.kept) == ['time_delay']
+
+
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
 
 

@@ -25,7 +25,8 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import around_fitted, linearised_anew
+from pprs_dynamics.inference.search.relinearisation import around_fitted
+from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import PatternLibrary
 from pprs_dynamics.measurement.files.recording import Recording
@@ -73,6 +74,8 @@ class Ranking:
         Those of the kept set, each the one that lowers most what those before it leave.
     path : tuple of CandidateSet
         From the patterns of the kept set to all of it, an effect more in each in that order.
+    refuted : frozenset of Place
+        What took no part in the search, as held-out data did not confirm it.
     """
 
     first: FittedSets = field(repr=False)
@@ -86,34 +89,37 @@ class Ranking:
     without: Mapping[Candidate, CandidateSet] = field(repr=False)
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
+    refuted: frozenset[Place]
 
     @classmethod
-    def of(cls, first: FittedSets, last: Search, best: CandidateSet) -> Ranking:
+    def of(cls, first: FittedSets, last: Search, best: CandidateSet,
+           refuted: frozenset[Place]) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
         best, kept, remainders = without_remainders(last, best)
-        return cls._keeping(first, last.fits, last.patterns, best, kept, remainders)
+        return cls._keeping(first, last.fits, last.patterns, best, kept, remainders, refuted)
 
     @classmethod
     def _keeping(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
                  best: CandidateSet, kept: CandidateSet, remainders: tuple[Remainder, ...],
-                 ) -> Ranking:
+                 refuted: frozenset[Place]) -> Ranking:
         without = {gone: last.evaluate(kept.without(gone)) for gone in kept.candidates}
         order, path = _falling(last, best, kept)
         return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), best, kept,
-                   remainders, MappingProxyType(without), order, path)
+                   remainders, MappingProxyType(without), order, path, refuted)
 
     def less(self, gone: EffectCandidate) -> Ranking:
-        """Return the ranking without one of the kept effects, and what paid only beside it.
+        """Return the ranking without one of the kept effects.
 
-        Where that one bent the columns, around what is left of the fitted model.
+        Where that one bent the columns, everything was found around it: the search begins again.
+        Else what paid only beside it goes with it.
         """
-        last, best, kept = self.last, self.best, self.last.pruned(self.without[gone])
-        if bends(gone):
-            around, kept = linearised_anew(self.first, last, kept)
-            last = FittedSets(around.design, around.decisions, around.regression.error_scale)
-            best = kept = last.refined(last.evaluate(kept.candidates))
-        return self._keeping(self.first, last, tuple(
-            one.around(last.regression) for one in self.patterns), best, kept, self.remainders)
+        places = {(one.effect, one.drive) for one in gone.components}
+        refuted = self.refuted | places
+        if bends(gone) and not places <= self.refuted:
+            return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
+        kept = self.last.pruned(self.without[gone])
+        return self._keeping(self.first, self.last, self.patterns, self.best, kept,
+                             self.remainders, refuted)
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -230,18 +236,22 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
-    first = FittedSets(design, decisions)
-    search = Search(first, patterns_of(first), (), lambda share: report(0.25 + 0.35 * share))
+    return _searched(FittedSets(design, decisions), frozenset(), report)
+
+
+def _searched(first: FittedSets, refuted: frozenset[Place],
+              report: Callable[[float], None] = lambda share: None) -> Ranking:
+    search = Search(first, patterns_of(first), refuted, lambda share: report(0.25 + 0.35 * share))
     last, best = around_fitted(search, search.run(), report)
     # Rivals that bend no columns are judged where none are bent: the best of each kind.
     seen = {_claims(best)}
     for one in _by_cost(last.fits.sets) if last is not search else ():
-        if one.cost > best.cost + decisions.rival_margin:
+        if one.cost > best.cost + first.decisions.rival_margin:
             break
         if one.effects and not one.unknowns and not _is_bent(one) and _claims(one) not in seen:
             seen.add(_claims(one))
             first.refined(first.evaluate(one.candidates))
-    found = Ranking.of(first, last, best)
+    found = Ranking.of(first, last, best, refuted)
     report(1.0)
     return found
 

@@ -71,7 +71,7 @@ def _around_fitted(
     """
     search, best = first, at_first
     costs: dict[Hashable, float] = {}
-    refuted: frozenset[Place] = frozenset()
+    refuted = first.refuted
 
     def around(design: Design, number: int) -> Search:
         fits = FittedSets(design, first.fits.decisions, first.fits.regression.error_scale)
@@ -224,22 +224,6 @@ def linearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, Candi
         fits = FittedSets(fits.design.around(point), fits.decisions, fits.regression.error_scale)
         found = fits.refined(fits.evaluate(found.candidates))
     return fits, found
-
-
-def linearised_anew(first: FittedSets, last: FittedSets, found: CandidateSet,
-                    ) -> tuple[FittedSets, CandidateSet]:
-    """Return a set that an effect was taken out of around its own fitted model.
-
-    What the effect bent may be too far for steps back: the way from the model as given is gone as
-    well, and the lower exact cost counts.
-
-    Raises
-    ------
-    ModelError
-        For values that no model may have.
-    """
-    return min((linearised(fits, fits.evaluate(found.candidates)) for fits in (last, first)),
-               key=lambda one: _exact_total(*one))
 
 
 def next_operating_point(fits: FittedSets, found: CandidateSet) -> OperatingPoint | None:

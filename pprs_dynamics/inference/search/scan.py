@@ -34,12 +34,13 @@ class Scan:
     Parameters
     ----------
     fits : FittedSets
-    refuted : container of Place
+    refuted : frozenset of Place
         What is not proposed: effects that bend the columns and were dropped where these were
-        computed with them, which counts for more than that they seem to pay where they are not.
+        computed with them, which counts for more than that they seem to pay where they are not;
+        and what held-out data did not confirm.
     """
 
-    def __init__(self, fits: FittedSets, refuted: Container[Place] = ()) -> None:
+    def __init__(self, fits: FittedSets, refuted: frozenset[Place] = frozenset()) -> None:
         self.fits, self.refuted = fits, refuted
 
     def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,

@@ -11,7 +11,7 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -48,17 +48,17 @@ class Search:
     fits : FittedSets
     patterns : sequence of PatternLibrary, optional
         Patterns of no catalogue that take part, see `patterns_of`; by default none do.
-    refuted : container of Place
+    refuted : frozenset of Place
         See `Scan`.
     progress : callable, optional
         Called with the share of the work that is done.
     """
 
     def __init__(self, fits: FittedSets, patterns: Sequence[PatternLibrary] = (),
-                 refuted: Container[Place] = (),
+                 refuted: frozenset[Place] = frozenset(),
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
-        self.scan = Scan(fits, refuted)
+        self.refuted, self.scan = refuted, Scan(fits, refuted)
         self._report = progress or (lambda share: None)
 
     @property
