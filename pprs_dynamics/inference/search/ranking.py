@@ -93,7 +93,7 @@ class Ranking:
 
     @classmethod
     def of(cls, first: FittedSets, last: Search, best: CandidateSet,
-           refuted: frozenset[Place]) -> Ranking:
+           refuted: frozenset[Place] = frozenset()) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
         best, kept, remainders = without_remainders(last, best)
         return cls._keeping(first, last.fits, last.patterns, best, kept, remainders, refuted)

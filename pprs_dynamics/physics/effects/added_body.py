@@ -45,10 +45,10 @@ def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, 
     on a link that turns about a fixed axis a recording decides the first moment, not the mass.
     """
     mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
-    usual = replace(mass, expected=(moved, moved) if moved > 0 else None)
-    return (usual, *(Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
-                              f'mass times its place along {axis} of {link}, from the centre',
-                              -1e3, 1e3, 0.0, scale=0.05) for axis in AXES), *rest[3:])
+    moments = (Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
+                         f'mass times its place along {axis} of {link}, from the centre',
+                         -1e3, 1e3, 0.0, scale=0.05) for axis in AXES)
+    return (replace(mass, expected=(moved, moved) if moved > 0 else None), *moments, *rest[3:])
 
 
 class AddedBody(BodyEffect):
