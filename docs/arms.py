@@ -153,6 +153,22 @@ def zero_rows(bench: Bench, base: ArmModel) -> tuple[list[list[str]], int, int]:
     return rows, right, named
 
 
+def first_mass(found: dict[str, Any]) -> dict[str, float] | None:
+    """Return the mass of a payload that was named first."""
+    first = next(iter(found.get('effects', ())), None)
+    return first['parameters']['mass'] if first and first['name'] == 'payload_mass' else None
+
+
+def told(mass: dict[str, float]) -> str:
+    """Return a mass and its interval."""
+    return f'{mass["value"]:.3f} ± {2 * mass["std"]:.3f} kg'
+
+
+def holds(mass: dict[str, float]) -> bool:
+    """Return whether the interval contains what the load weighs."""
+    return abs(mass['value'] - MASS) <= 2 * mass['std']
+
+
 def load_rows(bench: Bench) -> tuple[list[list[str]], int, int, int]:
     """Return the load by a base of each free run alone, on the whole run and on its halves.
 
@@ -169,15 +185,14 @@ def load_rows(bench: Bench) -> tuple[list[list[str]], int, int, int]:
         for part in (file(LOADED), 'first_half.csv', 'second_half.csv'):
             found = bench.run(f'load_{run}_{part.partition(".")[0]}', 'diagnose', part, '--model',
                               f'{run}.yaml')
-            said = (found.get('effects') or [{'name': 'nothing'}])[0]
-            if said['name'] != 'payload_mass':
-                rows[-1].append(said['name'])
+            mass = first_mass(found)
+            if mass is None:
+                rows[-1].append((found.get('effects') or [{'name': 'nothing'}])[0]['name'])
                 continue
-            mass = said['parameters']['mass']
             first += 1
             near += abs(mass['value'] / MASS - 1) < 0.03
-            held += abs(mass['value'] - MASS) <= 2 * mass['std']
-            rows[-1].append(f'{mass["value"]:.3f} ± {2 * mass["std"]:.3f} kg')
+            held += holds(mass)
+            rows[-1].append(told(mass))
     return rows, first, near, held
 
 
@@ -268,12 +283,10 @@ def tell(bench: Bench) -> dict[str, str]:
     met = sum(held[name] <= goal for name, goal in zip(base.drives, GOALS, strict=True))
     first = load['effects'][0]['name'] if load['effects'] else 'nothing'
     seconds = sorted(one['processor_seconds'] for one in (load, free) if one)
-    holds = mass is not None and abs(mass['value'] - MASS) <= 2 * mass['std']
     value = 'none' if mass is None else (
-        f'{mass["value"]:.3f} ± {2 * mass["std"]:.3f} kg ({100 * (mass["value"] / MASS - 1):+.1f} %'
-        f', {"holds" if holds else "does not hold"} {MASS} kg)')
-    taken = next((one['parameters']['mass'] for one in hand.get('effects', ())[:1]
-                  if one['name'] == 'payload_mass'), None)
+        f'{told(mass)} ({100 * (mass["value"] / MASS - 1):+.1f} %, '
+        f'{"holds" if holds(mass) else "does not hold"} {MASS} kg)')
+    taken = first_mass(hand)
     without_hand = ', '.join(one['name'] for one in hand.get('effects', ())) or 'not measured'
     proof = [
         ['the load is named first, mass within 3 %, its interval holds 2.805 kg', 'yes',
@@ -282,7 +295,7 @@ def tell(bench: Bench) -> dict[str, str]:
          f'{load_first} of {count} first, {load_near} within 3 %, {load_held} hold it'],
         [f'a hand of {HAND} kg in the model that is not there: first, within 5 %, no zeros', 'yes',
          without_hand if taken is None else
-         f'first; {taken["value"]:.3f} ± {2 * taken["std"]:.3f} kg; all: {without_hand}'],
+         f'first; {told(taken)}; all: {without_hand}'],
         ['free run: payload or gain claimed', 'none', ', '.join(sorted(claimed)) or 'none'],
         ['base model on a run not fitted, joints within the goal', '6 of 6', f'{met} of 6'],
         ['the same after `--adopt-all --refit` on another free run, error over all joints',
