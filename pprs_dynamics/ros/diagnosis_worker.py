@@ -117,8 +117,7 @@ class DiagnosisWorker:
             if not self._pipe.poll():
                 return None
             self.busy = False
-            answer: dict[str, Any] = self._pipe.recv()
-            return answer
+            return self._pipe.recv()
         except (EOFError, OSError):
             self.busy = False
             return {'error': 'the process that diagnoses has ended; what it knew is forgotten'}

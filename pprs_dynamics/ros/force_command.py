@@ -91,8 +91,7 @@ class Feedforward:
 
     def part(self, answer: ForceCommand, name: str) -> Array:
         """Return one part of the first forces, scaled as they are, (D,)."""
-        part: Array = self._scale * answer.forces.parts[name][0]
-        return part
+        return self._scale * answer.forces.parts[name][0]
 
     def answer(self, request: TrajectoryRequest) -> ForceCommand:
         """Return what goes out for a request.

@@ -45,8 +45,7 @@ class JointMoment:
     def sign(self) -> Array:
         """Direction v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
         width = STEEPNESS * self.speed
-        sign: Array = self.velocity / np.sqrt(self.velocity ** 2 + width ** 2)
-        return sign
+        return self.velocity / np.sqrt(self.velocity ** 2 + width ** 2)
 
 
 @dataclass(frozen=True)

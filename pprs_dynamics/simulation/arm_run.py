@@ -430,5 +430,4 @@ def _noise(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
     white = random.normal(size=shape)
     slow: Array = lfilter([np.sqrt(1 - CORRELATION ** 2)], [1, -CORRELATION],
                           random.normal(size=shape), axis=0)
-    noise: Array = np.sqrt(1 - COLOURED) * white + np.sqrt(COLOURED) * slow
-    return noise
+    return np.sqrt(1 - COLOURED) * white + np.sqrt(COLOURED) * slow

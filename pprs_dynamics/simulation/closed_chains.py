@@ -322,8 +322,7 @@ class ClosedChains:
         """
         along = (forces @ self._frames).reshape(*forces.shape[:-3], 27)
         squares = (along * along).dot(self._across), (reactions * reactions).dot(self._ones)
-        loads: Array = np.sqrt(np.concatenate(squares, axis=-1))
-        return loads
+        return np.sqrt(np.concatenate(squares, axis=-1))
 
     @property
     def warnings(self) -> int:

@@ -116,6 +116,5 @@ class EngineState:
         columns[:, len(dofs):] = rows.T
         # Joints that stand are driven by whatever holds them.
         moved = np.setdiff1d(np.arange(self.model.nv), self._standing)
-        found: Array = np.linalg.lstsq(columns[moved], needed[moved],
-                                       rcond=LEAST_SINGULAR)[0][:len(dofs)]
-        return found
+        return np.linalg.lstsq(columns[moved], needed[moved],
+                               rcond=LEAST_SINGULAR)[0][:len(dofs)]

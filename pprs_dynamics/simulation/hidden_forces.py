@@ -49,8 +49,7 @@ class DriveSpring(DriveForce):
         """Return k x (1 + (x / x_h)^2)."""
         x = moment.position - self.values['rest']
         hardened = 1 + (x / self.values['hardening']) ** 2
-        force: Array = self.values['stiffness'] * x * hardened
-        return force
+        return self.values['stiffness'] * x * hardened
 
 
 class ForceRipple(DriveForce):
@@ -68,8 +67,7 @@ class ForceRipple(DriveForce):
         turn = 2 * np.pi * moment.position / self.values['pitch']
         first = np.sin(turn + self.values['phase'])
         second = np.sin(2 * turn + self.values['second_phase'])
-        force: Array = self.values['force'] * (first + self.values['second'] * second)
-        return force
+        return self.values['force'] * (first + self.values['second'] * second)
 
 
 class LocalBump(DriveForce):
@@ -85,8 +83,7 @@ class LocalBump(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return F / (1 + ((q - q_0) / w)^4)."""
         away = (moment.position - self.values['place']) / self.values['width']
-        force: Array = self.values['force'] / (1 + away ** 4)
-        return force
+        return self.values['force'] / (1 + away ** 4)
 
 
 class Vibration(DriveForce):
@@ -101,8 +98,7 @@ class Vibration(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return A sin(2 pi f t + phi)."""
         turn = 2 * np.pi * self.values['frequency'] * moment.time
-        force: Array = self.values['force'] * np.sin(turn + self.values['phase'])
-        return force
+        return self.values['force'] * np.sin(turn + self.values['phase'])
 
 
 class DriveCoupling(DriveForce):
@@ -136,8 +132,7 @@ class DriveCoupling(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return c times the velocity of the source."""
         sources = self.values['source'].astype(int)
-        force: Array = self.values['coefficient'] * moment.velocity[..., sources]
-        return force
+        return self.values['coefficient'] * moment.velocity[..., sources]
 
 
 class RevoluteStiffness(StructureForce):

@@ -23,8 +23,7 @@ WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
 def algebraic_sign(velocity: Array, width: Array) -> Array:
     """Return v / sqrt(v^2 + w^2): another way to turn over than the tanh of the model."""
-    sign: Array = velocity / np.sqrt(velocity * velocity + width * width)
-    return sign
+    return velocity / np.sqrt(velocity * velocity + width * width)
 
 
 class ViscousFriction(DriveForce):
@@ -39,8 +38,7 @@ class ViscousFriction(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return c v_1 asinh(v / v_1)."""
         v_1 = self.values['thinning_velocity']
-        force: Array = self.values['coefficient'] * v_1 * np.arcsinh(moment.velocity / v_1)
-        return force
+        return self.values['coefficient'] * v_1 * np.arcsinh(moment.velocity / v_1)
 
 
 class CoulombFriction(DriveForce):
@@ -69,8 +67,7 @@ class AsymmetricFriction(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return c (v + side |v|) / 2."""
         v = moment.velocity
-        force: Array = self.values['coefficient'] * (v + self.values['side'] * np.abs(v)) / 2
-        return force
+        return self.values['coefficient'] * (v + self.values['side'] * np.abs(v)) / 2
 
 
 class StribeckFriction(DriveForce):
@@ -87,8 +84,7 @@ class StribeckFriction(DriveForce):
         """Return F exp(-|v| / v_s) v / sqrt(v^2 + w^2)."""
         v = moment.velocity
         fall = np.exp(-np.abs(v) / self.values['velocity'])
-        force: Array = self.values['force'] * fall * algebraic_sign(v, self.values['width'])
-        return force
+        return self.values['force'] * fall * algebraic_sign(v, self.values['width'])
 
 
 class QuadraticFriction(DriveForce):
@@ -103,8 +99,7 @@ class QuadraticFriction(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return c v |v|^(p - 1)."""
         v = moment.velocity
-        force: Array = self.values['coefficient'] * v * np.abs(v) ** (self.values['power'] - 1)
-        return force
+        return self.values['coefficient'] * v * np.abs(v) ** (self.values['power'] - 1)
 
 
 class LoadFriction(DriveForce):
@@ -120,8 +115,7 @@ class LoadFriction(DriveForce):
         """Return dmu N^(2/3) (10 N)^(1/3) v / sqrt(v^2 + w^2)."""
         load = np.cbrt(moment.guide_load * moment.guide_load * 10.0)
         sign = algebraic_sign(moment.velocity, self.values['width'])
-        force: Array = self.values['coefficient'] * load * sign
-        return force
+        return self.values['coefficient'] * load * sign
 
 
 class Hysteresis(DriveForce):
@@ -148,8 +142,7 @@ class Hysteresis(DriveForce):
     def force(self, moment: DriveMoment) -> Array:
         """Return share mu N (z - tanh(v / v_rev))."""
         dry = self.values['share'] * self._coulomb * moment.guide_load
-        force: Array = dry * (self._z - np.tanh(moment.velocity / self._width))
-        return force
+        return dry * (self._z - np.tanh(moment.velocity / self._width))
 
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Move z along, in parts of at most a fifth of the distance."""
@@ -182,8 +175,7 @@ class FrictionDrift(DriveForce):
         """Return F exp(-w / w_0) v / sqrt(v^2 + w_r^2)."""
         left = np.exp(-self._heat / self.values['path'])
         sign = algebraic_sign(moment.velocity, self.values['width'])
-        force: Array = self.values['force'] * left * sign
-        return force
+        return self.values['force'] * left * sign
 
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Warm by friction, cool towards the surroundings."""
@@ -203,9 +195,8 @@ class _PassiveJointFriction(HiddenJointFriction):
         """Return (c s_1 asinh(s / s_1)) / s + M / sqrt(s^2 + w^2)."""
         p = self.parameters
         share = np.maximum(speed / p['thinning_rate'], 1e-9)
-        resistance: Array = (p['viscous'] * np.arcsinh(share) / share
-                             + p['dry'] / np.sqrt(speed * speed + p['width'] ** 2))
-        return resistance
+        return (p['viscous'] * np.arcsinh(share) / share
+                + p['dry'] / np.sqrt(speed * speed + p['width'] ** 2))
 
 
 class RevoluteFriction(_PassiveJointFriction):

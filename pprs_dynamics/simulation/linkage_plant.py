@@ -286,8 +286,7 @@ class LinkagePlant:
 
         def coefficients(rates: Array) -> Array:
             x = np.maximum(np.sqrt(np.einsum('ki,ki->k', rates, rates)) / width, SLOWEST)
-            found: Array = viscous + dry * np.tanh(x) / (x * width)
-            return found
+            return viscous + dry * np.tanh(x) / (x * width)
 
         return np.concatenate(rows), coefficients
 
@@ -312,9 +311,8 @@ class LinkagePlant:
         if not beyond.any():
             return beyond
         rate = 2 * np.pi * STOP_FREQUENCY
-        pushed: Array = self.inertia * (rate ** 2 * beyond - 2 * STOP_DAMPING * rate * velocity
-                                        * (beyond != 0))
-        return pushed
+        return self.inertia * (rate ** 2 * beyond - 2 * STOP_DAMPING * rate * velocity
+                               * (beyond != 0))
 
 
 def _drawn(names: Sequence[str], random: np.random.Generator) -> list[str]:
@@ -342,5 +340,4 @@ def _loads(m: Any, loads: Any, table: JointFriction) -> Array:
     hinges = table.joint[table.joint >= 0]
     force[table.joint >= 0] = np.cross(loads.f[0, hinges], m.z[0, hinges])
     force[table.loop >= 0] = loads.F[0, table.loop[table.loop >= 0]]
-    found: Array = np.sqrt(np.einsum('ki,ki->k', force, force))
-    return found
+    return np.sqrt(np.einsum('ki,ki->k', force, force))

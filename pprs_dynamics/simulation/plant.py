@@ -187,8 +187,7 @@ class Plant:
     @property
     def position(self) -> Array:
         """Drive positions [m], (6,)."""
-        position: Array = self.chains.qpos.take(DRIVE_DOFS)
-        return position
+        return self.chains.qpos.take(DRIVE_DOFS)
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
         """Put the drives at positions (6,) [m], at rest or with velocities (6,) [m/s].

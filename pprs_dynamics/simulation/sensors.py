@@ -130,8 +130,7 @@ class EffortNoise:
         """Return the next sample [N], (D,)."""
         news = self._rng.standard_normal((len(self._keep) + 1, self._states.shape[1]))
         self._states = self._keep[:, None] * self._states + self._add[:, None] * news[1:]
-        noise: Array = self._white * news[0] + self._sizes @ self._states
-        return noise
+        return self._white * news[0] + self._sizes @ self._states
 
     def samples(self, count: int) -> Array:
         """Return the next samples [N], (count, D): those that `sample` would give."""
@@ -247,5 +246,4 @@ class Sensors:
         share, last, drives = steps - whole, len(self._past) - 1, range(len(delay))
         newer = np.array([self._past[min(whole[i], last)][quantity][i] for i in drives])
         older = np.array([self._past[min(whole[i] + 1, last)][quantity][i] for i in drives])
-        delayed: Array = newer + share * (older - newer)
-        return delayed
+        return newer + share * (older - newer)

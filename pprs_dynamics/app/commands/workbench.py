@@ -84,6 +84,5 @@ def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
         from pprs_dynamics.ros.live_joint_states import LiveNodes
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
-    source: LiveSource = LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                                   options.monitor, options.feedforward, options.namespace)
-    return source
+    return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
+                     options.monitor, options.feedforward, options.namespace)

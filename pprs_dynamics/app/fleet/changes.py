@@ -256,5 +256,4 @@ def _drawn_in(value: Array) -> Array:
     padded = np.concatenate([value[NEIGHBOURS // 2:0:-1], value, value[-2:-2 - NEIGHBOURS // 2:-1]])
     middle = medfilt(padded, NEIGHBOURS)[NEIGHBOURS // 2:-(NEIGHBOURS // 2)]
     most = CLIPPED * _scatter(value)
-    drawn: Array = middle + np.clip(value - middle, -most, most)
-    return drawn
+    return middle + np.clip(value - middle, -most, most)

@@ -92,8 +92,7 @@ class SurveyResult:
     @property
     def error(self) -> str | None:
         """Why there is no result, if there is none."""
-        found: str | None = self.rows[0].get('error')
-        return found
+        return self.rows[0].get('error')
 
 
 def requests_of(options: str, model: ForceModel) -> tuple[EffectRequest, ...]:

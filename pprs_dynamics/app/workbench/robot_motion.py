@@ -67,5 +67,4 @@ def _rms_between(error: Array, chosen: np.typing.NDArray[np.int_]) -> Array:
     known = np.isfinite(error)
     squares = np.add.reduceat(np.where(known, error, 0.0) ** 2, chosen, axis=0)
     counts = np.add.reduceat(known.astype(float), chosen, axis=0)
-    means: Array = np.sqrt(squares / np.maximum(counts, 1.0))
-    return means
+    return np.sqrt(squares / np.maximum(counts, 1.0))

@@ -256,11 +256,10 @@ def without_found(model: ForceModel, answer: Diagnosis) -> ForceModel:
     """Return the model of a diagnosis without what it found, its other numbers as they are."""
     found = {one.name for one in answer.effects}
     given = {effect.name: effect for effect in model.effects}
-    plain: ForceModel = replace(answer.adopted, effects=tuple(
+    return replace(answer.adopted, effects=tuple(
         given.get(effect.name, effect) if effect.name in found else effect
         for effect in answer.adopted.effects
         if effect.name not in found or effect.name in given))
-    return plain
 
 
 def change_point(time: Array, gains: Array) -> float | None:

@@ -267,5 +267,4 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
 def _ranks(values: Array) -> Array:
     """Return ranks from 1; equal values share the mean of theirs."""
     _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    ranks: Array = (np.cumsum(count) - (count - 1) / 2)[place]
-    return ranks
+    return (np.cumsum(count) - (count - 1) / 2)[place]

@@ -34,8 +34,7 @@ WORDS = {'load': 'load', 'rod_angle': 'rod angle', 'platform_x': 'platform x',
 def read_in(variable: str, units: DriveUnits) -> tuple[float, str]:
     """Return the factor from SI and the unit in which people read a variable of a drive."""
     name = variable.partition(' of ')[0]
-    found: tuple[float, str] = (TURNING if units.turns and name in TURNING else UNITS)[name]
-    return found
+    return (TURNING if units.turns and name in TURNING else UNITS)[name]
 
 
 @dataclass(frozen=True)

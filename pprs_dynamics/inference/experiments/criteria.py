@@ -181,8 +181,7 @@ class Precision:
         unseen = values <= UNSEEN
         variances = axes[:, ~unseen] ** 2 @ (1 / values[~unseen])
         variances[np.any(np.abs(axes[:, unseen]) > WEIGHT, axis=1)] = np.inf
-        result: Array = np.sqrt(variances) * self.scales
-        return result
+        return np.sqrt(variances) * self.scales
 
 
 def solve(matrix: Array, side: Array) -> Array:

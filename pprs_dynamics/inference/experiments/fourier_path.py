@@ -138,5 +138,4 @@ def _quaternions(psi: Array, theta: Array, phi: Array) -> Array:
     """Return the orientations of turns about z, then the new y, then the new x, (N, 4)."""
     from scipy.spatial.transform import Rotation
 
-    turns: Array = Rotation.from_euler('ZYX', np.stack((psi, theta, phi), axis=1)).as_quat()
-    return turns
+    return Rotation.from_euler('ZYX', np.stack((psi, theta, phi), axis=1)).as_quat()

@@ -239,8 +239,7 @@ class TrajectorySearch:
             else:
                 high = middle
         factor: float = np.exp(low)
-        result: Array = factor * x
-        return result
+        return factor * x
 
     def _allowed(self, path: FourierPath) -> FourierPath:
         """Return the path, made smaller until it keeps the limits at full rate."""

@@ -145,8 +145,7 @@ def errors_of(model: ForceModel, recordings: Sequence[Recording]) -> dict[str, f
 
 
 def _squares(model: ForceModel, recordings: Sequence[Recording]) -> Array:
-    squares: Array = measure_residuals(model, recordings)[0].error ** 2
-    return squares
+    return measure_residuals(model, recordings)[0].error ** 2
 
 
 def _rms(model: ForceModel, squares: Array) -> dict[str, float]:

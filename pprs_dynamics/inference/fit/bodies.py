@@ -55,14 +55,12 @@ class Bodies:
 
     def distance(self, point: Array) -> Array:
         """Return the distance from the description, element by element, (16 n,)."""
-        distance: Array = (self._relative(point) - np.eye(4)).ravel()
-        return distance
+        return (self._relative(point) - np.eye(4)).ravel()
 
     def _relative(self, point: Array) -> Array:
         M = np.tile(np.eye(4), (len(self.roots), 1, 1))
         M[:, ROWS, COLUMNS] += point.reshape(-1, PARAMETERS)
-        relative: Array = M @ M.transpose(0, 2, 1)
-        return relative
+        return M @ M.transpose(0, 2, 1)
 
 
 def _thick(P: Array) -> Array:

@@ -154,17 +154,15 @@ class DriveSeries:
             values = values[..., self._taken]
         values = bridged(values, self.known)
         parts = [fft.dct(values[..., part], norm='ortho', axis=-1) for part in self.stretches]
-        coefficients: Array = parts[0] if len(parts) == 1 else np.concatenate(
+        return parts[0] if len(parts) == 1 else np.concatenate(
             parts, axis=-1)[..., self._order]
-        return coefficients
 
     def inverse(self, coefficients: Array) -> Array:
         """Return the values (..., n) of DCT coefficients."""
         unsorted = np.empty_like(coefficients)
         unsorted[..., self._order] = coefficients
         parts = [fft.idct(unsorted[..., part], norm='ortho', axis=-1) for part in self.stretches]
-        values: Array = np.concatenate(parts, axis=-1)
-        return values
+        return np.concatenate(parts, axis=-1)
 
     def products(self, a: Array, b: Array) -> Array:
         """Return the sums over each band of products of rows (p, n) and (q, n), (B, p, q)."""

@@ -95,9 +95,7 @@ class NoiseShapes:
         """Return amplitudes to start from, (..., J + 1): a share of the mean square for each."""
         mean = squares[..., 1:].sum(axis=-1) / np.maximum(counts[..., 1:].sum(axis=-1), 1)
         count = len(self.at_bands)
-        amplitudes: Array = np.repeat(
-            np.maximum(mean, LEAST_POWER)[..., None] / count, count, axis=-1)
-        return amplitudes
+        return np.repeat(np.maximum(mean, LEAST_POWER)[..., None] / count, count, axis=-1)
 
     def fitted(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array) -> Array:
         """Return the amplitudes that maximise the likelihood, (D, J + 1).

@@ -60,8 +60,7 @@ def block_gains(before: Residuals, after: Residuals, noises: Mapping[str, NoiseS
     gains = sample_gains(before, after, noises)
     edges = np.linspace(0, len(before), BLOCKS + 1)
     block = np.searchsorted(edges, np.arange(len(before)), side='right') - 1
-    summed: Array = np.bincount(block, gains, BLOCKS).astype(float)
-    return summed
+    return np.bincount(block, gains, BLOCKS).astype(float)
 
 
 def certainty(gains: Array) -> float:

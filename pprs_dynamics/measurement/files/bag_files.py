@@ -162,8 +162,7 @@ def write_bag(path: Path, topics: Mapping[str, Samples],
 
 
 def _stamps(samples: Samples) -> Indices:
-    stamps: Indices = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
-    return stamps
+    return samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
 
 
 def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[str, Sequence[str]],

@@ -147,6 +147,4 @@ def spread(time: Array, part: slice) -> tuple[float, float, float]:
 def _smoothed(medians: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the running median over five blocks, which a lasting change of three survives."""
     padded = np.concatenate((medians[[0, 0]], medians, medians[[-1, -1]]))
-    smooth: NDArray[np.float64] = np.median(
-        np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
-    return smooth
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)

@@ -287,8 +287,7 @@ def _acceleration_error(stretches: Sequence[Stretch], duration: float, noise: Ar
         distortion = np.maximum(np.mean(gap * gap, axis=0) - gain * noise ** 2, 0.0)
         squares += len(gap) * (distortion + (noise * wide.noise_gain(2)) ** 2)
         count += len(gap)
-    error: Array = np.sqrt(squares / count) if count else np.full(len(noise), np.inf)
-    return error
+    return np.sqrt(squares / count) if count else np.full(len(noise), np.inf)
 
 
 @lru_cache(maxsize=256)
@@ -349,5 +348,4 @@ def convolve_valid(values: Array, weights: Array) -> Array:
     padded[:len(values)] = values
     windows = np.lib.stride_tricks.sliding_window_view(padded, size)[::step]
     product = np.fft.irfft(np.fft.rfft(windows) * np.fft.rfft(weights, size), size)
-    result: Array = product[:, len(weights) - 1:].ravel()[:count]
-    return result
+    return product[:, len(weights) - 1:].ravel()[:count]

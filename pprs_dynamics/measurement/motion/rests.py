@@ -36,9 +36,7 @@ def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[
     span = (maximum_filter1d(position, window, axis=0, mode='nearest')
             - minimum_filter1d(position, window, axis=0, mode='nearest'))
     # Every sample of such a window stands, not its middle alone.
-    rests: np.typing.NDArray[np.bool_] = maximum_filter1d(
-        span < speed * SHORTEST_REST, window, axis=0, mode='nearest')
-    return rests
+    return maximum_filter1d(span < speed * SHORTEST_REST, window, axis=0, mode='nearest')
 
 
 def share_in_motion(time: Array, position: Array, moving: float = 0.0) -> float:
@@ -62,8 +60,7 @@ def share_in_motion(time: Array, position: Array, moving: float = 0.0) -> float:
         return 0.0
     speed = np.abs(moved) / step[:, None]
     least = RESOLVED * resolution(position) / step[:, None]
-    return float(np.mean(np.any(
-        speed > np.maximum(moving * speed.max(axis=0), least), axis=1)))
+    return float(np.mean(np.any(speed > np.maximum(moving * speed.max(axis=0), least), axis=1)))
 
 
 def resolution(position: Array) -> Array:
@@ -74,5 +71,4 @@ def resolution(position: Array) -> Array:
     # their median, as a gap of the recording is a jump in it.
     noise = (np.median(np.abs(np.diff(position, 3, axis=0)), axis=0) / (NORMAL_MEDIAN * 20 ** 0.5)
              if len(position) > 3 else np.zeros_like(finest))
-    found: Array = np.maximum(np.where(np.isfinite(finest), finest, 0.0), noise)
-    return found
+    return np.maximum(np.where(np.isfinite(finest), finest, 0.0), noise)

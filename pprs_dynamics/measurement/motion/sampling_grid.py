@@ -66,8 +66,7 @@ class SamplingGrid:
         from scipy.interpolate import make_interp_spline
 
         steps = np.arange(int(self.places[-1]) + 1)
-        result: Array = make_interp_spline(self.places, values, k=3)(steps)
-        return result
+        return make_interp_spline(self.places, values, k=3)(steps)
 
     def inside(self, edge: int) -> slice:
         """Return the samples that lie at least `edge` steps from both ends."""

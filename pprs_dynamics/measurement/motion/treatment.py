@@ -68,8 +68,7 @@ class Treatment:
         if len(values) != self.samples:
             raise ValueError(f'{len(values)} samples for a treatment of {self.samples}')
         sums = np.add.reduceat(values, self.starts, axis=0)
-        means: Array = sums / self._counts.reshape((-1,) + (1,) * (values.ndim - 1))
-        return means
+        return sums / self._counts.reshape((-1,) + (1,) * (values.ndim - 1))
 
     def blocks(self, first: int, last: int) -> Treatment:
         """Return the treatment of blocks first..last-1 alone, for their samples alone."""

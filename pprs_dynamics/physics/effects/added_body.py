@@ -89,11 +89,10 @@ class AddedBody(BodyEffect):
                 inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
                 names += [(mass, *moment, *inertia),
                           (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
-        made: type[Self] = type(cls.__name__, (cls,), {
+        return type(cls.__name__, (cls,), {
             'places': places, 'linear': linear, 'coefficients': coefficients,
             'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
             'made_by': (cls.on, (places, alike, moved))})
-        return made
 
     @classmethod
     def at(cls, coefficients: Mapping[str, float]) -> Self:

@@ -24,5 +24,4 @@ def other_exponent(quantity: Array, column: Array) -> Array:
     """
     size = np.abs(quantity)
     usual = np.sqrt(np.mean(size ** 2)) or 1.0
-    added: Array = EXPONENTS * np.log(np.maximum(size / usual, LEAST_SHARE)) * column
-    return added
+    return EXPONENTS * np.log(np.maximum(size / usual, LEAST_SHARE)) * column

@@ -99,8 +99,7 @@ def _space(columns: Array) -> Array:
     if not scaled.size:
         return np.zeros((len(columns), 0))
     u, s, _ = np.linalg.svd(scaled, full_matrices=False)
-    basis: Array = u[:, s > SAME * s[0]]
-    return basis
+    return u[:, s > SAME * s[0]]
 
 
 def _groups(count: int, is_same: Callable[[int, int], bool]) -> tuple[tuple[int, ...], ...]:

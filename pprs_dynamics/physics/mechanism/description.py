@@ -41,8 +41,7 @@ class Frame:
 
     def of_point(self, point: Array) -> Array:
         """Return a point of this frame in the one that it stands in."""
-        placed: Array = self.R @ point + self.p
-        return placed
+        return self.R @ point + self.p
 
     @classmethod
     def of(cls, xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Frame:

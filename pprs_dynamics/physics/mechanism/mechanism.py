@@ -61,8 +61,7 @@ class Mechanism:
     @property
     def masses(self) -> Array:
         """Of the bodies [kg], (B,)."""
-        masses: Array = self.inertial[:, 0]
-        return masses
+        return self.inertial[:, 0]
 
     @property
     def body_names(self) -> tuple[str, ...]:

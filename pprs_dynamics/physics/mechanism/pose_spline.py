@@ -117,9 +117,8 @@ def spline_rows(knots: Array, position: Array, orientation: Array, at: Array) ->
     omega = 2 * _vector_part(first[:, 3:], s) / square
     growth = 2 * np.sum(s * first[:, 3:], axis=1, keepdims=True) / square
     epsilon = 2 * _vector_part(second[:, 3:], s) / square - growth * omega
-    rows: Array = np.hstack((place[:, :3], s / np.sqrt(square), first[:, :3], omega,
-                             second[:, :3], epsilon))
-    return rows
+    return np.hstack((place[:, :3], s / np.sqrt(square), first[:, :3], omega,
+                      second[:, :3], epsilon))
 
 
 def spline_through(knots: Array, values: Array, at: Array) -> tuple[Array, Array, Array]:
@@ -148,11 +147,9 @@ def _continuous(quaternion: Array) -> Array:
     """Return quaternions with signs chosen such that neighbours are near each other."""
     turned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0
     signs = np.concatenate(([1.0], np.cumprod(np.where(turned, -1.0, 1.0))))
-    continuous: Array = quaternion * signs[:, None]
-    return continuous
+    return quaternion * signs[:, None]
 
 
 def _vector_part(a: Array, b: Array) -> Array:
     """Return the vector part of quaternion a times the conjugate of b, (N, 3)."""
-    part: Array = b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
-    return part
+    return b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])

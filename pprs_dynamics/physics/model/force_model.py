@@ -288,8 +288,7 @@ class ForceModel(ABC):
 
     def without(self, effect: str) -> Self:
         """Return the model without the effect of that name."""
-        return replace(self, effects=tuple(
-            each for each in self.effects if each.name != effect))
+        return replace(self, effects=tuple(each for each in self.effects if each.name != effect))
 
     def measured(self, forces: F, state: ModelState | None = None) -> F:
         """Return the measured forces where the drives apply `forces`.
@@ -323,5 +322,4 @@ class ForceModel(ABC):
         """Errors of measured drive positions [m], to be subtracted, (D,)."""
         errors = [effect.position_error(self.drives) for effect in self.effects
                   if isinstance(effect, MeasurementEffect)]
-        total: Array = np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))
-        return total
+        return np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))

@@ -60,8 +60,7 @@ class DriveLimits(ABC):
 
     def clamped(self, forces: Array) -> Array:
         """Return efforts, (N, D), moved to the limit where they are over it."""
-        clamped: Array = np.clip(forces, -self.efforts, self.efforts)
-        return clamped
+        return np.clip(forces, -self.efforts, self.efforts)
 
     def allow(self, forces: Array, drive_motion: tuple[Array, ...]) -> bool:
         """Return whether all is finite, and neither a stroke nor an effort is exceeded.

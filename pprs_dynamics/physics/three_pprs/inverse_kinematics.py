@@ -74,8 +74,7 @@ class ChainKinematics:
     @property
     def rod_angle(self) -> Array:
         """u_i [rad], (N, 3)."""
-        angle: Array = np.arctan2(self.sin_u, self.cos_u)
-        return angle
+        return np.arctan2(self.sin_u, self.cos_u)
 
     @classmethod
     def from_table(cls, table: Array) -> ChainKinematics:

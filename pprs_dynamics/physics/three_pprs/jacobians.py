@@ -73,8 +73,7 @@ class Jacobians:
     @cached_property
     def J(self) -> Array:
         """[J], (N, 6, 6)."""
-        J: Array = self.B_inverse * self.A[:, None, :]                         # Eq. (11)
-        return J
+        return self.B_inverse * self.A[:, None, :]                    # Eq. (11)
 
     @cached_property
     def J_u(self) -> Array:
@@ -82,8 +81,7 @@ class Jacobians:
         chains = self.chains
         rows = _matrix(rod_row(self.geometry.frames, self.geometry.rod_length, chains.arm,
                                chains.sin_u))
-        J_u: Array = rows @ self.J                                             # Eq. (10)
-        return J_u
+        return rows @ self.J                                          # Eq. (10)
 
     @property
     def J_omega(self) -> Array:

@@ -97,8 +97,7 @@ class Body:
     @property
     def tensor(self) -> Array:
         """Inertia about the centre in the body's axes, (3, 3) [kg m^2]."""
-        tensor: Array = self.axes @ np.diag(self.moments) @ self.axes.T
-        return tensor
+        return self.axes @ np.diag(self.moments) @ self.axes.T
 
 
 @dataclass(frozen=True)

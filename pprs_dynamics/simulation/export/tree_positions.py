@@ -49,5 +49,4 @@ class TreePositions:
         still = np.zeros_like(given)
         q = self._mechanism.at(given, still, still).motion.q[0]
         t, rows = self._mechanism.structure.tables, self._rows
-        found: Array = t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows]
-        return found
+        return t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows]

@@ -83,8 +83,7 @@ def _quaternion(R: Array) -> Array:
     """Return w x y z."""
     from scipy.spatial.transform import Rotation
 
-    quaternion: Array = np.roll(Rotation.from_matrix(R).as_quat(), 1)
-    return quaternion
+    return np.roll(Rotation.from_matrix(R).as_quat(), 1)
 
 
 def _rpy(R: Array) -> tuple[float, float, float]:

@@ -46,5 +46,4 @@ class ActiveFriction(Effect):
 
     def dry(self, guide_load: Array) -> Array:
         """Return the dry friction in full motion [N], for loads of the guides (N, 6) [N]."""
-        dry: Array = np.asarray(self.coulomb) * guide_load
-        return dry
+        return np.asarray(self.coulomb) * guide_load

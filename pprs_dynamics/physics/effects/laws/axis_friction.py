@@ -33,9 +33,8 @@ class AxisFriction(Effect):
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
-        force: Array = (np.asarray(self.viscous) * state.velocity
-                        + np.asarray(self.coulomb) * state.direction)
-        return force
+        return (np.asarray(self.viscous) * state.velocity
+                + np.asarray(self.coulomb) * state.direction)
 
     def dry(self, guide_load: Array) -> Array:
         """Return the dry friction in full motion [N], in the shape of the guide's load."""
