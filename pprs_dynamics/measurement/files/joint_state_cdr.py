@@ -24,9 +24,9 @@ from pprs_dynamics.system.cdr import (
     LITTLE_ENDIAN,
     STAMP,
     WORD,
-    aligned,
-    padded,
-    with_text,
+    Walk,
+    with_count,
+    with_names,
 )
 
 
@@ -38,8 +38,8 @@ class Layout:
     ----------
     names : tuple of str
         Joints, in the message's order.
-    position, velocity, effort : (offset, count)
-        First byte and number of values.
+    arrays : three times (offset, count)
+        First byte and number of values of position, velocity and effort.
     length : int
         Bytes of the message.
     fixed : (K,) array of int
@@ -50,9 +50,7 @@ class Layout:
     """
 
     names: tuple[str, ...]
-    position: tuple[int, int]
-    velocity: tuple[int, int]
-    effort: tuple[int, int]
+    arrays: tuple[tuple[int, int], ...]
     length: int
     fixed: Indices
     pattern: NDArray[np.uint8]
@@ -62,38 +60,21 @@ class Layout:
         """Return the layout of a message, None where it is not little-endian CDR of version 1."""
         if data[:2] != LITTLE_ENDIAN[:2]:
             return None
-        fixed = list(range(2))
+        walk = Walk(data)
         try:
-            offset, fixed_word = _sequence(data, HEADER + STAMP.size)
-            fixed += fixed_word
-            offset += _count(data, fixed_word)                       # frame_id
-            offset, fixed_word = _sequence(data, offset)
-            fixed += fixed_word
-            names = []
-            for _ in range(_count(data, fixed_word)):
-                offset, length_word = _sequence(data, offset)
-                size = _count(data, length_word)
-                names.append(data[offset:offset + size].rstrip(b'\x00').decode())
-                fixed += [*length_word, *range(offset, offset + size)]
-                offset += size
-            arrays = []
-            for _ in range(3):
-                offset, fixed_word = _sequence(data, offset)
-                fixed += fixed_word
-                count = _count(data, fixed_word)
-                if count:
-                    offset = aligned(offset, 8)
-                arrays.append((offset, count))
-                offset += 8 * count
+            places = walk.header()
+            arrays = tuple(walk.numbers() for _ in range(3))
+            names = tuple(data[place].rstrip(b'\x00').decode() for place in places)
         except (struct.error, UnicodeDecodeError):
             return None
         # Bytes may follow: rmw_fastrtps leaves some where a sequence is empty, and ROS itself
         # ignores them (rosbags does not).
-        if offset > len(data):
+        if walk.at > len(data):
             return None
-        places = np.array(fixed, dtype=np.int64)
-        return cls(tuple(names), arrays[0], arrays[1], arrays[2], len(data), places,
-                   np.frombuffer(data, np.uint8)[places])
+        fixed = np.array([
+            *range(2), *(k for word in walk.words for k in range(word, word + WORD.size)),
+            *(k for place in places for k in range(place.start, place.stop))], np.int64)
+        return cls(names, arrays, len(data), fixed, np.frombuffer(data, np.uint8)[fixed])
 
     def matches(self, rows: NDArray[np.uint8]) -> Mask:
         """Return which messages, (N, length) bytes, have this layout."""
@@ -128,18 +109,12 @@ def serialised(
     position, velocity, effort : (N, D) arrays
         `velocity` may be None: an empty sequence.
     """
-    head = with_text(LITTLE_ENDIAN + bytes(STAMP.size), '')
-    head = padded(head, 4) + WORD.pack(len(names))
-    for name in names:
-        head = with_text(head, name)
-    rows = np.empty((len(stamps), 0), np.uint8)
-    prefix = head
+    rows, prefix = np.empty((len(stamps), 0), np.uint8), with_names('', names)
     for values in (position, velocity, effort):
         count = 0 if values is None else values.shape[1]
-        prefix = padded(prefix, 4, rows.shape[1]) + WORD.pack(count)
+        prefix = with_count(prefix, count, rows.shape[1])
         if values is None or not count:
             continue
-        prefix = padded(prefix, 8, rows.shape[1])
         constant = np.tile(np.frombuffer(prefix, np.uint8), (len(stamps), 1))
         numbers = np.ascontiguousarray(values, dtype='<f8').view(np.uint8)
         rows, prefix = np.concatenate((rows, constant, numbers), axis=1), b''
@@ -147,19 +122,3 @@ def serialised(
     words = np.column_stack((seconds, nanoseconds)).astype('<u4')
     rows[:, HEADER:HEADER + STAMP.size] = words.view(np.uint8)
     return rows
-
-
-def _sequence(data: bytes, offset: int) -> tuple[int, list[int]]:
-    """Return the place after a length word and the places of the word itself."""
-    start = aligned(offset, 4)
-    if start + 4 > len(data):
-        raise struct.error
-    return start + 4, list(range(start, start + 4))
-
-
-def _count(data: bytes, word: list[int]) -> int:
-    count: int = WORD.unpack_from(data, word[0])[0]
-    # No sequence has more elements than the message has bytes: garbage would loop for ever.
-    if count > len(data):
-        raise struct.error
-    return count

@@ -93,8 +93,7 @@ class JointStateBlocks:
         """Read messages of one layout into their rows; return whether they hold all drives."""
         stamps[rows] = layout.stamps(messages)
         return self._place(layout.names, [
-            layout.values(messages, array)
-            for array in (layout.position, layout.velocity, layout.effort)], rows, values)
+            layout.values(messages, array) for array in layout.arrays], rows, values)
 
     def _take_one(
         self, message: bytes, layout: Layout | None, row: int, stamps: Indices, values: Array,

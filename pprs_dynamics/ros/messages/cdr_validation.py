@@ -19,7 +19,7 @@ from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 
 from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.system.cdr import HEADER, STAMP, aligned
+from pprs_dynamics.system.cdr import HEADER, STAMP, Walk
 
 TWO_WORDS = 8
 
@@ -55,7 +55,7 @@ def is_whole(data: bytes, kind: type = MultiDOFJointTrajectory) -> bool:
     if len(data) < HEADER or data[0] or data[1] > 1:
         # Another encoding: its deserialiser has to know.
         return len(data) >= HEADER
-    walk = _Walk(data, '<I' if data[1] else '>I')
+    walk = Walk(data, is_little_endian=data[1] == 1)
     try:
         _WALKS[kind](walk)
     except struct.error:
@@ -63,76 +63,29 @@ def is_whole(data: bytes, kind: type = MultiDOFJointTrajectory) -> bool:
     return walk.at <= len(data)
 
 
-class _Walk:
-    """A place in the bytes of a message, which moves on over what is read."""
-
-    def __init__(self, data: bytes, word: str) -> None:
-        self._data, self._word, self.at = data, struct.Struct(word), HEADER
-
-    def aligned(self, size: int) -> None:
-        """Go to the next place that values of a size may start at, counted after the header."""
-        self.at = aligned(self.at, size)
-
-    def over(self, size: int, alignment: int = 4) -> None:
-        """Go over that many bytes of values."""
-        self.aligned(alignment)
-        self.at += size
-
-    def count(self) -> int:
-        """Read a length word."""
-        self.aligned(4)
-        count: int = self._word.unpack_from(self._data, self.at)[0]
-        # Every element takes a byte at least: more is garbage, and would loop for ever.
-        if count > len(self._data):
-            raise struct.error
-        self.at += self._word.size
-        return count
-
-    def text(self) -> None:
-        """Go over a text."""
-        count = self.count()
-        self.at += count
-
-    def texts(self) -> None:
-        """Go over a sequence of texts."""
-        for _ in range(self.count()):
-            self.text()
-
-    def numbers(self, each: int = 1) -> None:
-        """Go over a sequence of elements that are `each` numbers of 8 bytes."""
-        if count := self.count():
-            self.over(8 * each * count, 8)
-
-
-def _trajectory(walk: _Walk) -> None:
-    walk.over(STAMP.size)
-    walk.text()
-    walk.texts()
+def _trajectory(walk: Walk) -> None:
+    walk.header()
     for _ in range(walk.count()):
         for numbers in (7, 6, 6):
             walk.numbers(numbers)
         walk.over(STAMP.size)
 
 
-def _joint_trajectory(walk: _Walk) -> None:
-    walk.over(STAMP.size)
-    walk.text()
-    walk.texts()
+def _joint_trajectory(walk: Walk) -> None:
+    walk.header()
     for _ in range(walk.count()):
         for _ in range(4):
             walk.numbers()
         walk.over(STAMP.size)
 
 
-def _joint_state(walk: _Walk) -> None:
-    walk.over(STAMP.size)
-    walk.text()
-    walk.texts()
+def _joint_state(walk: Walk) -> None:
+    walk.header()
     for _ in range(3):
         walk.numbers()
 
 
-def _array(walk: _Walk) -> None:
+def _array(walk: Walk) -> None:
     for _ in range(walk.count()):
         walk.text()
         walk.over(TWO_WORDS)  # size and stride of a dimension
@@ -140,6 +93,6 @@ def _array(walk: _Walk) -> None:
     walk.numbers()
 
 
-_WALKS: dict[type, Callable[[_Walk], None]] = {
+_WALKS: dict[type, Callable[[Walk], object]] = {
     MultiDOFJointTrajectory: _trajectory, JointTrajectory: _joint_trajectory,
-    JointState: _joint_state, Float64MultiArray: _array, String: _Walk.text}
+    JointState: _joint_state, Float64MultiArray: _array, String: Walk.text}

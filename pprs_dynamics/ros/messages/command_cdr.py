@@ -18,7 +18,15 @@ from pprs_dynamics.ros.messages.conversions import (
     seconds_and_rest,
 )
 from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.system.cdr import LITTLE_ENDIAN, STAMP, WORD, padded, with_text
+from pprs_dynamics.system.cdr import (
+    HEADER,
+    LITTLE_ENDIAN,
+    STAMP,
+    WORD,
+    padded,
+    with_count,
+    with_names,
+)
 
 
 class CommandBytes:
@@ -37,8 +45,9 @@ class CommandBytes:
               for name in ('positions', 'velocities', 'accelerations', 'effort')),
             ('sec', '<i4'), ('nanosec', '<u4')])
         # No dimensions, no offset, the numbers, and what aligns them.
-        self._commands = padded(LITTLE_ENDIAN + WORD.pack(0) + WORD.pack(0) + WORD.pack(count), 8)
-        self._names = _names(names)
+        self._commands = with_count(LITTLE_ENDIAN + WORD.pack(0) + WORD.pack(0), count)
+        # Frame and names of the drives, as they follow a stamp.
+        self._names = with_names(names.frame, names.joints)[HEADER + STAMP.size:]
 
     def commands(self, effort: Array) -> bytes:
         """Return a std_msgs/Float64MultiArray that holds the drives' efforts."""
@@ -49,11 +58,9 @@ class CommandBytes:
         """Return a sensor_msgs/JointState of the drives at a time [ns]."""
         message = LITTLE_ENDIAN + STAMP.pack(*seconds_and_rest(stamp)) + self._names
         for values in (position, velocity, effort):
-            if values is None:
-                message = padded(message, 4) + WORD.pack(0)
-            else:
-                message = (padded(padded(message, 4) + WORD.pack(self._count), 8)
-                           + self._values.pack(*values.tolist()))
+            message = with_count(message, 0 if values is None else self._count)
+            if values is not None:
+                message += self._values.pack(*values.tolist())
         return message
 
     def joint_trajectory(
@@ -83,14 +90,4 @@ class CommandBytes:
         stamp = STAMP.pack(*seconds_and_rest(start))
         head = padded(LITTLE_ENDIAN + stamp + self._names, 4) + WORD.pack(len(points))
         # The first point's first length word may stand where its padding would be.
-        first = padded(head + WORD.pack(self._count), 8)
-        return first + points.tobytes()[8:]
-
-
-def _names(names: RobotNames) -> bytes:
-    """Return frame and names of the drives, as they follow a stamp."""
-    start = LITTLE_ENDIAN + bytes(STAMP.size)
-    message = padded(with_text(start, names.frame), 4) + WORD.pack(len(names.joints))
-    for drive in names.joints:
-        message = with_text(message, drive)
-    return message[len(start):]
+        return with_count(head, self._count) + points.tobytes()[8:]
