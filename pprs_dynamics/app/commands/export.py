@@ -15,7 +15,7 @@ from pprs_dynamics.app.commands.arguments import output_file
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import read_inputs
 from pprs_dynamics.app.report.progress import progress_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, text_table
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import FORMATS, express
 from pprs_dynamics.simulation.export.replay import (
@@ -69,16 +69,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
-    from rich.table import Table
-
-    table = Table(title='Replayed in MuJoCo: the model\'s efforts less those of the file, rms',
-                  title_justify='left')
-    for name in ('drive', 'effort', 'error', 'expected'):
-        table.add_column(name, justify='left' if name == 'drive' else 'right')
-    for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
-                                    found.expected, strict=True):
-        table.add_row(shown(name), *(f'{number:.4g} {unit}' for number in numbers))
-    screen.print(table)
+    screen.print(text_table(
+        ('drive', 'effort', 'error', 'expected'),
+        [(shown(name), *(f'{number:.4g} {unit}' for number in numbers))
+         for name, unit, *numbers in zip(found.drives, found.units, found.effort, found.error,
+                                         found.expected, strict=True)],
+        title='Replayed in MuJoCo: the model\'s efforts less those of the file, rms',
+        title_justify='left'))
     if found.recorded is not None:
         by_file, by_model = found.recorded
         screen.print(f'measured less the file {by_file:.4g}, less the model {by_model:.4g}, rms')

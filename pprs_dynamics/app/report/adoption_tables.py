@@ -5,15 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from rich import box
 from rich.console import Group
 from rich.markup import escape
 from rich.panel import Panel
-from rich.table import Table
 
+from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import counted, in_unit, plain, with_uncertainty
@@ -102,12 +101,8 @@ def _parts(answer: Adoption) -> Iterator[Any]:
         yield f'[yellow]![/] {escape(remark)}'
 
 
-def _table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]] | Any,
-           caption: str | None = None) -> Table:
-    table = Table(title=escape(title), title_justify='left', title_style='bold',
-                  box=box.SIMPLE_HEAD, caption=caption and escape(caption), caption_justify='left')
-    for number, heading in enumerate(headings):
-        table.add_column(escape(heading), justify='left' if number == 0 else 'right')
-    for row in rows:
-        table.add_row(*(escape(cell) for cell in row))
-    return table
+def _table(title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]],
+           caption: str | None = None) -> Any:
+    return text_table(headings, [tuple(map(escape, row)) for row in rows], frame='head',
+                      title=escape(title), caption=caption and escape(caption),
+                      caption_justify='left')

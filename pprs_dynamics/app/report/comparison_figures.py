@@ -217,12 +217,15 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     if statement.range is not None:
         figure.add_vrect(x0=0.98 * statement.range[0], x1=1.02 * statement.range[1],
                          fillcolor=MARK, opacity=0.3, line_width=0)
+    return _over_frequency(figure, 300, f'{what} on {statement.drive} [{unit}]')
+
+
+def _over_frequency(figure: Any, height: int, title: str) -> Any:
     figure.update_layout(
-        height=300, margin=MARGIN, legend=LEGEND, hovermode='x unified',
+        height=height, margin=MARGIN, legend=LEGEND, hovermode='x unified',
         xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
                'showticksuffix': 'last'},
-        yaxis={'type': 'log', 'title': f'{what} on {statement.drive} [{unit}]',
-               'exponentformat': 'e', 'dtick': 1})
+        yaxis={'type': 'log', 'title': title, 'exponentformat': 'e', 'dtick': 1})
     return figure
 
 
@@ -286,13 +289,7 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
                 x=frequency, y=values, name=f'{name}: {label}', mode='lines',
                 meta={'drive': name}, line={'color': colour, 'width': 1.2},
                 hovertemplate=f'%{{y:.3g}} {_power(residuals.units_of(name).effort)}'))
-    figure.update_layout(
-        height=360, margin=MARGIN, legend=LEGEND, hovermode='x unified',
-        xaxis={'type': 'log', 'title': 'frequency [Hz]', 'dtick': 1, 'ticksuffix': ' Hz',
-               'showticksuffix': 'last'},
-        yaxis={'type': 'log', 'title': f'power [{_power(residuals.unit)}]',
-               'exponentformat': 'e', 'dtick': 1})
-    return figure
+    return _over_frequency(figure, 360, f'power [{_power(residuals.unit)}]')
 
 
 def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:

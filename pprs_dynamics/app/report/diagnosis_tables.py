@@ -9,13 +9,13 @@ from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import Any
 
-from rich import box
 from rich.console import Group
 from rich.markup import escape
 from rich.padding import Padding
 from rich.panel import Panel
 from rich.table import Table
 
+from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RankedEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed, name_drives, plain, with_drives
@@ -59,8 +59,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
     yield _verdict(diagnosis, words)
     if diagnosis.effects:
-        yield _plain_table(_headings(diagnosis),
-                           _effect_rows(diagnosis)[:MOST_EFFECTS], right=(2, 3, 4))
+        yield text_table(_headings(diagnosis), _effect_rows(diagnosis)[:MOST_EFFECTS],
+                         right=(2, 3, 4), whole=(0, 2, 3, 4), frame='none')
         lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
                  for effect, drive, text in _joined(fitted_values(diagnosis))]
         taken = accumulate(-(-len(line) // WIDTH) * WIDTH for line in lines)
@@ -189,23 +189,5 @@ def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
 
 
 def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
-           right: Sequence[int] = ()) -> Table:
-    table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
-    for number, heading in enumerate(headings):
-        table.add_column(escape(heading), justify='right' if number in right else 'left',
-                         no_wrap=number in right or number == 0)
-    for row in rows:
-        table.add_row(*row)
-    return table
-
-
-def _plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]],
-                 right: Sequence[int] = ()) -> Table:
-    """Return a table without lines and title."""
-    table = Table(box=None, padding=(0, 1))
-    for number, heading in enumerate(headings):
-        table.add_column(escape(heading), justify='right' if number in right else 'left',
-                         no_wrap=number in right or number == 0)
-    for row in rows:
-        table.add_row(*row)
-    return table
+           right: Sequence[int] = ()) -> Any:
+    return text_table(headings, rows, right=right, whole=(0, *right), frame='head', title=title)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 
@@ -70,13 +71,7 @@ def _number(value: float) -> str:
 
 
 def _table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> Any:
-    from rich import box
     from rich.markup import escape
-    from rich.table import Table
 
-    table = Table(title=title, title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
-    for heading in headings:
-        table.add_column(escape(heading))
-    for row in rows:
-        table.add_row(*map(escape, row))
-    return table
+    return text_table(headings, [tuple(map(escape, row)) for row in rows], right=(), frame='head',
+                      title=title)

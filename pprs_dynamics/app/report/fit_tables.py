@@ -8,6 +8,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
+from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.fit.base_fit import (
     HALVES,
@@ -42,29 +43,7 @@ def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
     from rich.console import Group
     from rich.markup import escape
 
-    return Group(_fit_table(model, fit), *map(escape, fit.told),
-                 *([_numbers_table(fit)] if details else []))
-
-
-def _fit_table(model: ForceModel, fit: BaseFit) -> Any:
-    """Return the errors as a table of the terminal."""
-    from rich.table import Table
-
-    table = Table(title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
-    for heading in ('drive', 'unit', 'before', 'after', 'held out'):
-        table.add_column(heading, justify='left' if heading in ('drive', 'unit') else 'right')
-    for row in error_rows(model, fit):
-        table.add_row(*row)
-    return table
-
-
-def _numbers_table(fit: BaseFit) -> Any:
-    """Return every fitted number as a table of the terminal."""
-    from rich.table import Table
-
-    table = Table()
-    for heading in NUMBERS:
-        table.add_column(heading, justify='right' if heading in NUMBERS[2:5] else 'left')
-    for row in number_rows(fit.numbers):
-        table.add_row(*row)
-    return table
+    errors = text_table(('drive', 'unit', 'before', 'after', 'held out'), error_rows(model, fit),
+                        right=(2, 3, 4), title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
+    numbers = [text_table(NUMBERS, number_rows(fit.numbers), right=(2, 3, 4))] if details else []
+    return Group(errors, *map(escape, fit.told), *numbers)

@@ -9,11 +9,10 @@ from collections.abc import Iterator, Sequence
 from math import inf
 from typing import Any
 
-from rich import box
 from rich.console import Group
 from rich.markup import escape
-from rich.table import Table
 
+from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.diagnosis.quantities import counted, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
 
@@ -73,24 +72,21 @@ def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:
     if not steps:
         yield 'No effect was added to this model yet.'
         return
-    table = Table(title=f'Error of the model, rms [{unit}], as effects were added',
-                  title_justify='left', title_style='bold', box=box.SIMPLE_HEAD)
-    for heading in ('', 'effect', 'error', 'held out', ''):
-        table.add_column(heading, justify='right' if heading in ('error', 'held out') else 'left',
-                         no_wrap=heading != 'effect')
     largest = max(max(step.error_before, step.error_after) for step in steps)
-    table.add_row('', 'before', f'{steps[0].error_before:.3f}',
-                  f'{steps[0].held_out_before:.3f}', _bar(steps[0].error_before, largest, 'red'))
+    rows = [('', 'before', f'{steps[0].error_before:.3f}', f'{steps[0].held_out_before:.3f}',
+             _bar(steps[0].error_before, largest, 'red'))]
     for number, step in enumerate(steps, start=1):
         again = f' (on other recordings {step.error_before:.3f} before)' if number > 1 and (
             step.sha256 != steps[number - 2].sha256) else ''
         on = f' on {", ".join(step.drives)}' if step.drives else ''
-        table.add_row(f'{number}', escape(f'+ {step.effect}{on}{again}'),
-                      f'{step.error_after:.3f}', f'{step.held_out_after:.3f}',
-                      _bar(step.error_after, largest, 'green'))
+        rows.append((f'{number}', escape(f'+ {step.effect}{on}{again}'),
+                     f'{step.error_after:.3f}', f'{step.held_out_after:.3f}',
+                     _bar(step.error_after, largest, 'green')))
     noise = noise_of(steps)
-    table.add_row('', 'noise', f'{noise:.3f}', '', _bar(noise, largest, 'white'))
-    yield table
+    rows.append(('', 'noise', f'{noise:.3f}', '', _bar(noise, largest, 'white')))
+    yield text_table(('', 'effect', 'error', 'held out', ''), rows, right=(2, 3),
+                     whole=(0, 2, 3, 4), frame='head',
+                     title=f'Error of the model, rms [{unit}], as effects were added')
     for number, step in enumerate(steps, start=1):
         yield f'[bold]{number}. {escape(step.effect)}[/]'
         for line in details(step):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
+from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain
 
 if TYPE_CHECKING:
@@ -46,21 +47,17 @@ def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
 
 def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
     from rich.markup import escape
-    from rich.table import Table
 
-    table = Table(title=escape(
-        f'{summary.name}: {summary.used} of {summary.samples} samples in {len(summary.segments)} '
-        f'segment{"s" * (len(summary.segments) != 1)}, {summary.duration:.2f} s at '
-        f'{summary.rate:.6g} Hz'), caption=escape(summary.source))
     position = units.of('m')
-    for heading in ('drive', f'position [{position}]', f'velocity [{position}/s]',
-                    f'effort [{units.effort}]', 'measured'):
-        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
-    for drive in drives:
-        found = summary.drives[drive]
-        table.add_row(escape(drive), _span(found.position), _span(found.velocity),
-                      _span(found.effort), f'{found.measured:.1%}')
-    return table
+    return text_table(
+        ('drive', f'position [{position}]', f'velocity [{position}/s]', f'effort [{units.effort}]',
+         'measured'),
+        [(escape(drive), *map(_span, (found.position, found.velocity, found.effort)),
+          f'{found.measured:.1%}') for drive in drives for found in [summary.drives[drive]]],
+        caption=escape(summary.source), title=escape(
+            f'{summary.name}: {summary.used} of {summary.samples} samples in '
+            f'{len(summary.segments)} segment{"s" * (len(summary.segments) != 1)}, '
+            f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
 
 
 def _span(bounds: tuple[float, float] | None) -> str:
@@ -132,31 +129,24 @@ def comparison_view(comparison: Comparison, command: str, details: bool = False,
 
 def _beside_table(comparison: Comparison, beside: Beside) -> Any:
     from rich.markup import escape
-    from rich.table import Table
 
-    table = Table(box=None, padding=(0, 1))
-    for heading in ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'):
-        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
     rows = [*((name, one.rms, beside.drives.get(name)) for name, one in comparison.drives.items()),
             ('all', comparison.rms, beside.rms)]
-    for name, before, after in rows:
-        table.add_row(escape(name), plain(before), 'none' if after is None else plain(after),
-                      '' if not after or not before else f'{100 * (after / before - 1):+.0f}%')
-    return table
+    return text_table(
+        ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'),
+        [(escape(name), plain(before), 'none' if after is None else plain(after),
+          '' if not after or not before else f'{100 * (after / before - 1):+.0f}%')
+         for name, before, after in rows], frame='none')
 
 
 def _comparison_table(comparison: Comparison) -> Any:
     from rich.markup import escape
-    from rich.table import Table
 
     colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
-    table = Table(box=None, padding=(0, 1))
     # One unit for all: names of joints need the room.
     short = len(comparison.unit) > 1
-    for heading in comparison_headings(comparison)[:7]:
-        if short and not heading.startswith('rms'):
-            heading = heading.partition(' [')[0]
-        table.add_column(escape(heading), justify='left' if heading == 'drive' else 'right')
-    for row, drive in zip(comparison_rows(comparison), comparison.drives.values(), strict=True):
-        table.add_row(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
-    return table
+    return text_table(
+        [heading.partition(' [')[0] if short and not heading.startswith('rms') else heading
+         for heading in comparison_headings(comparison)[:7]],
+        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7]) for row, drive in zip(
+            comparison_rows(comparison), comparison.drives.values(), strict=True)], frame='none')

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
@@ -59,3 +60,39 @@ def shown(name: object) -> str:
     from rich.markup import escape
 
     return escape(displayed(name))
+
+
+def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
+               right: Collection[int] | None = None, whole: Collection[int] = (),
+               frame: str = 'box', **options: Any) -> Any:
+    """Return a table for the console.
+
+    Parameters
+    ----------
+    headings : sequence of str
+    rows : iterable of sequence of str
+        With rich's markup.
+    right : collection of int, optional
+        Columns of numbers; by default all but the first.
+    whole : collection of int, optional
+        Columns that are not wrapped.
+    frame : {'box', 'head', 'none'}
+        Around and in it; 'head' has a line below the headings and a bold title.
+    **options
+        Of rich's Table.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    frames: dict[str, dict[str, Any]] = {
+        'box': {}, 'none': {'box': None, 'padding': (0, 1)},
+        'head': {'box': SIMPLE_HEAD, 'title_justify': 'left', 'title_style': 'bold'}}
+    table = Table(**{**frames[frame], **options})
+    numbers = range(1, len(headings)) if right is None else right
+    for number, heading in enumerate(headings):
+        table.add_column(escape(heading), justify='right' if number in numbers else 'left',
+                         no_wrap=number in whole)
+    for row in rows:
+        table.add_row(*row)
+    return table
