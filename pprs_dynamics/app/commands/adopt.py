@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import MODEL, PAGE, add_details, output_file
+from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
 from pprs_dynamics.app.commands.output import tell
 from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
 from pprs_dynamics.app.front_door.adopt import adopt
@@ -33,8 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
     add_details(parser)
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='write a page with all figures')
+    add_report(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -28,9 +28,21 @@ INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifes
 DEFAULT_MODEL = 'config/paper.yaml'
 
 
-def add_details(parser: argparse.ArgumentParser) -> None:
+def add_details(parser: argparse.ArgumentParser, what: str = 'print all there is to say') -> None:
     """Declare --details."""
-    parser.add_argument('--details', action='store_true', help='print all there is to say')
+    parser.add_argument('--details', action='store_true', help=what)
+
+
+def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with all figures',
+               ) -> None:
+    """Declare --report."""
+    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE), help=what)
+
+
+def add_topic(parser: argparse.ArgumentParser) -> None:
+    """Declare --topic."""
+    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
+                        'holds several')
 
 
 def number(lower: float, upper: float, unit: str = '', above: bool = False,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import PAGE, add_details, output_file
+from pprs_dynamics.app.commands.arguments import add_details, add_report, output_file
 from pprs_dynamics.app.commands.output import tell
 from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
 from pprs_dynamics.app.front_door.compare import compare
@@ -24,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'with layouts for PlotJuggler and Foxglove beside it')
     parser.add_argument('--beside', metavar='FILE', help='another model file on the same '
                         'recordings, or another recording: its errors stand beside')
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='write a page with all figures')
+    add_report(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import MODEL, PAGE, add_details, output_file
+from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
 from pprs_dynamics.app.commands.output import tell, write_json
 from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
 from pprs_dynamics.app.front_door.adopt import adopt_all
@@ -28,8 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_recordings(parser)
     add_validation(parser)
     add_details(parser)
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='write a page with all figures')
+    add_report(parser)
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',

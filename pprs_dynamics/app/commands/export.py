@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import output_file
+from pprs_dynamics.app.commands.arguments import add_topic, output_file
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import read_inputs
 from pprs_dynamics.app.report.progress import progress_bar
@@ -40,8 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--recording', dest='recordings', metavar='RECORDING', action='append',
                         default=[], help='its motion is replayed (default: a short excitation); '
                         'may be repeated')
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a '
-                        'recording holds several')
+    add_topic(parser)
 
 
 def run(options: argparse.Namespace) -> int:

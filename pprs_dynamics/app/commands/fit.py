@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import MODEL, PAGE, output_file
+from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
 from pprs_dynamics.app.commands.output import tell
 from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
 from pprs_dynamics.app.front_door.fit import fit
@@ -21,9 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_validation(parser)
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL), required=True,
                         help='model file that is written')
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='write a page with all figures')
-    parser.add_argument('--details', action='store_true', help='print every fitted number')
+    add_report(parser)
+    add_details(parser, 'print every fitted number')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import PAGE, output_file
+from pprs_dynamics.app.commands.arguments import add_report
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import add_recordings
 from pprs_dynamics.app.front_door.inputs import read_checked
@@ -36,8 +36,7 @@ class InfoError(PprsError, ValueError):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser, required=False)
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='an arm or a robot with loops, drawn at home')
+    add_report(parser, 'an arm or a robot with loops, drawn at home')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ import shlex
 
 from rich.markup import escape
 
-from pprs_dynamics.app.commands.arguments import PAGE, POSES, number, output_file, seed
+from pprs_dynamics.app.commands.arguments import POSES, add_report, number, output_file, seed
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
 from pprs_dynamics.app.front_door.next_experiment import RATE, next_experiment
@@ -65,8 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--noise', type=number(LEAST_NOISE, 1e3, 'N'), default=0.05,
                         help='of the efforts over 0.01 s, for --purpose commission without '
                         'recordings [N] (default 0.05)')
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='write a page with all figures')
+    add_report(parser)
 
 
 def run(options: argparse.Namespace) -> int:

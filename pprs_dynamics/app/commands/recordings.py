@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from pprs_dynamics.app.commands.arguments import add_topic
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.terminal import shown
@@ -17,15 +18,14 @@ def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> No
     """Declare RECORDING… and --topic."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
                         help='rosbag2 folder, .mcap, .db3, .csv or .csv.gz')
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
-                        'holds several')
+    add_topic(parser)
 
 
-def add_validation(parser: argparse.ArgumentParser) -> None:
+def add_validation(parser: argparse.ArgumentParser,
+                   what: str = 'held-out errors are taken on it') -> None:
     """Declare --validate."""
     parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
-                        help='a recording that is never fitted: held-out errors are taken on it; '
-                        'may be repeated')
+                        help=f'a recording that is never fitted: {what}; may be repeated')
 
 
 def read_inputs(options: argparse.Namespace, screen: Any) -> Inputs:

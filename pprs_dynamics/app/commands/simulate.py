@@ -12,7 +12,13 @@ import argparse
 
 import numpy as np
 
-from pprs_dynamics.app.commands.arguments import PAGE, RECORDING, number, output_file, seed
+from pprs_dynamics.app.commands.arguments import (
+    RECORDING,
+    add_report,
+    number,
+    output_file,
+    seed,
+)
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.progress import staged_bar
@@ -52,8 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'arm [N m, N] half a percent of the largest)')
     parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
                         help='what the robot is driven with (default friction)')
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='the robot moving, as a page')
+    add_report(parser, 'the robot moving, as a page')
 
 
 def run(options: argparse.Namespace) -> int:

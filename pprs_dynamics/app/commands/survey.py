@@ -12,8 +12,8 @@ from typing import Any
 
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
-    PAGE,
-    output_file,
+    add_report,
+    add_topic,
     output_folder,
     whole,
 )
@@ -52,15 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--effects', metavar='auto|NAME,…', default=AUTO,
                         help='auto: diagnose each recording; else these effects are fitted, many '
                         'times faster; EFFECT or EFFECT:drive+drive')
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
-                        'holds several')
+    add_topic(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', metavar='N', type=whole(1, MOST_WORKERS),
                        help='processes on this machine (default: one for every core)')
     where.add_argument('--scheduler', metavar='tcp://HOST:PORT',
                        help='use a running Dask cluster')
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help="write the fleet's page, as pprs trend does")
+    add_report(parser, "write the fleet's page, as pprs trend does")
 
 
 def run(options: argparse.Namespace) -> int:

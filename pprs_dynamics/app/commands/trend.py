@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from pprs_dynamics.app.commands.arguments import PAGE, output_file
+from pprs_dynamics.app.commands.arguments import add_report
 from pprs_dynamics.app.commands.output import write_json
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.trend import fleet_trends
@@ -38,8 +38,7 @@ def _limit(text: str) -> tuple[str, float]:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('store', metavar='STORE', help='folder that pprs survey wrote')
-    parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE),
-                        help='write a page: a map of the fleet, and every trend')
+    add_report(parser, 'write a page: a map of the fleet, and every trend')
     parser.add_argument('--limit', metavar='QUANTITY=NUMBER', type=_limit, action='append',
                         default=[], help='tell when a slope reaches it; may be repeated')
     parser.add_argument('--beside', metavar='COLUMN',

@@ -11,7 +11,8 @@ from __future__ import annotations
 import argparse
 import re
 
-from pprs_dynamics.app.commands.arguments import whole
+from pprs_dynamics.app.commands.arguments import add_topic, whole
+from pprs_dynamics.app.commands.recordings import add_validation
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
@@ -31,11 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
                         help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
                         'store of pprs survey, to choose from in the browser')
-    parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
-                        help='a recording that is never fitted: adoptions are judged on it; may '
-                        'be repeated')
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
-                        'holds several')
+    add_validation(parser, 'adoptions are judged on it')
+    add_topic(parser)
     parser.add_argument('--live', action='store_true',
                         help='listen to joint_states, and set effects on running nodes')
     parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,
