@@ -39,6 +39,7 @@ from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.rejection import Rejection
 from pprs_dynamics.ros.messages.robot_names import RobotNames
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
+from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
 JUDGED = 0.05  # [s] between looks at what came in
@@ -172,11 +173,11 @@ class LiveJointStates(Node):
         return {**self._counters, 'drives': list(self.model.drives), 'age': age, 'kept': span,
                 'trouble': self._trouble, 'diagnosis': self._diagnosis,
                 'effects': list(self.model.values.get(ACTIVE, ())),
-                'error': [_plain(value) for value in running],
-                'monitor_error': [_plain(value) for value in self._monitor]
+                'error': [finite(value) for value in running],
+                'monitor_error': [finite(value) for value in self._monitor]
                 if self._monitor is not None and now - self._heard < ERROR_SPAN else None,
                 'time': [moment for moment, _ in late[::step]],
-                'residual': [[_plain(value) for value in column] for column in zip(
+                'residual': [[finite(value) for value in column] for column in zip(
                     *(values.tolist() for _, values in late[::step]), strict=True)]}
 
 
@@ -263,7 +264,3 @@ class LiveNodes:
             return f'has not answered within {PATIENCE:g} s'
         result = future.result().result
         return '' if result.successful else str(result.reason)
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

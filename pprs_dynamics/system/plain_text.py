@@ -24,6 +24,12 @@ def displayed(name: object) -> str:
                    for character in str(name))
 
 
+def counted(count: int, thing: str) -> str:
+    """Return '1 step' or '3 steps'; `thing` may go on after its noun: 'number of the model'."""
+    noun, _, rest = thing.partition(' ')
+    return f'{count} {noun}{"s" * (count != 1)}{" " * bool(rest)}{rest}'
+
+
 def for_json(content: Any) -> Any:
     """Return what JSON can hold: text as `displayed`, None for numbers that are not finite."""
     if isinstance(content, dict):

@@ -26,6 +26,7 @@ from pprs_dynamics import __version__
 from pprs_dynamics.app.fleet.manifest import ManifestEntry, filesystem, is_remote
 from pprs_dynamics.app.fleet.named_effects import OWN, fit_named_effects
 from pprs_dynamics.app.fleet.store import key_of
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -242,7 +243,7 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
     for d, drive in enumerate(residuals.drives):
         known = np.isfinite(residuals.measured[:, d])
         if known.any():
-            rms = float(np.sqrt(np.mean(residuals.error[known, d] ** 2)))
+            rms = root_mean_square(residuals.error[known, d])
             swing = float(np.std(residuals.measured[known, d]))
             found[drive] = {'rms': rms, 'relative': rms / swing if swing else float('nan'),
                             'noise': float(noise.get(drive, np.nan))}

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.fleet.trend import FleetTrends, Trend, main_change
+from pprs_dynamics.system.plain_text import counted
 
 MONTH = 30.0  # [days], for slopes
 APART = 6.0  # standard deviations from the fleet's median beyond which a robot is mentioned
@@ -106,12 +107,12 @@ def _sentences(fleet: FleetTrends) -> Iterator[str]:
         for other in apart[:1]:
             yield f'{_place(other)} {change_text(other)}{reach_text(other)}'
     if not changed:
-        yield f'No change on {_counted(len(fleet.robots), "robot")}.'
+        yield f'No change on {counted(len(fleet.robots), "robot")}.'
     yield from _lying_apart(fleet, {robot for robot, _ in changed})
     if fleet.errors:
-        yield f'{_counted(len(fleet.errors), "recording")} gave no result.'
+        yield f'{counted(len(fleet.errors), "recording")} gave no result.'
     if fleet.left_out:
-        yield (f'{_counted(fleet.left_out, "result")} of other options, models or versions left '
+        yield (f'{counted(fleet.left_out, "result")} of other options, models or versions left '
                f'out; these are of --effects {fleet.options}.')
 
 
@@ -130,10 +131,6 @@ def _lying_apart(fleet: FleetTrends, changed: set[str]) -> Iterator[str]:
 def _place(trend: Trend) -> str:
     drive = f', {trend.quantity.drive}' if trend.quantity.drive else ''
     return f'{robot_text(trend.robot)}{drive}: {trend.quantity.name}'
-
-
-def _counted(count: int, noun: str) -> str:
-    return f'{count} {noun}{"s" * (count != 1)}'
 
 
 def to_dict(fleet: FleetTrends) -> dict[str, Any]:

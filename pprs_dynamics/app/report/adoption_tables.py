@@ -15,7 +15,8 @@ from rich.panel import Panel
 from pprs_dynamics.app.report.terminal import text_table
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
-from pprs_dynamics.inference.diagnosis.quantities import counted, in_unit, plain, with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain, with_uncertainty
+from pprs_dynamics.system.plain_text import counted
 
 MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2

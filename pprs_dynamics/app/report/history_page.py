@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from pprs_dynamics.app.report.history_figures import falling_error_by_drive
 from pprs_dynamics.app.report.history_tables import details, noise_of, step_rows
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.inference.diagnosis.quantities import change, counted, in_unit
+from pprs_dynamics.inference.diagnosis.quantities import change, in_unit
 from pprs_dynamics.physics.model.ledger import Step
+from pprs_dynamics.system.plain_text import counted
 
 
 def _headings(unit: str) -> tuple[str, ...]:

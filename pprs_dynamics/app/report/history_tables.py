@@ -13,8 +13,9 @@ from rich.console import Group
 from rich.markup import escape
 
 from pprs_dynamics.app.report.terminal import text_table
-from pprs_dynamics.inference.diagnosis.quantities import counted, with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
+from pprs_dynamics.system.plain_text import counted
 
 MOST_LISTED = 3  # numbers of the model that a line names
 BAR = 24  # characters, of the largest error

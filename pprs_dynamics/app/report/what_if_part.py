@@ -14,6 +14,7 @@ import numpy as np
 
 from pprs_dynamics.app.report.comparison_figures import shown_samples
 from pprs_dynamics.app.report.page import Page, one_script
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.what_if import OptionalForces, WhatIf
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
@@ -75,7 +76,7 @@ def _drive(one: OptionalForces, residuals: Residuals) -> dict[str, Any]:
     steps = np.where(np.isfinite(rows), np.round(LARGEST / size * np.nan_to_num(rows)), GAP)
     time = residuals.time[np.where(at < 0, np.roll(at, 1), at)]
     return {'name': one.name, 'noise': one.noise, 'samples': one.samples,
-            'given': float(np.sqrt(np.nanmean(one.given ** 2))),
+            'given': root_mean_square(one.given),
             'columns': one.columns.tolist(), 'products': _letters(one.products, 'f8'),
             'time': _letters(time, 'f4'), 'rows': _letters(steps, 'i2'),
             'scales': _letters(size / LARGEST, 'f8')}

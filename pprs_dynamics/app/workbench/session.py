@@ -13,8 +13,6 @@ from pathlib import Path
 from threading import Lock, RLock
 from typing import Any
 
-import numpy as np
-
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import Cancelled, Job
@@ -23,20 +21,17 @@ from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, share
 from pprs_dynamics.app.workbench.tick_fits import Tick, TickFits
 from pprs_dynamics.app.workbench.view_stages import following, linear, without_ticks
 from pprs_dynamics.app.workbench.view_state import (
-    NOT_KNOWN,
     DriveError,
     Share,
     ViewState,
     effect_to_dict,
     errors_of,
-    finite,
     names_of,
     recordings_to_dict,
-    rms,
     units_to_dict,
 )
 from pprs_dynamics.app.workbench.worker_process import run_in_process
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import original
 from pprs_dynamics.inference.adoption.adoption import Adoption
@@ -52,6 +47,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.system.numbers import finite
 from pprs_dynamics.system.plain_text import for_json
 
 
@@ -257,9 +253,8 @@ class Session:
 
     def overall(self) -> DriveError:
         """Return the error over all samples and drives."""
-        noise = list(self.noise.values())
-        return DriveError(rms(self.before), rms(self.now),
-                          float(np.sqrt(np.mean(np.square(noise)))) if noise else NOT_KNOWN)
+        return DriveError(root_mean_square(self.before), root_mean_square(self.now),
+                          root_mean_square(list(self.noise.values())))
 
     @property
     def steps(self) -> list[Step]:

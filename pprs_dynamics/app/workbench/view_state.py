@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.workbench.tick_fits import Exact, Offer, Tick, TickFits
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.estimates import Estimate
@@ -20,6 +20,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.system.numbers import finite
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
 # cost is lowest; and the fitted model evaluated.
@@ -182,7 +183,8 @@ def recordings_to_dict(recordings: Sequence[Recording], fits: TickFits, now: Arr
         first = part.stop
         found.append({
             'name': recording.name, 'start': float(time[part][0]), 'end': float(time[part][-1]),
-            'before': finite(rms(fits.before[part])), 'now': finite(rms(now[part])),
+            'before': finite(root_mean_square(fits.before[part])),
+            'now': finite(root_mean_square(now[part])),
             'findings': [finding.text for finding in recording.findings]})
     return found
 
@@ -196,16 +198,6 @@ def names_of(candidate: EffectCandidate, drives: tuple[str, ...]) -> tuple[str, 
 def errors_of(before: Array, now: Array, noise: Mapping[str, float], drives: tuple[str, ...],
               ) -> dict[str, DriveError]:
     """Return the errors of the drives that were measured."""
-    return {name: DriveError(rms(before[:, d]), rms(now[:, d]), noise.get(name, NOT_KNOWN))
+    return {name: DriveError(root_mean_square(before[:, d]), root_mean_square(now[:, d]),
+                             noise.get(name, NOT_KNOWN))
             for d, name in enumerate(drives) if np.isfinite(before[:, d]).any()}
-
-
-def rms(values: Array) -> float:
-    """Return the root of the mean square of what is known."""
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known ** 2))) if known.size else NOT_KNOWN
-
-
-def finite(value: float | None) -> float | None:
-    """Return a number that JSON has, or None."""
-    return float(value) if value is not None and np.isfinite(value) else None

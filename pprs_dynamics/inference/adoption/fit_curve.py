@@ -18,7 +18,7 @@ from math import pi
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError, UnknownNameError
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -184,7 +184,7 @@ def fit_curve(
         start, end = -pi, pi
     root = np.sqrt(noise.power(series.frequency))
     error = series.transform(series.error) / root
-    scale = float(np.sqrt(np.mean(series.error[series.known] ** 2)))
+    scale = root_mean_square(series.error[series.known])
     best: FittedCurve | None = None
     for intervals in INTERVALS:
         index, weight = spline_basis(x[series.index], start, end, intervals, turns)

@@ -13,8 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.fit.base_fit import HALVES, BaseFit, errors_of, fit_base
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -68,8 +67,8 @@ def refit_base(model: ForceModel, recordings: Sequence[Recording],
     before = errors_of(model, validate) if validate else found.before
     drives = [drive for drive in before if drive in found.held_out]
     # Drives of different sizes and units count alike.
-    ratio = float(np.sqrt(np.mean([
-        (found.held_out[drive] / max(before[drive], 1e-300)) ** 2 for drive in drives])))
+    ratio = root_mean_square([
+        found.held_out[drive] / max(before[drive], 1e-300) for drive in drives])
     where = ('the validation recordings' if validate else 'its halves, each predicted from the '
              'other,' if found.held_out_on == HALVES else 'recordings predicted from the others')
     change = f'the error on {where} is {ratio:.3g} of that before, over all drives'

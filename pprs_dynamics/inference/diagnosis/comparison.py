@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.system.numbers import finite
 
 # Of the effort's size, below which a changing effort is rounding.
 CONSTANT = 1e-9
@@ -91,9 +92,9 @@ class Beside:
 
     def to_dict(self) -> dict[str, Any]:
         """Return name and errors."""
-        return {'name': self.name, 'drives': {name: {'rms': _number(value)}
+        return {'name': self.name, 'drives': {name: {'rms': finite(value)}
                                               for name, value in self.drives.items()},
-                'overall': {'rms': _number(self.rms)}}
+                'overall': {'rms': finite(self.rms)}}
 
 
 @dataclass(frozen=True)
@@ -133,10 +134,10 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
         return {
-            'drives': {name: {key: _number(getattr(drive, key))
+            'drives': {name: {key: finite(getattr(drive, key))
                               for key in ('rms', 'relative', 'bias', 'peak')}
                        for name, drive in self.drives.items()},
-            'overall': {'rms': _number(self.rms), 'relative': _number(self.relative)},
+            'overall': {'rms': finite(self.rms), 'relative': finite(self.relative)},
             'where': [statement.to_dict() for statement in self.where]}
 
 
@@ -177,8 +178,8 @@ def _compare_drive(
 ) -> DriveComparison:
     known = np.isfinite(residuals.measured[:, index])
     error, effort = residuals.error[known, index], residuals.measured[known, index]
-    rms, bias, peak = _rms(error), float(error.mean()), float(np.abs(error).max())
-    swing = _rms(effort - effort.mean())
+    rms, bias, peak = root_mean_square(error), float(error.mean()), float(np.abs(error).max())
+    swing = root_mean_square(effort - effort.mean())
     constant = swing <= CONSTANT * max(float(np.abs(effort).max()), CONSTANT)
     relative = float('nan') if constant else rms / swing
     explained = float('nan') if constant else 1 - float(np.var(error)) / swing ** 2
@@ -194,7 +195,7 @@ def _compare_drive(
                 if one.kind not in ('scatter', 'level')), default=0.0)
     floor = min(floor, float(np.sqrt(max(rms ** 2 - most, 0.0))))
     unexplained = float(np.sqrt(max(rms ** 2 - floor ** 2, 0.0)))
-    parts = {part: _rms(values[known, index] - values[known, index].mean())
+    parts = {part: root_mean_square(values[known, index] - values[known, index].mean())
              for part, values in residuals.parts.items()}
     grade = _grade(unexplained, floor, swing, constant, parts)
     unit = residuals.units_of(name).effort
@@ -264,11 +265,3 @@ def _overall_verdict(drives: Mapping[str, DriveComparison], told: Collection[str
     return (f'the model leaves {in_unit(rms, unit)}{share}: more than noise on {where}; '
             f'worst on {worst}, {in_unit(beyond[worst].unexplained, beyond[worst].unit)} '
             f'unexplained ({beyond[worst].grade})')
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values ** 2)))
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

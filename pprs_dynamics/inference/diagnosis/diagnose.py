@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
 from pprs_dynamics.inference.diagnosis.found_effects import (
@@ -229,7 +229,7 @@ class _Answer:
                                                  self.ranking.remainders)), self._sets(),
             tuple(moved), find_cautions(fits, self.best, effects), first.notes,
             first.given, adopted, first.residuals, remaining, noise, floors,
-            float(np.sqrt(np.mean(np.square(list(floors.values()))))),
+            root_mean_square(list(floors.values())),
             'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
     def _effects(self, final: SettledSet, adopted: ForceModel, remaining: Array,
@@ -238,8 +238,8 @@ class _Answer:
         fits, ordered, steps = self.fits, self.ranking.order, self.ranking.path
         if not ordered:
             return []
-        errors = [_rms(self.ranking.first.design.residuals.error),
-                  *(linear_error(fits, step) for step in steps[1:-1]), _rms(remaining)]
+        errors = [root_mean_square(self.ranking.first.design.residuals.error),
+                  *(linear_error(fits, step) for step in steps[1:-1]), root_mean_square(remaining)]
         if self.validate:
             given = self.ranking.first.design.given
             models = [given, *(settled(fits, one).model for one in steps[1:-1]), adopted]
@@ -277,7 +277,7 @@ class _Answer:
     def _is_above_noise(self, remaining: Array) -> bool:
         """Return whether errors (M, D) leave a drive more than its noise allows for."""
         regression = self.fits.regression
-        return any(_rms(remaining[:, d]) > self.decisions.left_ratio
+        return any(root_mean_square(remaining[:, d]) > self.decisions.left_ratio
                    * regression.noise_floor(self.best.fit, d) for d in regression.drives)
 
     def _evidence(self, candidate: Candidate) -> float:
@@ -345,7 +345,3 @@ class _Answer:
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.nanmean(values ** 2)))

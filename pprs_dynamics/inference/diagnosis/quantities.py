@@ -89,9 +89,3 @@ def listed(names: Sequence[str], last: str = 'and') -> str:
 def sentence(text: str) -> str:
     """Return a phrase with a capital and a full stop."""
     return f'{text[:1].upper()}{text[1:]}.'
-
-
-def counted(count: int, thing: str) -> str:
-    """Return '1 step' or '3 steps'; `thing` may go on after its noun: 'number of the model'."""
-    noun, _, rest = thing.partition(' ')
-    return f'{count} {noun}{"s" * (count != 1)}{" " * bool(rest)}{rest}'

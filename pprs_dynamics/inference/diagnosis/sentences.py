@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 
-import numpy as np
-
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
@@ -155,7 +154,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
-        left = float(np.sqrt(np.nanmean(diagnosis.remaining ** 2)))
+        left = root_mean_square(diagnosis.remaining)
         lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
         above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
                  if left > AT_NOISE * diagnosis.noise_floor else '')

@@ -12,6 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
+from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import PatternLibrary
@@ -135,7 +136,8 @@ def word_statement(
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
     sentence = _sentence(variable, pattern, library, signed, amplitude, share, time, shape)
     if rivals:
-        sentence += f'; {_listed([_words(name) for name in rivals])} would explain it about as well'
+        sentence += (f'; {listed([_words(name) for name in rivals], "or")} would explain it about '
+                     'as well')
     return Statement(drive, variable, limits, share, time, f'{drive}: {sentence}', evidence,
                      pattern.kind, amplitude, float(np.mean(shape ** 2)), rivals)
 
@@ -225,7 +227,3 @@ def _ends(
 def _words(variable: str) -> str:
     name, of, other = variable.partition(' of ')
     return WORDS.get(name, name) + of + other
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f'{", ".join(names[:-1])} or {names[-1]}'

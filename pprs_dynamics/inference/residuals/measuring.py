@@ -59,19 +59,16 @@ def measure_residuals(
     notes: list[str] = []
     total = 2.0 * sum(len(recording.time) for recording in recordings)
     done = 0.0
+
+    def reporter(before: float) -> Callable[[float, float], None]:
+        def report(samples: float, _: float) -> None:
+            if progress is not None:
+                progress(before + samples, total)
+        return report
     for recording in recordings:
-        def report(samples: float, _: float, before: float = done) -> None:
-            if progress is not None:
-                progress(before + samples, total)
-
-        reconstruction = reconstruct(model, recording, report)
+        reconstruction = reconstruct(model, recording, reporter(done))
         done += len(recording.time)
-
-        def report_model(samples: float, _: float, before: float = done) -> None:
-            if progress is not None:
-                progress(before + samples, total)
-
-        tables.append(treated_table(model, reconstruction, report_model))
+        tables.append(treated_table(model, reconstruction, reporter(done)))
         done += len(recording.time)
         notes += reconstruction.notes
         # Motion at full rate takes several times the room of all that follows.

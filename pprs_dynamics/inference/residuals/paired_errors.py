@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -20,12 +20,12 @@ LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 
 def rms(residuals: Residuals) -> float:
     """Return the root of the mean squared error, over samples and drives [N]."""
-    return float(np.sqrt(np.nanmean(residuals.error ** 2)))
+    return root_mean_square(residuals.error)
 
 
 def rms_by_drive(residuals: Residuals) -> dict[str, float]:
     """Return the root of the mean squared error of every drive that was measured [N]."""
-    return {drive: float(np.sqrt(np.nanmean(residuals.error[:, d] ** 2)))
+    return {drive: root_mean_square(residuals.error[:, d])
             for d, drive in enumerate(residuals.drives)
             if np.isfinite(residuals.error[:, d]).any()}
 

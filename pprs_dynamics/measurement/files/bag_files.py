@@ -27,11 +27,11 @@ from pprs_dynamics.measurement.files.samples import (
     Indices,
     Progress,
     Samples,
-    counted,
     whole_epoch,
 )
 from pprs_dynamics.system.input_files import require_file
 from pprs_dynamics.system.output_files import new_folder, scratch_folder, writable_file
+from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection

@@ -29,7 +29,6 @@ from pprs_dynamics.measurement.files.samples import (
     Defect,
     Progress,
     Samples,
-    counted,
     whole_epoch,
 )
 from pprs_dynamics.system.csv_tables import (
@@ -40,6 +39,7 @@ from pprs_dynamics.system.csv_tables import (
     write_table,
 )
 from pprs_dynamics.system.numbers import parse_number
+from pprs_dynamics.system.plain_text import counted
 
 QUANTITIES = ('position', 'velocity', 'effort')
 CURRENT = 'current'

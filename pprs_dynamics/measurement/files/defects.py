@@ -20,9 +20,9 @@ from pprs_dynamics.measurement.files.samples import (
     Indices,
     Mask,
     Samples,
-    counted,
     when,
 )
+from pprs_dynamics.system.plain_text import counted
 
 # What a differentiating filter needs at least; shorter segments are nothing but edges.
 SHORTEST_SEGMENT = 20

@@ -19,9 +19,9 @@ from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
 from pprs_dynamics.measurement.files.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
-from pprs_dynamics.measurement.files.samples import Defect, Progress, Samples, counted
+from pprs_dynamics.measurement.files.samples import Defect, Progress, Samples
 from pprs_dynamics.measurement.files.table_files import read_table
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import counted, displayed
 
 
 @dataclass(frozen=True)

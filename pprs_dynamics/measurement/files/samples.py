@@ -167,11 +167,6 @@ def whole_epoch(seconds: Array) -> int:
     return int(np.floor(finite[np.abs(finite - middle) < EPOCH_STAMP].min()))
 
 
-def counted(count: int, noun: str) -> str:
-    """Return '1 sample', '2 samples'."""
-    return f'{count} {noun}' + ('' if count == 1 else 's')
-
-
 def when(spans: tuple[tuple[float, float], ...]) -> str:
     """Return 'at 1.5 s' or 'between 1.5 s and 2 s'."""
     first, last = min(span[0] for span in spans), max(span[1] for span in spans)

@@ -55,7 +55,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 
 ORDER = 7
 SHORTEST_WINDOW = 2 * ORDER + 3  # samples; shorter ones hardly smooth
@@ -232,8 +232,8 @@ def choose_smoothing(
     text = (
         f'velocities and accelerations come from polynomials of order {ORDER} through the '
         f'positions over {window * step:.3g} s ({window} samples, cut-off {chosen.cut_off:.3g} '
-        f'Hz), {given}: positions have {_rms(noise) * 1e6:.2g} u{unit} rms of noise, accelerations '
-        f'keep {_rms(errors[window]):.2g} {unit}/s^2 rms of error')
+        f'Hz), {given}: positions have {root_mean_square(noise) * 1e6:.2g} u{unit} rms of noise, '
+        f'accelerations keep {root_mean_square(errors[window]):.2g} {unit}/s^2 rms of error')
     return Smoothing(window * step, noise, noise * chosen.noise_gain(1), errors[window], text)
 
 
@@ -317,10 +317,6 @@ def _windows(longest: int) -> list[int]:
 def _odd(samples: float) -> int:
     """Return the nearest odd number."""
     return 2 * round((samples - 1) / 2) + 1
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values * values)))
 
 
 def convolve_valid(values: Array, weights: Array) -> Array:

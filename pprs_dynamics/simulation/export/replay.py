@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Progress
@@ -126,8 +126,9 @@ class Replayed:
         by_drive = zip(self.drives, self.units, self.error.tolist(), self.expected.tolist(),
                        self.effort.tolist(), strict=True)
         found: dict[str, Any] = {
-            'replay_error': _pooled(self.error), 'expected_error': _pooled(self.expected),
-            'effort': _pooled(self.effort),
+            'replay_error': root_mean_square(self.error),
+            'expected_error': root_mean_square(self.expected),
+            'effort': root_mean_square(self.effort),
             'drives': {name: {'unit': unit, 'replay_error': error, 'expected_error': expected,
                               'effort': effort}
                        for name, unit, error, expected, effort in by_drive}}
@@ -168,8 +169,7 @@ def replay_recordings(model: ForceModel, replay: Replay, recordings: Sequence[Re
         measured = reconstruction.treat(reconstruction.effort)
         for name, those in errors.items():
             those.append(measured - table[name])
-    by_file, by_model = (float(np.sqrt(np.nanmean(np.concatenate(those) ** 2)))
-                         for those in errors.values())
+    by_file, by_model = (root_mean_square(np.concatenate(those)) for those in errors.values())
     return _replayed(model, replay, squares, (by_file, by_model))
 
 
@@ -179,10 +179,6 @@ def _replayed(model: ForceModel, replay: Replay, effort: Array,
                             for sums in (*replay.squares, effort))
     return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, expected,
                     own, recorded)
-
-
-def _pooled(values: Array) -> float:
-    return float(np.sqrt(np.mean(values ** 2)))
 
 
 def _excitation(model: ForceModel) -> Any:
