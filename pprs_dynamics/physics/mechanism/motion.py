@@ -80,9 +80,13 @@ class PlatformMotion:
         self.__dict__['rows'] = rows
         self.__dict__['time'] = None if time is None else checked_times(time, len(rows))
 
-    def _set(self, rows: Array, time: Array | None) -> None:
-        self.__dict__['rows'] = rows
-        self.__dict__['time'] = time
+    @classmethod
+    def _of(cls, rows: Array, time: ArrayLike | None) -> PlatformMotion:
+        """Return the motion of rows that are known to be right."""
+        motion = object.__new__(cls)
+        motion.__dict__['rows'] = rows
+        motion.__dict__['time'] = None if time is None else checked_times(time, len(rows))
+        return motion
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f'a PlatformMotion stays as it is: {name} was to be set')
@@ -99,10 +103,7 @@ class PlatformMotion:
         if not len(rows):
             raise MotionError('position', f'its shape is {(0, 3)}',
                               'be (N, 3) with N of at least 1', 'shape')
-        selected = object.__new__(PlatformMotion)
-        selected._set(
-            rows, None if self.time is None else checked_times(self.time[index], len(rows)))
-        return selected
+        return PlatformMotion._of(rows, None if self.time is None else self.time[index])
 
     @cached_property
     def position(self) -> Array:
@@ -143,9 +144,7 @@ class PlatformMotion:
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
         """Return the motion with other times [s]."""
-        same = object.__new__(PlatformMotion)
-        same._set(self.rows, checked_times(time, len(self)))
-        return same
+        return PlatformMotion._of(self.rows, time)
 
     def resampled(self, rate: float) -> PlatformMotion:
         """Return the motion at a constant rate.
@@ -199,9 +198,7 @@ class PlatformMotion:
             # The constructor raises the specific error.
             P, q, v, omega, a, epsilon = np.split(rows, ENDS, axis=1)
             return cls(P, q, v, omega, a, epsilon, time)
-        motion = object.__new__(cls)
-        motion._set(checked, None if time is None else checked_times(time, len(checked)))
-        return motion
+        return cls._of(checked, time)
 
     @classmethod
     def at_rest(cls, position: ArrayLike, orientation: ArrayLike | None = None) -> PlatformMotion:

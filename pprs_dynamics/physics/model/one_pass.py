@@ -100,8 +100,7 @@ class OnePass:
         self, robot: Robot, active: ActiveFriction, passive: WholeMechanismFriction,
         limits: Limits, reversal: Reversal, printed: bool,
     ) -> None:
-        self._fields = {'robot': robot, 'reversal': reversal, 'printed': printed, 'load': None}
-        self._geometry = robot.geometry
+        self._robot, self._reversal, self._printed = robot, reversal, printed
         self._bounds = limits.rod_sine, limits.condition_number
         widths = reversal.widths(len(active.viscous)).tolist()
         drives = zip(active.viscous, active.coulomb, widths, strict=True)
@@ -125,10 +124,10 @@ class OnePass:
 
     def mechanism(self, motion: PlatformMotion, table: Array) -> MechanismState:
         """Return the state of the mechanism, not yet solved, for a motion and its forces."""
-        kinematics = MechanismKinematics(self._geometry, motion, *self._bounds)
+        kinematics = MechanismKinematics(self._robot.geometry, motion, *self._bounds)
         if len(table) > FORCES:
             kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
-        return MechanismState.unsolved(self._fields, motion, kinematics)
+        return MechanismState(self._robot, motion, kinematics, self._reversal, self._printed)
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> Any:

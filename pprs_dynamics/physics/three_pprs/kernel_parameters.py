@@ -40,10 +40,7 @@ class KernelParameters(Generic[P]):
 
     def extended(self, form: Callable[..., Q], *others: Any) -> KernelParameters[Q]:
         """Return the parameters `form(named, *others)`, a named tuple that begins with these."""
-        extended: KernelParameters[Q] = object.__new__(KernelParameters)
-        extended.named = form(self.named, *others)
-        extended.row = np.concatenate((self.row, _numbers(others)))
-        return extended
+        return KernelParameters(form(self.named, *others))
 
 
 def _numbers(named: tuple[Any, ...]) -> list[float]:

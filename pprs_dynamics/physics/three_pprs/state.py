@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -128,15 +128,6 @@ class MechanismState:
     reversal: Reversal
     printed: bool = False
     load: StructureLoad | None = None
-
-    @classmethod
-    def unsolved(
-        cls, fields: Mapping[str, Any], motion: PlatformMotion, kinematics: MechanismKinematics,
-    ) -> MechanismState:
-        """Return the state of other fields and these; in a fifth of the constructor's time."""
-        state = object.__new__(cls)
-        state.__dict__.update(fields, motion=motion, kinematics=kinematics)
-        return state
 
     @property
     def drives(self) -> tuple[str, ...]:
