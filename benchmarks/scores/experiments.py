@@ -46,8 +46,8 @@ from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.run import DriveReference, simulate
 from pprs_dynamics.simulation.sensors import EffortNoise
+from pprs_dynamics.simulation.simulated_run import DriveReference, simulate
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'rod_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',

@@ -58,7 +58,7 @@ def _run(module: str, node: str, has_actions: bool = False) -> int:
               "pip install 'pprs_dynamics[ros]'", file=sys.stderr)
         return 2
     from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor
-    from pprs_dynamics.ros.run import run_node
+    from pprs_dynamics.ros.run_node import run_node
 
     return run_node(getattr(importlib.import_module(f'pprs_dynamics.ros.{module}'), node),
                     executor_type=StoppableExecutor if has_actions else PromptExecutor)

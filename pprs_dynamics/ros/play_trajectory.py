@@ -35,7 +35,7 @@ from pprs_dynamics.ros.node.parameters import (
     refuse_unknown,
 )
 from pprs_dynamics.ros.node.qos import publisher
-from pprs_dynamics.ros.run import Finished
+from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.simulation.arm_run import draw_motion
 
 # Fast DDS asks listeners every 3 s what they have got, which none tells by itself.

@@ -28,7 +28,7 @@ from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.ros.monitor import MonitorNode
 from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
-from pprs_dynamics.ros.run import Finished
+from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes

@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.measured_states import PATIENCE, Measured, MeasuredStates
+from pprs_dynamics.ros.messages.measured_states import PATIENCE, MeasuredState, MeasuredStates
 from pprs_dynamics.ros.messages.rejection import Rejection
 
 JOINTS = ('a', 'b', 'c')
@@ -27,7 +27,7 @@ class Robot:
     def __init__(self) -> None:
         self.now = 100.0
         self.states = MeasuredStates(JOINTS, lambda: self.now)
-        self.read: list[Measured] = []
+        self.read: list[MeasuredState] = []
         self.said: list[str] = []
 
     def send(self, names: Sequence[str], after: int, **changes: object) -> None:

@@ -23,8 +23,8 @@ from pprs_dynamics.simulation.hidden_forces import EffortOffset
 from pprs_dynamics.simulation.hidden_friction import CoulombFriction, Hysteresis
 from pprs_dynamics.simulation.hidden_sensors import EffortGain, HomingError, TimeDelay
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.simulated_run import DriveReference, SimulatedRun, simulate
 
 MODEL = DriveModel.load('config/paper.yaml')
 # The plant iterates loads until what is left in the forces is below mu times 3e-5 N.

@@ -34,8 +34,8 @@ from pprs_dynamics.simulation.hidden_effects import (
     draw_effect,
 )
 from pprs_dynamics.simulation.plant import Plant, PlantSettings
-from pprs_dynamics.simulation.run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.simulated_run import DriveReference, SimulatedRun, simulate
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 MODEL = DriveModel.load('config/paper.yaml')

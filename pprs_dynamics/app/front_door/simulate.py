@@ -180,9 +180,9 @@ def _simulate_platform(model: DriveModel, names: Sequence[str], seed: int, scale
                        motion: PlatformMotion, noise: float, feedforward: str,
                        progress: Any) -> SimulationResult:
     from pprs_dynamics.simulation.hidden_effects import draw_effects
-    from pprs_dynamics.simulation.run import DriveReference
-    from pprs_dynamics.simulation.run import simulate as simulate_robot
     from pprs_dynamics.simulation.sensors import SensorSettings
+    from pprs_dynamics.simulation.simulated_run import DriveReference
+    from pprs_dynamics.simulation.simulated_run import simulate as simulate_robot
 
     forces = model.drive_forces(motion)
     model.limits.check_strokes(forces.mechanism.position)

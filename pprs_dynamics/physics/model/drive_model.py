@@ -20,7 +20,7 @@ from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import (
     IndependentChainsFriction,
-    JointFriction,
+    JointCoefficients,
     PassiveFriction,
     WholeMechanismFriction,
 )
@@ -263,8 +263,8 @@ def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 
 def _passive_friction(values: Mapping[str, Any], limits: Limits) -> PassiveFriction:
-    joints = (JointFriction(**_group(values, 'friction.revolute.')),
-              JointFriction(**_group(values, 'friction.spherical.')))
+    joints = (JointCoefficients(**_group(values, 'friction.revolute.')),
+              JointCoefficients(**_group(values, 'friction.spherical.')))
     printed = values['equations'] == 'printed'
     if values['friction.approach'] == WholeMechanismFriction.approach:
         return WholeMechanismFriction(*joints, printed)

@@ -24,7 +24,7 @@ PATIENCE = 1.0  # [s] for messages with the other drives; so far apart may stamp
 STEPS = 15  # of a drive's stream, whose median is its period
 
 
-class Measured(NamedTuple):
+class MeasuredState(NamedTuple):
     """Stamp [ns], positions and efforts (D,) of the drives; efforts NaN where unknown."""
 
     stamp: int
@@ -100,7 +100,7 @@ class MeasuredStates:
         self._read_last = clock()
         self._forget()
 
-    def read(self, data: bytes) -> list[Measured]:
+    def read(self, data: bytes) -> list[MeasuredState]:
         """Return the samples that a message completes.
 
         Raises
@@ -132,7 +132,7 @@ class MeasuredStates:
         if len(present) == len(self._joints):
             self._whole = now
             self._forget()
-            return [Measured(stamp, position, effort)]
+            return [MeasuredState(stamp, position, effort)]
         if now - self._whole <= PATIENCE:
             return []
         for values in zip(present, position.tolist(), effort.tolist(), strict=True):
@@ -160,7 +160,7 @@ class MeasuredStates:
         if joint == self._joints[0]:
             self._due.append(stamp)
 
-    def _completed(self) -> list[Measured]:
+    def _completed(self) -> list[MeasuredState]:
         """Return the samples at whose stamps all drives are known by now."""
         known = [stream.newest for stream in self._streams.values()]
         if None in known:
@@ -172,7 +172,7 @@ class MeasuredStates:
             values = [stream.at(stamp) for stream in self._streams.values()]
             if None not in values:
                 table = np.array(values, dtype=float)
-                found.append(Measured(stamp, table[:, 0].copy(), table[:, 1].copy()))
+                found.append(MeasuredState(stamp, table[:, 0].copy(), table[:, 1].copy()))
         return found
 
 

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect, LinkageFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import (
-    JointFriction,
+    JointCoefficients,
     PassiveFriction,
     WholeMechanismFriction,
 )
@@ -213,10 +213,10 @@ def _of_platform(model: DriveModel, sorting: _Sorting) -> tuple[tuple[Effect, ..
         sorting.left.append('friction.approach')
     if model.equations != 'corrected':
         sorting.left.append('equations')
+    hinges = values['friction.revolute.viscous'] if hinged else 0.0
     return ((ActiveFriction(values['friction.drives.viscous'] if damped else zero, zero),
-             WholeMechanismFriction(
-                 JointFriction(values['friction.revolute.viscous'] if hinged else 0.0, 0.0, 0.0),
-                 JointFriction(0.0, 0.0, 0.0), False)),
+             WholeMechanismFriction(JointCoefficients(hinges, 0.0, 0.0),
+                                    JointCoefficients(0.0, 0.0, 0.0), False)),
             replace(model, equations='corrected'))
 
 

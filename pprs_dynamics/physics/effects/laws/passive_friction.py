@@ -35,7 +35,7 @@ from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 
 @dataclass(frozen=True)
-class JointFriction:
+class JointCoefficients:
     """Friction coefficients of one kind of passive joint.
 
     Parameters
@@ -240,7 +240,7 @@ class PassiveFriction(Effect):
 
     Parameters
     ----------
-    revolute, spherical : JointFriction
+    revolute, spherical : JointCoefficients
         In C_i and A_i.
     printed : bool
         Take the equations to the letter, misprints included.
@@ -248,8 +248,8 @@ class PassiveFriction(Effect):
 
     name: ClassVar[str] = 'passive_friction'
     approach: ClassVar[str]
-    revolute: JointFriction
-    spherical: JointFriction
+    revolute: JointCoefficients
+    spherical: JointCoefficients
     printed: bool = False
 
     def resistances(self, state: MechanismState) -> Resistances:
