@@ -24,7 +24,7 @@ class Finished(Exception):
     """Raised by a node whose work is done."""
 
 
-def run_node(factory: Callable[[], Node], args: list[str] | None = None,
+def run_node(factory: Callable[[], Node],
              executor_type: type[StoppableExecutor] = PromptExecutor) -> int:
     """Spin one node until SIGINT, SIGTERM or `Finished`.
 
@@ -39,8 +39,8 @@ def run_node(factory: Callable[[], Node], args: list[str] | None = None,
     stop = _Stop()
     StopSignals(stop)
     try:
-        check_files(sys.argv if args is None else args)
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        check_files(sys.argv)
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except PprsError as error:
         return _complain(with_hint(error))
     except RuntimeError as error:  # the public base of rclpy's own

@@ -75,7 +75,7 @@ def solve(geometry, motion):
 
 def home_determinant(geometry):
     """Return det [B] of the home pose."""
-    return np.linalg.det(solve(geometry, home_pose(geometry))[1].B)[0]
+    return np.linalg.det(solve(geometry, home_pose())[1].B)[0]
 
 
 # Inverse and forward -------------------------------------------------------------------------
@@ -210,7 +210,7 @@ def test_forward_from_home_finds_the_true_pose_among_several():
 
 
 def test_drives_that_cannot_close_the_mechanism_raise(geometry):
-    q = solve_inverse_kinematics(geometry, home_pose(geometry)).position.repeat(3, axis=0)
+    q = solve_inverse_kinematics(geometry, home_pose()).position.repeat(3, axis=0)
     q[1, 0] += 1.0  # one slide a metre away from the others
     with pytest.raises(ConvergenceError, match='sample 1') as caught:
         solve_forward_kinematics(geometry, q)

@@ -38,7 +38,7 @@ class RobotMotion:
     now: Array
 
 
-def robot_motion(session: Session, most: int = MOST_POSES) -> RobotMotion:
+def robot_motion(session: Session) -> RobotMotion:
     """Return the poses of all recordings, one after the other.
 
     Raises
@@ -49,7 +49,7 @@ def robot_motion(session: Session, most: int = MOST_POSES) -> RobotMotion:
     model = session.model
     if not isinstance(model, (DriveModel, ArmModel)):
         raise SessionError(f'{model.title} is not drawn: it moves along a line')
-    chosen = np.unique(np.linspace(0, len(session.data) - 1, most).astype(int))
+    chosen = np.unique(np.linspace(0, len(session.data) - 1, MOST_POSES).astype(int))
     found: list[Skeleton] = []
     first = 0
     for one in session.fits.design.reconstructions:

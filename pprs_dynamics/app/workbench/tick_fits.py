@@ -21,7 +21,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -108,7 +108,6 @@ class TickFits:
     model : ForceModel
         As it is; its numbers count from where its ledger says they began.
     recordings : sequence of Recording
-    decisions : Decisions, optional
 
     Attributes
     ----------
@@ -121,12 +120,11 @@ class TickFits:
         As `measure_residuals` and `Regression`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Sequence[Recording],
-                 decisions: Decisions = DECISIONS) -> None:
-        self.model, self.recordings, self.decisions = model, tuple(recordings), decisions
+    def __init__(self, model: ForceModel, recordings: Sequence[Recording]) -> None:
+        self.model, self.recordings = model, tuple(recordings)
         start = original(model)
         self.design = Design.of(start, recordings)
-        self.fits = FittedSets(self.design, decisions)
+        self.fits = FittedSets(self.design, DECISIONS)
         self.scan = Scan(self.fits)
         self.none = self.fits.evaluate(())
         self._scanning = RLock()  # of the library

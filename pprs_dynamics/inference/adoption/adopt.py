@@ -29,7 +29,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -50,7 +50,6 @@ def adopt(
     model: ForceModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
-    decisions: Decisions = DECISIONS,
 ) -> Adoption:
     """Return a model with an effect, or why it should not have it.
 
@@ -82,16 +81,15 @@ def adopt(
     request.require_place(model)
     start = original(model)
     if diagnosis is None:
-        diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share),
-                             decisions)
-    case = _Case(model, start, request, recordings, validate, force, diagnosis, decisions)
+        diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share))
+    case = _Case(model, start, request, recordings, validate, force, diagnosis)
     if request.present(model):
         return _fit_anew(case, report)
     named = next((one for one in diagnosis.effects if one.name == request.name), None)
     # Where the recordings call for it, beside what else they call for, is known by now.
     placed = replace(request, drives=named.drives) if named and not request.drives else request
     try:
-        fitted = fit_effect(start, placed, recordings, decisions,
+        fitted = fit_effect(start, placed, recordings,
                             lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
     except (ModelError, StandingError) as error:
         return case.without_model(str(error))
@@ -143,7 +141,6 @@ class _Case:
     validate: Sequence[Recording]
     force: bool
     diagnosis: Diagnosis
-    decisions: Decisions
 
     @property
     def held_out(self) -> str:
@@ -201,7 +198,7 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     """Return the model with what it has fitted anew, where that gains anything."""
     design = Design.of(case.start, case.recordings,
                        lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
-    fits, name = FittedSets(design, case.decisions), case.request.name
+    fits, name = FittedSets(design, DECISIONS), case.request.name
     found = fits.evaluate(())
     try:
         fitted = SettledSet(fits, found, estimate_widths(fits, found)).model

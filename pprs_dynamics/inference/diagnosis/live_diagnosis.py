@@ -31,7 +31,6 @@ from pprs_dynamics.inference.residuals.paired_errors import (
     certainty,
     sample_gains,
 )
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -180,10 +179,7 @@ class LiveDiagnosis:
                 'window': [self.last.start, self.last.end] if self.last else None,
                 'note': self.note}
 
-    def with_window(
-        self, recording: Recording, start: float, decisions: Decisions = DECISIONS,
-        live: LiveDecisions = LIVE_DECISIONS,
-    ) -> LiveDiagnosis:
+    def with_window(self, recording: Recording, start: float) -> LiveDiagnosis:
         """Return what is known with one more window.
 
         Parameters
@@ -199,9 +195,10 @@ class LiveDiagnosis:
         PprsError
             As `diagnose`.
         """
+        live = LIVE_DECISIONS
         if share_in_motion(recording.time, recording.position, live.moving) < live.least_motion:
             return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
-        answer = diagnose(self.model, [recording], decisions=decisions)
+        answer = diagnose(self.model, [recording])
         noise = answer.noise
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
                         answer.to_dict(), answer.adopted,

@@ -67,15 +67,14 @@ class Localisation:
     drives: dict[str, DriveFindings]
 
 
-def localise(residuals: Residuals, decisions: Decisions = DECISIONS,
-             progress: Callable[[float], None] | None = None) -> Localisation:
+def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
+             ) -> Localisation:
     """Return where the error of each drive lies, as far as noise would not do the same.
 
     Parameters
     ----------
     residuals : Residuals
         Averaged to at most 16 000 samples first; what is faster than that is not seen.
-    decisions : Decisions
     progress : callable, optional
         Called with the share of the work that is done.
     """
@@ -84,14 +83,14 @@ def localise(residuals: Residuals, decisions: Decisions = DECISIONS,
     done: list[int] = []
 
     def search_drive(drive: int) -> DriveFindings:
-        found = _search(thin, drive, decisions)
+        found = _search(thin, drive)
         done.append(drive)
         report(len(done) / len(thin.drives))
         return found
 
     drives = dict(zip(thin.drives, each(search_drive, range(len(thin.drives))), strict=True))
     for name, statement in levels(thin, {
-            name: found.noise for name, found in drives.items()}, decisions).items():
+            name: found.noise for name, found in drives.items()}, DECISIONS).items():
         drives[name] = replace(drives[name], statements=(*drives[name].statements, statement))
     ranked = sorted((statement for findings in drives.values()
                      for statement in findings.statements), key=lambda one: -one.evidence)
@@ -124,7 +123,7 @@ def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
     return found
 
 
-def _search(residuals: Residuals, drive: int, decisions: Decisions) -> DriveFindings:
+def _search(residuals: Residuals, drive: int) -> DriveFindings:
     measured = residuals.measured[:, drive]
     known = np.isfinite(measured)
     if known.sum() < LEAST_SAMPLES:
@@ -135,7 +134,7 @@ def _search(residuals: Residuals, drive: int, decisions: Decisions) -> DriveFind
     error = residuals.error[known, drive]
     if np.abs(error).max() <= ROUNDING * np.abs(measured[known]).max():
         return DriveFindings((), None)
-    prices = replace(Prices.of(regression, decisions), drives=len(residuals.drives))
+    prices = replace(Prices.of(regression, DECISIONS), drives=len(residuals.drives))
     library = PatternLibrary(regression, prices, drive, with_plain_forms=True)
     fit = regression.fit(())
     stated: list[tuple[UnknownCandidate, JointFit, float, tuple[str, ...]]] = []

@@ -157,15 +157,13 @@ class Residuals:
             self.units)
 
 
-def find_stretches(
-    values: Array, segment: np.typing.NDArray[np.int_], longest_bridge: int = LONGEST_BRIDGE,
-) -> list[slice]:
+def find_stretches(values: Array, segment: np.typing.NDArray[np.int_]) -> list[slice]:
     """Return stretches of one segment that start and end known, with only short gaps inside."""
     stretches = []
     for part in _runs(segment):
         known = part.start + np.flatnonzero(np.isfinite(values[part]))
         if len(known):
-            cuts = np.flatnonzero(np.diff(known) > longest_bridge + 1)
+            cuts = np.flatnonzero(np.diff(known) > LONGEST_BRIDGE + 1)
             begins = np.concatenate(([known[0]], known[cuts + 1]))
             ends = np.concatenate((known[cuts], [known[-1]])) + 1
             stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]

@@ -67,9 +67,9 @@ class Judgement:
         self._cut_segments()
 
     def _tell(self, kind: str, count: int, what: str, places: Iterable[tuple[int, int]] = (),
-              drives: Iterable[str] = (), least: int = 1) -> None:
+              drives: Iterable[str] = ()) -> None:
         """Add a finding with places as (first, last) samples, if there is anything to tell."""
-        if count < least:
+        if not count:
             return
         time = self.samples.time
         spans = tuple((float(time[first]), float(time[last])) for first, last in places)

@@ -36,13 +36,13 @@ Item = TypeVar('Item')
 KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
 
 
-def read_content(path: str, largest: int = LARGEST_FILE) -> bytes:
+def read_content(path: str) -> bytes:
     """Return the content of a file of a description, or raise UnreadableFileError."""
     file = Path(path)
     require_file(file)
     try:
-        if file.stat().st_size > largest:
-            raise UnreadableFileError(path, f'more than {largest / 1e6:.0f} MB: no URDF')
+        if file.stat().st_size > LARGEST_FILE:
+            raise UnreadableFileError(path, f'more than {LARGEST_FILE / 1e6:.0f} MB: no URDF')
         return file.read_bytes()
     except OSError as error:
         if isinstance(error, UnreadableFileError):

@@ -76,16 +76,12 @@ class ForwardKinematics:
     near_branch: np.ndarray
 
 
-def home_pose(geometry: Geometry, height: float = 0.5) -> PlatformMotion:
+def home_pose() -> PlatformMotion:
     """Return the platform at rest, unturned, above the base's centre.
 
-    Parameters
-    ----------
-    geometry : Geometry
-    height : float
-        Z of the platform [m]; any height is as good for kinematics, which only shifts the lifts.
+    Any height is as good for kinematics, which only shifts the lifts.
     """
-    return PlatformMotion.at_rest((0.0, 0.0, height))
+    return PlatformMotion.at_rest((0.0, 0.0, 0.5))
 
 
 def solve_forward_kinematics(
@@ -111,7 +107,7 @@ def solve_forward_kinematics(
         Where the geometry's home pose is itself singular, so that it tells no mode.
     """
     q = checked_matrix('drive positions', drive_positions, 6)
-    home = home_pose(geometry)
+    home = home_pose()
     start = home if seed is None else seed
     if len(start) not in (1, len(q)):
         raise MotionError('seed', f'it has {len(start)} poses',

@@ -60,11 +60,10 @@ def names_given(arguments: Sequence[str] | None = None) -> list[str]:
             for name in _names_in(path)] + _names_on(arguments)
 
 
-def folder_of(name: str, arguments: Sequence[str] | None = None) -> Path:
+def folder_of(name: str) -> Path:
     """Return the folder that a path in a parameter counts from: its file's, or the present one."""
-    arguments = sys.argv if arguments is None else arguments
-    files = [path for path in _paths(arguments) if path.is_file() and name in _names_in(path)]
-    return Path.cwd() if not files or name in _names_on(arguments) else files[-1].resolve().parent
+    files = [path for path in _paths(sys.argv) if path.is_file() and name in _names_in(path)]
+    return Path.cwd() if not files or name in _names_on(sys.argv) else files[-1].resolve().parent
 
 
 def _names_in(path: Path) -> list[str]:

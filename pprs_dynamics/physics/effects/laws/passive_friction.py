@@ -152,16 +152,14 @@ def _lift_forces(i: int, w: Wrench, inverse: Inverse, rods: ThreeChains) -> Any:
     return rods[i].sin_u * power(w, inverse.columns.lifts[i])                  # Eq. (11)
 
 
-def resistance_forces(
-    state: MechanismState, resistances: Resistances, printed: bool = False,
-) -> Array:
+def resistance_forces(state: MechanismState, resistances: Resistances) -> Array:
     """Return the drive forces that overcome resistances in the joints, (N, 6) [N].
 
     By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
     """
     k = np.concatenate(resistances, axis=1)
     force, kinematics = np.empty(k.shape), state.kinematics
-    parameters = state.robot.geometry.kernel_parameters.extended(TransferParameters, printed)
+    parameters = state.robot.geometry.kernel_parameters.extended(TransferParameters, False)
     evaluate(transfer_kernel, parameters, kinematics.chain_table, kinematics.inverse_table, k,
              force)
     return force
