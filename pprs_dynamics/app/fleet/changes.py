@@ -17,8 +17,7 @@ from math import comb
 from typing import Any
 
 import numpy as np
-from scipy.signal import medfilt
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError
@@ -193,7 +192,7 @@ class _Series:
         noise = max(fit.squares, self.n * (1e-3 * self.scatter) ** 2) / freedom
         F = (constant - fit.squares) / fit.count / noise / inflation
         places = comb(self.n, fit.count)
-        return float(min(places * f_distribution.sf(F, fit.count, freedom), 1.0)), float(F)
+        return float(min(places * fdtrc(fit.count, freedom, max(F, 0.0)), 1.0)), float(F)
 
     def told_slope(self) -> tuple[tuple[Change, ...], Array]:
         """Return the slope, averaged over the days at which it may have begun."""
@@ -254,6 +253,6 @@ def _drawn_in(value: Array) -> Array:
     if len(value) < NEIGHBOURS:
         return value
     padded = np.concatenate([value[NEIGHBOURS // 2:0:-1], value, value[-2:-2 - NEIGHBOURS // 2:-1]])
-    middle = medfilt(padded, NEIGHBOURS)[NEIGHBOURS // 2:-(NEIGHBOURS // 2)]
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
     most = CLIPPED * _scatter(value)
     return middle + np.clip(value - middle, -most, most)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import Bounds, minimize
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
@@ -76,6 +75,8 @@ def climb(start: Array, evaluated: Evaluation, put_back: Callable[[Array], Array
     put_back : callable
         Returns parameters moved onto the limits: these hold to first order only.
     """
+    from scipy.optimize import Bounds, minimize  # here: commands start without it
+
     known = _Evaluated(evaluated, start)
     best, trust = start, TRUST
     for _ in range(ROUNDS):

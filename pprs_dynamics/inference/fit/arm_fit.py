@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, lsq_linear
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.fit.arm_columns import (
@@ -213,6 +212,8 @@ class _Problem:
 
     def _descended(self, unknown: Array, free: np.typing.NDArray[np.bool_], weights: Array,
                    ) -> Array:
+        from scipy.optimize import least_squares  # here: commands start without it
+
         def residuals(part: Array) -> Array:
             every = unknown.copy()
             every[free] = part
@@ -257,6 +258,8 @@ def _widths(columns: Sequence[ArmColumns], rest: Array, known: Array, own: Array
     Friction is not negative, and turns over well below the joint's speeds: what does not would be
     a curve through all of them.
     """
+    from scipy.optimize import lsq_linear  # here: commands start without it
+
     tried = [np.clip(width * factor, 1e-6, None) for factor in WIDTHS]
     turning = [np.concatenate([one.turning(each) for one in columns]) for each in tried]
     found = width.copy()

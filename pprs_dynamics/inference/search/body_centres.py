@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import Term
@@ -93,6 +92,8 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
         column = columns(away)
         m = column @ reduced[:, -1] / max(float(column @ column), 1e-300)
         return np.concatenate((reduced[:, -1] - m * column, weight * away))
+
+    from scipy.optimize import least_squares  # here: commands start without it
 
     best = min((least_squares(left, start, bounds=(-1, 1), max_nfev=40, xtol=CLOSE,
                               ftol=CLOSE / 10, gtol=CLOSE / 10) for start in STARTS),

@@ -19,7 +19,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import NonlinearConstraint, minimize
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
@@ -108,6 +107,8 @@ def _nearest(robot: Mechanism, component: Component, c: Array, covariance: Array
         start /= 2
     else:
         return None
+
+    from scipy.optimize import NonlinearConstraint, minimize  # here: commands start without it
 
     def distance(u: Array) -> float:
         return float(u @ u)
