@@ -23,6 +23,7 @@ from pprs_dynamics.system.input_files import require_file
 LARGEST = 5_000_000  # bytes: a ledger of a thousand steps
 MOST_VALUES = 100_000  # what takes the time; the paper's robot has 150, a step some 70
 DEEPEST = 20  # /** and ros__parameters included, a model file has 7
+DEEPER = 'maximum nesting depth'  # in what the C parser of PyYAML 6.0.4 and later says of 1 000
 LONGEST = 1_000  # characters of a value without quotes: no number is that long
 # 10 and 90 for YAML 1.1, words for ROS 2.
 ANCIENT_NUMBER = re.compile(r'[-+]?[0-9][0-9_.]*(_[0-9_.]*|(:[0-5]?[0-9])+(\.[0-9_]*)?)', re.ASCII)
@@ -96,6 +97,10 @@ def check_bounds(text: str, path: str | PathLike[str] = '') -> None:
             if isinstance(event, yaml.ScalarEvent) and not event.style:
                 _check_unquoted(event.value, line, path)
     except yaml.YAMLError as error:
+        if DEEPER in str(error):  # it looks ahead, and gives up before the event is there
+            mark = getattr(error, 'problem_mark', None)
+            raise UnreadableFileError(path, f'line {mark.line + 1 if mark else 1}: it is nested '
+                                      f'more than {DEEPEST} deep') from None
         raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
 
 
