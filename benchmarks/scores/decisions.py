@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import OUTPUT
-from benchmarks.hidden.recordings import Case
+from benchmarks.hidden.recordings import PINK, Case
 from benchmarks.scores.cases import Outcome, outcomes_of, scoring_parser
 from benchmarks.scores.diagnosis import cases, diagnose_case, one_line
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -27,24 +27,33 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 
 FACTORS = (0.5, 2.0)
 AS_IT_IS = ('', 1.0)
+# Recordings on which a number can matter: weak effects, sets, forms that are off, slow noise.
+WEAK = (0.25, 0.5)
+SLOWEST = (0.999, PINK)
 SETS = 2  # of two and three effects, of a seed's
 EVERY = 3  # of the effects of the catalogue, every third
+ROWS = {'effects': 'good', 'pairs': 'good', 'forms': 'exact', 'unknown': 'good', 'nothing': 'good'}
+# What changes words and warnings only.
+TOLD = ('suspect_margin', 'statement_share', 'noise_accuracy', 'good', 'poor', 'sure', 'edge_share',
+        'short', 'few_samples', 'unexcited', 'one_way', 'filtered', 'reversal_share')
+NUMBERS = tuple(one.name for one in fields(Decisions) if one.name not in TOLD)
 # A case, the number that is changed, and by what.
 Changed = tuple[Case, str, float]
 
 
 def changes() -> list[tuple[str, float]]:
     """Return each number with each factor, and nothing changed."""
-    return [AS_IT_IS, *((one.name, factor) for one in fields(Decisions) for factor in FACTORS)]
+    return [AS_IT_IS, *((name, factor) for name in NUMBERS for factor in FACTORS)]
 
 
 def chosen_cases(first: int, seeds: int) -> list[Case]:
     """Return cases of most kinds, few enough to be run with every change."""
-    found = cases(('nothing',), seeds, seeds, (), first) + cases(
-        ('unknown',), seeds, 0, (1.0,), first)
+    found = [one for one in cases(('nothing',), seeds, seeds, (), first) if one.noise in SLOWEST]
     for seed in range(first, first + seeds):
-        found += cases(('effects',), 1, 0, (1.0,), seed)[seed % EVERY::EVERY]
-        found += cases(('pairs',), 1, 0, (), seed)[::3][:SETS]
+        found += cases(('effects',), 1, 0, WEAK, seed)[seed % EVERY::2 * EVERY]
+        found += cases(('pairs',), 1, 0, (), seed)[::EVERY][:SETS]
+        found += cases(('forms',), 1, 0, (), seed)[seed % EVERY::EVERY]
+        found += cases(('unknown',), 1, 0, (1.0,), seed)[seed % 2::2]
     return found
 
 
@@ -65,17 +74,17 @@ def make_table(outcomes: Iterable[dict[str, Any]]) -> str:
             groups.setdefault((one['number'], one['factor']), []).append(one)
     lines = ['| number | value | halved | doubled |', '|---|---|---|---|',
              f'| as they are | | {_counts(groups.get(AS_IT_IS, []))} | |']
-    lines += [f'| {one.name.replace("_", " ")} | {getattr(DECISIONS, one.name):g} | '
-              + ' | '.join(_counts(groups.get((one.name, factor), [])) for factor in FACTORS)
-              + ' |' for one in fields(Decisions)]
+    lines += [f'| {name.replace("_", " ")} | {getattr(DECISIONS, name):g} | '
+              + ' | '.join(_counts(groups.get((name, factor), [])) for factor in FACTORS)
+              + ' |' for name in NUMBERS]
     return '\n'.join(lines) + '\n'
 
 
 def _counts(outcomes: Sequence[dict[str, Any]]) -> str:
     shares = []
-    for row in ('effects', 'pairs', 'unknown', 'nothing'):
+    for row, right in ROWS.items():
         own = [one for one in outcomes if one['row'] == row]
-        shares.append(f'{sum(bool(one["judged"]["good"]) for one in own)}/{len(own)}')
+        shares.append(f'{sum(bool(one["judged"][right]) for one in own)}/{len(own)}')
     return ', '.join(shares)
 
 
@@ -92,8 +101,8 @@ def main() -> int:
     found = outcomes_of(options, partial(run_changed, recordings=options.recordings), todo,
                         lambda one: f'{one["name"]} {one["number"]} {one["factor"]}',
                         lambda one: f'{one["number"]} x {one["factor"]:g}: {one_line(one)}')
-    print('Right of effects, of sets of two and three, of what is in no catalogue, and of nothing '
-          'missing:\n')
+    print('Right of weak effects, of sets of two and three, exactly right of forms that are off, '
+          'right of what is in no catalogue, and of nothing missing:\n')
     print(make_table(found))
     return 0
 

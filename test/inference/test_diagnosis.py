@@ -298,6 +298,16 @@ def test_a_hidden_effect_is_named(name: str) -> None:
     assert found.effects[0].error_after < found.effects[0].error_before
 
 
+def test_what_shows_beside_others_alone_is_confirmed() -> None:
+    """A tilt raises the error as long as a spring is missing, and lowers it to a fifth then."""
+    names = ('base_tilt', 'drive_spring', 'friction_drift')
+    found, _ = case('pairs', *names, seed=703, snr=0.0)
+    assert sorted(one.name for one in found.effects) == sorted(names)
+    assert not found.unconfirmed
+    tilt = next(one for one in found.effects if one.name == 'base_tilt')
+    assert tilt.error_after > tilt.error_before
+
+
 def test_wide_reversals_are_widths_and_no_further_friction() -> None:
     model, recording, truth = make_case(Case('effects', ('homing_error',), 5, 1.0, 0.9))
     found = diagnose(model, [recording])

@@ -166,3 +166,19 @@ def test_costs_do_not_depend_on_what_was_fitted_before() -> None:
             order = rng.permutation(len(one.candidates))
             again = other.evaluate(tuple(one.candidates[place] for place in order))
             assert again.cost == pytest.approx(one.cost, abs=1e-9, rel=1e-12)
+
+
+@pytest.mark.parametrize('number', range(12))
+def test_an_effect_alone_is_on_the_drives_where_it_costs_least(number: int) -> None:
+    """Otherwise it would be no rival of what is found in its place."""
+    rng = np.random.default_rng(number)
+    truth = {('structure_4', None): 1.0, **{('drive_1', d): rng.normal() for d in range(3)}}
+    search = Search(FittedSets(random_design(truth, 20 + number), DECISIONS))
+    search.run()
+    for effect in ON_DRIVES:
+        alone = [one.cost for one in search.fits.sets
+                 if len(one.candidates) == 1 and one.effects[0].effect is effect]
+        exhaustive = [search.fits.evaluate((one,)).cost for one in everything()
+                      if one.effect is effect]
+        # A tenth of what rivals may differ by.
+        assert not alone or min(alone) <= min(exhaustive) + DECISIONS.rival_margin / 10

@@ -256,9 +256,10 @@ class _Answer:
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 final.fits.library.force(final.found, last, remaining.shape), said.at_bound,
                 self.ranking.shares[k],
-                errors[k + 1] < errors[k] and (
+                (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
-                    or (not self.validate and self._is_predicted(k)))))
+                    or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
+                or self._is_needed(self.ranking.without[candidate], held_out[-1])))
         return found
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
@@ -268,11 +269,23 @@ class _Answer:
                 for one in near if one is not self.kept
                 for same in one.effects if same.effect is candidate.effect]
 
-    def _is_predicted(self, k: int) -> bool:
+    def _is_predicted(self, without: CandidateSet, found: CandidateSet) -> bool:
         """Return whether held-out blocks are predicted better for certain with an effect more."""
         before, after = (hold_out(self.fits, self.fits.at_noise_of(
-            self.kept, step.candidates)).losses for step in self.ranking.path[k:k + 2])
+            self.kept, one.candidates)).losses for one in (without, found))
         return certainty(before - after) > self.decisions.sure
+
+    def _is_needed(self, without: CandidateSet, held_out: float) -> bool:
+        """Return whether all that was found is better than without one of them.
+
+        Before what explains most is there, what another effect adds may look like an error.
+        """
+        if linear_error(self.fits, without) <= linear_error(self.fits, self.kept):
+            return False
+        if self.validate:
+            model = settled(self.fits, without).model
+            return rms(measure_residuals(model, self.validate)[0]) > held_out
+        return self._is_predicted(without, self.kept)
 
     def _is_above_noise(self, remaining: Array) -> bool:
         """Return whether errors (M, D) leave a drive more than its noise allows for."""

@@ -108,7 +108,7 @@ class Search:
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._try(self._replacements(self.best))
-            self._simplify()
+            self._simplified(self.best)
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 return
             if self.is_beyond_point:
@@ -134,6 +134,9 @@ class Search:
             # The first effect decides which way the search goes.
             if number < REFINED or len(found.candidates) == 1:
                 self.fits.refined(found)
+        # A scan puts it where each drive pays by itself: beside others that is seldom right.
+        for found in [one for one in new if len(one.candidates) == len(one.effects) == 1]:
+            self._simplified(found)
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
@@ -286,15 +289,14 @@ class Search:
                 Component.of(effect, one.drive, others[number], one.names)
                 for one, others in zip(candidate.components, shapes, strict=True))
 
-    def _simplify(self) -> None:
+    def _simplified(self, found: CandidateSet) -> None:
         """Drop candidates and drives, and try variants, as long as that lowers the cost."""
         while True:
-            best = self.best
-            for candidates in self._simpler(best):
-                self.fits.evaluate(candidates)
-            if self.best.cost > best.cost - LEAST_IMPROVEMENT:
+            simpler = min(map(self.fits.evaluate, self._simpler(found)),
+                          key=lambda one: one.cost, default=found)
+            if simpler.cost > found.cost - LEAST_IMPROVEMENT:
                 return
-            self.fits.refined(self.best)
+            found = self.fits.refined(simpler)
 
     def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
         for candidate in best.candidates:
