@@ -253,6 +253,6 @@ def _drawn_in(value: Array) -> Array:
     if len(value) < NEIGHBOURS:
         return value
     padded = np.concatenate([value[NEIGHBOURS // 2:0:-1], value, value[-2:-2 - NEIGHBOURS // 2:-1]])
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
+    middle: Array = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
     most = CLIPPED * _scatter(value)
     return middle + np.clip(value - middle, -most, most)
