@@ -294,7 +294,7 @@ class Search:
         while True:
             simpler = min(map(self.fits.evaluate, self._simpler(found)),
                           key=lambda one: one.cost, default=found)
-            if simpler.cost > found.cost - LEAST_IMPROVEMENT:
+            if not simpler.cost < found.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
                 return
             found = self.fits.refined(simpler)
 
