@@ -259,7 +259,7 @@ class _Answer:
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
-                or self._is_needed(self.ranking.without[candidate], held_out[-1])))
+                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
         return found
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
@@ -275,12 +275,12 @@ class _Answer:
             self.kept, one.candidates)).losses for one in (without, found))
         return certainty(before - after) > self.decisions.sure
 
-    def _is_needed(self, without: CandidateSet, held_out: float) -> bool:
-        """Return whether all that was found is better than without one of them.
+    def _is_needed(self, without: CandidateSet, error: float, held_out: float) -> bool:
+        """Return whether all that was found, with its errors, is better than without one of them.
 
         Before what explains most is there, what another effect adds may look like an error.
         """
-        if linear_error(self.fits, without) <= linear_error(self.fits, self.kept):
+        if linear_error(self.fits, without) <= error:
             return False
         if self.validate:
             model = settled(self.fits, without).model
