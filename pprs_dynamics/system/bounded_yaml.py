@@ -84,8 +84,7 @@ def check_bounds(text: str, path: str | PathLike[str] = '') -> None:
             elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
                 depth -= 1
             if depth > DEEPEST:
-                raise UnreadableFileError(
-                    path, f'line {line}: it is nested more than {DEEPEST} deep')
+                raise _too_deep(line, path)
             if isinstance(event, yaml.AliasEvent):
                 raise UnreadableFileError(
                     path, f'line {line}: *{event.anchor} is an alias, which ROS 2 parameter files '
@@ -99,9 +98,12 @@ def check_bounds(text: str, path: str | PathLike[str] = '') -> None:
     except yaml.YAMLError as error:
         if DEEPER in str(error):  # it looks ahead, and gives up before the event is there
             mark = getattr(error, 'problem_mark', None)
-            raise UnreadableFileError(path, f'line {mark.line + 1 if mark else 1}: it is nested '
-                                      f'more than {DEEPEST} deep') from None
+            raise _too_deep(mark.line + 1 if mark else 1, path) from None
         raise UnreadableFileError(path, f'not valid YAML: {_one_line(error)}') from None
+
+
+def _too_deep(line: int, path: str | PathLike[str]) -> UnreadableFileError:
+    return UnreadableFileError(path, f'line {line}: it is nested more than {DEEPEST} deep')
 
 
 def _check_unquoted(value: str, line: int, path: str | PathLike[str]) -> None:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
@@ -130,7 +130,7 @@ class Regression:
         self._products: dict[tuple[Block, Block | None, int], Array] = {}
         self._equations: dict[tuple[int, tuple[Block, ...]], DriveEquations] = {}
         self.error_scale = error_scale or {
-            d: float(np.sqrt(np.mean(rows[-1] ** 2))) for d, rows in self.base.items()}
+            d: root_mean_square(rows[-1]) for d, rows in self.base.items()}
 
     @property
     def samples(self) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import (
     ReversalShape,
     move_numbers,
@@ -108,7 +108,7 @@ def linear_residual(fits: FittedSets, found: CandidateSet) -> Array:
 
 def linear_error(fits: FittedSets, found: CandidateSet) -> float:
     """Return the rms of `linear_residual` over all drives [N]."""
-    return float(np.sqrt(np.nanmean(np.square(linear_residual(fits, found)))))
+    return root_mean_square(linear_residual(fits, found))
 
 
 def exact_forces(design: Design, model: ForceModel) -> Array:

@@ -108,7 +108,7 @@ class Search:
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._try(self._replacements(self.best))
-            self._simplified(self.best)
+            self._simplify(self.best)
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 return
             if self.is_beyond_point:
@@ -136,7 +136,7 @@ class Search:
                 self.fits.refined(found)
         # A scan puts it where each drive pays by itself: beside others that is seldom right.
         for found in [one for one in new if len(one.candidates) == len(one.effects) == 1]:
-            self._simplified(found)
+            self._simplify(found)
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
@@ -289,7 +289,7 @@ class Search:
                 Component.of(effect, one.drive, others[number], one.names)
                 for one, others in zip(candidate.components, shapes, strict=True))
 
-    def _simplified(self, found: CandidateSet) -> None:
+    def _simplify(self, found: CandidateSet) -> None:
         """Drop candidates and drives, and try variants, as long as that lowers the cost."""
         while True:
             simpler = min(map(self.fits.evaluate, self._simpler(found)),
