@@ -58,10 +58,13 @@ def _run(module: str, node: str, has_actions: bool = False) -> int:
               "pip install 'pprs_dynamics[ros]'", file=sys.stderr)
         return 2
     from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor
+    from pprs_dynamics.ros.node.preparation import end_if_preparing
     from pprs_dynamics.ros.run_node import run_node
 
-    return run_node(getattr(importlib.import_module(f'pprs_dynamics.ros.{module}'), node),
-                    executor_type=StoppableExecutor if has_actions else PromptExecutor)
+    status = run_node(getattr(importlib.import_module(f'pprs_dynamics.ros.{module}'), node),
+                      executor_type=StoppableExecutor if has_actions else PromptExecutor)
+    end_if_preparing(status)
+    return status
 
 
 def _check_arguments(name: str, arguments: list[str]) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import threading
 import time
@@ -43,6 +44,18 @@ def prepare_beside(node: Node, model: DriveModel | ArmModel) -> threading.Thread
                               name=NAME, daemon=True)
     thread.start()
     return thread
+
+
+def end_if_preparing(status: int) -> None:
+    """End the process at once, with an exit status, if equations are still being compiled.
+
+    Nothing stops a compiler, and Python's own end walks through registries that it goes on
+    filling: some ends then came with a traceback ("dictionary changed size during iteration").
+    """
+    if any(thread.name == NAME for thread in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
 
 
 def _prepare(logger: Any, values: dict[str, Any]) -> None:
