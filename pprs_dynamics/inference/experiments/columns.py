@@ -26,12 +26,12 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.platform_sensitivities import ChunkSensitivities
 from pprs_dynamics.inference.regression.sensitivities import (
     DRIVE_WIDTHS,
     HOMING,
     NUMBERS,
     OF_DRIVES,
+    OF_JOINTS,
     PRESENT,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
@@ -40,7 +40,6 @@ from pprs_dynamics.inference.search.body_centres import about_centre
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 
 HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
@@ -225,26 +224,20 @@ class ColumnPlan:
 
     def _whole_columns(self, forces: Any, samples: int) -> _WholeColumns:
         """Return the columns of all motions at full rate that do not need one motion alone."""
-        numbers = tuple(one.number for one in self.base if isinstance(one, ModelNumber))
         wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
             one, (FittedTerm, PresentCoefficient, PresentShape))}
         structure = tuple(effect for effect in wanted if issubclass(effect, StructureEffect))
         shifts = any(effect.shifts_positions() for effect in wanted)
         none = np.zeros((0, *forces.total.shape))
-        if isinstance(self.model, DriveModel):
-            found = ChunkSensitivities(self.model, forces)
-            return _WholeColumns(
-                found.of_numbers(numbers), found.of_drive_widths(), found.of_passive_widths(),
-                {effect: np.stack([full for full, _ in found.of_structure(effect)])
-                 for effect in structure}, self._homing(found, samples) if shifts else none)
         sensitivities = sensitivities_of(self.model, self.given)
         known = {effect.name for effect in self.given.effects}
         sensitivities.searched = tuple(one for one in structure if one.name not in known)
+        sensitivities.homing_stride = max(1, samples // HOMING_SAMPLES) if shifts else 0
         columns = sensitivities.columns(forces)
         return _WholeColumns(
-            columns[NUMBERS], columns[OF_DRIVES], none,
+            columns[NUMBERS], columns[OF_DRIVES], columns.get(OF_JOINTS, none),
             {effect: columns[(PRESENT if effect.name in known else '') + effect.name]
-             for effect in structure}, columns.get(HOMING, none) if shifts else none)
+             for effect in structure}, columns.get(HOMING, none))
 
     def _present(self, column: PresentCoefficient | PresentShape, design: Design) -> Rows:
         """Return the column of what the given model has already on one motion."""
@@ -261,13 +254,6 @@ class ColumnPlan:
         weights = effect.to_coefficients(values)
         slopes = design.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
         return {drive: slopes[column.effect.shape.index(column.parameter)]}
-
-    def _homing(self, found: ChunkSensitivities, samples: int) -> Array:
-        """Return the columns of wrong zeros by drive, (6, N, 6)."""
-        every = np.arange(len(found.state.velocity))
-        kept = every[::max(1, samples // HOMING_SAMPLES)]
-        return np.stack([np.stack([np.interp(every, kept, column) for column in rows.T], axis=1)
-                         for rows in found.of_homing(kept)])
 
     def _motion_design(self, forces: Forces, part: slice, time: Array, treat: Treatment,
                        block: int) -> Design:

@@ -5,58 +5,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
+from typing import Any
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.sensitivities import (
-    NUMBERS,
-    OF_DRIVES,
-    RELATIVE_STEP,
-    Number,
-    Sensitivities,
-    reversal_columns,
-)
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
-from pprs_dynamics.physics.model.axis_model import AxisForces, AxisModel, AxisMotion
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.inference.regression.arm_sensitivities import ArmSensitivities
+from pprs_dynamics.inference.regression.sensitivities import following
 
 
-class AxisSensitivities(Sensitivities):
-    """Columns of a single axis.
+class AxisSensitivities(ArmSensitivities):
+    """Columns of a single axis: no bodies but one, no passive joints, and a zero anywhere.
 
     Parameters
     ----------
     model : AxisModel
+    given : ForceModel
     """
 
-    model: AxisModel
+    def _efforts(self, model: Any, state: Any) -> Array:
+        total: Array = model.mass * (state.acceleration - model.gravity) + sum(
+            effect.force(state) for effect in following(model))
+        return total
 
-    def columns(self, forces: AxisForces) -> dict[str, Array]:
-        """Return columns of numbers and of widths of turning over, (K, N, 1) each."""
-        state = forces.mechanism
-        numbers = np.zeros((len(self.numbers), *state.velocity.shape))
-        for row, number in enumerate(self.numbers):
-            numbers[row] = self.sensed(self._of_number(number, state), state)
-        dry = sum((effect.dry(state.guide_load) for effect in self.model.effects
-                   if isinstance(effect, AxisFriction)), np.zeros_like(state.guide_load))
-        width = np.asarray(self.model.reversal.velocity)
-        widths = np.stack([self.sensed(column, state) for column in reversal_columns(
-            dry, state.velocity, state.direction, width)])
-        return {NUMBERS: numbers, OF_DRIVES: widths}
+    def _at(self, model: Any, state: Any) -> Any:
+        return state
 
-    def _of_number(self, number: Number, motion: AxisMotion) -> Array:
-        """Return the change per standard deviation of a number, (N, 1) [N]."""
-        now = self.model.values[number.key]
-        moved = build_model({**self.model.values, number.key: now + RELATIVE_STEP * number.value})
-        assert isinstance(moved, AxisModel)
-        change = self._own_force(moved, motion) - self._own_force(self.model, motion)
-        scaled: Array = change * number.deviation / (RELATIVE_STEP * abs(number.value))
-        return scaled
-
-    @staticmethod
-    def _own_force(model: AxisModel, motion: AxisMotion) -> Array:
-        """Return the force without added effects, whose memories the chunk has advanced."""
-        own = tuple(e for e in model.effects if isinstance(e, (AxisFriction, AxisOffset)))
-        return replace(model, effects=own).drive_forces(motion).total
+    def of_homing(self, state: Any, reference: Array) -> None:
+        """Return nothing: no force depends on where an axis is."""

@@ -11,18 +11,22 @@ those of effects in its drives is behind `Sensitivities`; the rest of the diagno
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
@@ -89,6 +93,9 @@ def _unit(model: ForceModel, key: str, element: int | None) -> str:
 class Sensitivities(ABC):
     """Columns that a model has, chunk by chunk.
 
+    Bodies change the loads, and loads change friction: most columns are differences of the whole
+    model at the same motion.
+
     Parameters
     ----------
     model : ForceModel
@@ -102,7 +109,13 @@ class Sensitivities(ABC):
     numbers : tuple of Number
     searched : tuple of type of StructureEffect
         Effects outside the drives that the given model could have and has not.
+    each : callable
+        Evaluates columns, in threads where they take long.
+    homing_stride : int
+        Samples between those at which `HOMING` is computed where that takes long; 0: not at all.
     """
+
+    each: ClassVar[Callable[..., Iterable[Any]]] = map
 
     def __init__(self, model: ForceModel, given: ForceModel) -> None:
         self.model, self.given = model, given
@@ -112,8 +125,8 @@ class Sensitivities(ABC):
             bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
+        self.homing_stride = 5
 
-    @abstractmethod
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.
 
@@ -129,6 +142,46 @@ class Sensitivities(ABC):
         forces : Forces
             Of the model at one chunk, before its sensors.
         """
+        state: Any = forces.mechanism
+        reference = self._efforts(self.model, state)
+        columns = {NUMBERS: self._of_numbers(forces, reference), OF_DRIVES: self._sensed_each(
+            reversal_columns(self.dry(state), state.velocity, state.direction,
+                             np.asarray(self.model.reversal.velocity)), state)}
+        for friction in filter(self.is_in_passive_joints, following(self.model)):
+            columns[OF_JOINTS] = self._sensed_each(
+                passive_reversal_columns(friction, state), state)
+        homing = self.of_homing(state, reference) if self.homing_stride else None
+        if homing is not None:
+            columns[HOMING] = homing
+        for effect in self.searched:
+            columns[effect.name], bare = self._of_structure(effect, state, reference)
+            if issubclass(effect, BodyEffect):
+                columns[BARE + effect.name] = bare
+        known = {effect.name for effect in self.given.effects}
+        for present in self.model.effects:
+            if isinstance(present, StructureEffect) and present.name in known:
+                columns[PRESENT + present.name], _ = self._of_structure(
+                    type(present), state, reference)
+        return columns
+
+    @abstractmethod
+    def dry(self, state: Any) -> Array:
+        """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
+
+    @abstractmethod
+    def is_in_passive_joints(self, effect: Effect) -> bool:
+        """Return whether an effect is the model's own friction in the passive joints."""
+
+    @abstractmethod
+    def of_homing(self, state: Any, reference: Array) -> Array | None:
+        """Return the change per metre that each drive is measured too far, (D, N, D), if known.
+
+        Parameters
+        ----------
+        state : MechanismState or LinkageState
+        reference : (N, D) array
+            Efforts there.
+        """
 
     def sensed(self, column: Array, state: Any) -> Array:
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
@@ -136,6 +189,103 @@ class Sensitivities(ABC):
             if isinstance(effect, MeasurementEffect):
                 column = effect.sensed(column, state.time, self.model.drives)
         return column
+
+    def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:
+        return np.stack([self.sensed(column, state) for column in columns])
+
+    def _efforts(self, model: ForceModel, state: Any) -> Array:
+        """Return efforts at a state, without effects that know their past."""
+        total: Array = state.rigid_force + sum(
+            effect.force(state) for effect in following(model))
+        return total
+
+    def _at(self, model: Any, state: Any) -> Any:
+        """Return the same motion with the bodies and the reversals of another model."""
+        found = replace(state.loaded(model.robot), load=None, reversal=model.reversal)
+        for effect in model.effects:
+            if isinstance(effect, BodyEffect):
+                found = effect.apply(found)
+        return found
+
+    def drives_of(self, number: Number) -> list[int] | None:
+        """Return the drives that a number of a list acts on, and no other of that list does.
+
+        None, the default, where it may act on all. The others are moved at once.
+        """
+        return None
+
+    @cached_property
+    def _moved(self) -> dict[Number, ForceModel]:
+        """The model with numbers away from 0 by `RELATIVE_STEP` of the given ones.
+
+        Made once, not chunk by chunk; numbers of a list that act on drives of their own share one.
+        """
+        models: dict[tuple[str, int | None], ForceModel] = {}
+        found = {}
+        for number in self.numbers:
+            alone = None if self.drives_of(number) else number.element
+            place = (number.key, alone)
+            if place not in models:
+                value: Any = self.model.values[number.key]
+                if isinstance(value, tuple):
+                    value = tuple(
+                        one + RELATIVE_STEP * given * (alone in (None, k)) for k, (one, given)
+                        in enumerate(zip(value, self.given.values[number.key], strict=True)))
+                else:
+                    value += RELATIVE_STEP * number.value
+                models[place] = build_model({**self.model.values, number.key: value})
+            found[number] = models[place]
+        return found
+
+    def _of_numbers(self, forces: Any, reference: Array) -> Array:
+        columns = np.zeros((len(self.numbers), *reference.shape))
+        changes: dict[int, Array] = {}
+        for row, number in enumerate(self.numbers):
+            moved = id(self._moved[number])
+            if moved not in changes:
+                changes[moved] = self._change(number, forces, reference)
+            drives = self.drives_of(number) or slice(None)
+            columns[row][:, drives] = (changes[moved][:, drives] * number.deviation
+                                       / (RELATIVE_STEP * abs(number.value)))
+            columns[row] = self.sensed(columns[row], forces.mechanism)
+        return columns
+
+    def _change(self, number: Number, forces: Any, reference: Array) -> Array:
+        """Return what a number moved by `RELATIVE_STEP` of itself changes, (N, D)."""
+        moved = self._moved[number]
+        change: Array = self._efforts(moved, self._at(moved, forces.mechanism)) - reference
+        return change
+
+    def _of_structure(self, effect: type[StructureEffect], state: Any, reference: Array,
+                      ) -> tuple[Array, Array]:
+        """Return columns per unit of each coefficient, around values that the model has.
+
+        As the model says, and as they would be if friction did not follow the loads that the
+        effect adds (a preloaded guide). Those of bodies are around none: `AddedBody.around` makes
+        them exact for where one is.
+        """
+        present = next((one for one in self.model.effects if type(one) is effect
+                        and isinstance(one, StructureEffect)), None)
+        if issubclass(effect, AddedBody) and effect in self.searched:
+            present = None
+        values = effect.to_coefficients(present.values) if present is not None else {}
+
+        def columns(coefficient: Parameter) -> tuple[Array, Array]:
+            step = coefficient.scale
+            moved: Any = effect.at({**values, coefficient.name:
+                                    values.get(coefficient.name, 0.0) + step})
+            if not isinstance(moved, BodyEffect):
+                before = effect.at(values) if present is None else present
+                change = self.sensed((moved.force(state) - before.force(state)) / step, state)
+                return change, change
+            found = moved.apply(state) if present is None else self._at(replace(
+                self.model, effects=tuple(moved if one is present else one
+                                          for one in self.model.effects)), state)
+            return (self.sensed((self._efforts(self.model, found) - reference) / step, state),
+                    self.sensed((found.rigid_force - state.rigid_force) / step, state))
+
+        full, bare = zip(*self.each(columns, effect.coefficients), strict=True)
+        return np.stack(full), np.stack(bare)
 
 
 def following(model: ForceModel) -> list[Effect]:
