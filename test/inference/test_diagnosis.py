@@ -21,7 +21,9 @@ from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.library import Library
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -332,6 +334,18 @@ def test_what_no_effect_explains_is_told_with_its_variable(name: str, variable: 
     assert found.verdict == 'unknown'
     assert found.depends_on[0].drive in truth['effects'][0]['drives']
     assert found.depends_on[0].variable.startswith(variable)
+
+
+@pytest.mark.parametrize(('sensor', 'value'), [('effort_gain.slide_3.gain', 0.3),
+                                               ('time_delay.slide_3.delay', 0.006)])
+def test_the_width_of_reversals_is_that_behind_the_sensor(sensor: str, value: float) -> None:
+    """Friction as the sensor shows it would be told as one that turns over elsewhere."""
+    model = build_model({**MODEL.values, 'effects.active': [sensor.partition('.')[0]],
+                         f'effects.{sensor}': value})
+    true = build_model({**model.values, 'friction.reversal_velocities':
+                        (0.0, 0.0, 0.004, 0.0, 0.0, 0.0)})
+    fits = FittedSets(Design.of(model, [record(true, noise=0.02)]), DECISIONS)
+    assert estimate_widths(fits, fits.evaluate(())) == {2: pytest.approx(0.004, rel=0.02)}
 
 
 def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:

@@ -13,7 +13,7 @@ coefficients, priors and costs always mean the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -126,11 +126,17 @@ class Design:
         reconstructions = tuple(reconstruct(model, recording) for recording in recordings)
         return cls._evaluated(model, model, reconstructions, progress)
 
-    def around(self, point: OperatingPoint,
-               progress: Callable[[float], None] | None = None) -> Design:
-        """Return the design of the same recordings around another operating point."""
-        design = self._evaluated(point.model, self.given, self.reconstructed(point.model),
-                                 progress)
+    def around(self, point: OperatingPoint, alone: bool = False) -> Design:
+        """Return the design of the same recordings around another operating point.
+
+        Parameters
+        ----------
+        point : OperatingPoint
+        alone : bool
+            Nothing is to be added to its effects: others outside the drives get no columns.
+        """
+        design = self._evaluated(point.model, self.given, self.reconstructed(point.model), None,
+                                 {one.effect for one in point.effects} if alone else None)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if not isinstance(column, ReversalShape):
@@ -161,8 +167,11 @@ class Design:
     @classmethod
     def _evaluated(cls, model: ForceModel, given: ForceModel,
                    reconstructions: tuple[Reconstruction, ...],
-                   progress: Callable[[float], None] | None) -> Design:
+                   progress: Callable[[float], None] | None,
+                   effects: Container[type[CatalogueEffect]] | None = None) -> Design:
         sensitivities = sensitivities_of(model, given)
+        if effects is not None:
+            sensitivities.restrict(effects)
         tables: list[dict[Any, Array]] = []
         full: list[FullRate] = []
         notes: list[str] = []
@@ -249,16 +258,16 @@ class Design:
         """Return an effect's columns in one segment, (k, N), as the sensors show them."""
         time = recording.time[part]
         if issubclass(effect, MeasurementEffect):
-            effort = self._sensed(recording.effort[None, part, drive], time, drive, effect)[0]
+            effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
             return np.stack(effect.sensor_columns(effort, time, **shape))
         memory = effect.drive_memory()
         if memory is not None:
             effect.begin(memory, recording.start)
         rows = np.stack(effect.columns(recording.samples(part, drive, memory), **shape))
-        return self._sensed(rows, time, drive)
+        return self.sensed(rows, time, drive)
 
-    def _sensed(self, rows: Array, time: Array, drive: int,
-                without: type[CatalogueEffect] | None = None) -> Array:
+    def sensed(self, rows: Array, time: Array, drive: int,
+               without: type[CatalogueEffect] | None = None) -> Array:
         """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
         name = self.drives[drive]
         for effect in self.model.effects:

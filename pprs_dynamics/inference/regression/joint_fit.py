@@ -153,7 +153,8 @@ class Regression:
                           mean: Array | None = None) -> Block:
         """Return a block of rows that are transformed already, (k, n) by drive."""
         if precision is None:
-            precision = self.g_prior({d: values @ values.T for d, values in rows.items()})
+            precision = (self.g_prior({d: values @ values.T for d, values in rows.items()})
+                         if rows else 1e-300 * np.eye(1))
         return Block(rows, precision, mean)
 
     def term_block(self, term: Term, names: Sequence[str]) -> Block:
@@ -164,13 +165,15 @@ class Regression:
         return self.block({d: rows[chosen] for d, rows in term.rows.items()})
 
     def g_prior(self, grams: Mapping[int, Array]) -> Array:
-        """Return the precision of coefficients whose rows have these sums of products, (k, k)."""
-        acting = {d: gram for d, gram in grams.items() if np.any(gram)}
-        precision = sum(gram / (len(self.series[d]) * max(self.error_scale[d], 1e-12) ** 2)
-                        for d, gram in acting.items()) / max(len(acting), 1)
-        size = len(next(iter(grams.values()))) if grams else 1
-        precision = np.zeros((size, size)) + precision
-        scale = np.trace(precision) / size
+        """Return the precision of coefficients by their rows' sums of products, (..., k, k)."""
+        acting = np.zeros(next(iter(grams.values())).shape[:-2])
+        precision = np.zeros_like(next(iter(grams.values())))
+        for d, gram in grams.items():
+            acting += np.any(gram, axis=(-2, -1))
+            precision += gram / (len(self.series[d]) * max(self.error_scale[d], 1e-12) ** 2)
+        precision /= np.maximum(acting, 1)[..., None, None]
+        size = precision.shape[-1]
+        scale = np.trace(precision, axis1=-2, axis2=-1)[..., None, None] / size
         full: Array = precision + (1e-9 * scale + 1e-300) * np.eye(size)
         return full
 

@@ -11,7 +11,7 @@ those of effects in its drives is behind `Sensitivities`; the rest of the diagno
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -22,7 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Effect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -126,6 +126,12 @@ class Sensitivities(ABC):
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
         self.homing_stride = 5
+
+    def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
+        """Leave out columns that effects other than these would need."""
+        self.searched = tuple(one for one in self.searched if one in effects)
+        if not any(one.shifts_positions() and one in effects for one in catalogue().values()):
+            self.homing_stride = 0
 
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.

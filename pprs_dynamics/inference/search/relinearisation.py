@@ -206,11 +206,12 @@ def _share_of(report: Callable[[float], None], start: float, width: float,
     return lambda share: report(start + width * share)
 
 
-def linearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, CandidateSet]:
+def linearised(fits: FittedSets, found: CandidateSet, alone: bool = False,
+               ) -> tuple[FittedSets, CandidateSet]:
     """Return a set around its own fitted model, and the fitted sets that it is of.
 
     Those given where nothing would change. Gauss-Newton steps with the set as it is, each
-    halved until the exact error falls.
+    halved until the exact error falls. `alone`: nothing is to be added, see `Design.around`.
 
     Raises
     ------
@@ -221,7 +222,8 @@ def linearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, Candi
         point = next_operating_point(fits, found)
         if point is None:
             break
-        fits = FittedSets(fits.design.around(point), fits.decisions, fits.regression.error_scale)
+        fits = FittedSets(fits.design.around(point, alone), fits.decisions,
+                          fits.regression.error_scale)
         found = fits.refined(fits.evaluate(found.candidates))
     return fits, found
 
@@ -281,7 +283,7 @@ def relinearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, Can
     ModelError
         For values that no model may have.
     """
-    fits, found = linearised(fits, found)
+    fits, found = linearised(fits, found, alone=True)
     return fits, fits.refined(found)
 
 
@@ -328,8 +330,9 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     if not (before.widths and found.effects):
         return before
     base, effects = parts_of(fits, found)
-    around = FittedSets(fits.design.around(OperatingPoint(before.model, base, effects)),
-                        fits.decisions, fits.regression.error_scale)
+    point = OperatingPoint(before.model, base, effects)
+    around = FittedSets(fits.design.around(point, alone=True), fits.decisions,
+                        fits.regression.error_scale)
     after = SettledSet(around, around.refined(around.evaluate(found.candidates)), before.widths)
 
     def loss(one: SettledSet) -> float:

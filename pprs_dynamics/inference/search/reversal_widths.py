@@ -75,11 +75,14 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
         def column(trial: float, d: int = d, turning: list[Turning] = turning) -> Array:
             parts = []
             for recording in design.recordings:
-                drive = recording.samples(slice(None), d)
-                dry = friction.dry(recording.guide_load)[:, d]
-                other = replace(drive, direction=smooth_sign(drive.velocity, trial))
-                change = _dry_force(other, dry, turning) - _dry_force(drive, dry, turning)
-                parts.append(recording.treat(change[:, None])[:, 0])
+                pieces = []
+                for part in recording.segments:
+                    drive = recording.samples(part, d)
+                    dry = friction.dry(recording.guide_load[part])[:, d]
+                    other = replace(drive, direction=smooth_sign(drive.velocity, trial))
+                    change = _dry_force(other, dry, turning) - _dry_force(drive, dry, turning)
+                    pieces.append(design.sensed(change[None], drive.time, d))
+                parts.append(recording.treat(np.concatenate(pieces, axis=1)[0][:, None])[:, 0])
             return np.concatenate(parts)
 
         def loss(logarithm: float, d: int = d, width: float = width, rest: Array = rest,

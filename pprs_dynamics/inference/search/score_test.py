@@ -91,10 +91,10 @@ class ScoreTest(Generic[Label]):
                     gram[:, i, j] = gram[:, j, i] = series.sums(
                         rows[places[:, i]] * rows[places[:, j]])
             grams[d] = gram
-        precision = np.stack([
-            self.regression.g_prior({d: gram[number].sum(axis=-1) for d, gram in grams.items()})
-            if entry.precision is None else entry.precision
-            for number, entry in enumerate(entries)])
+        precision = self.regression.g_prior({d: gram.sum(axis=-1) for d, gram in grams.items()})
+        for number, entry in enumerate(entries):
+            if entry.precision is not None:
+                precision[number] = entry.precision
         mean = np.stack([np.zeros(size) if entry.mean is None else entry.mean
                          for entry in entries])
         return _Group([entry.label for entry in entries], places, grams, precision, mean)
