@@ -246,25 +246,32 @@ class Design:
     def drive_rows(self, effect: type[DriveEffect], drive: int,
                    shape: Mapping[str, float]) -> Array:
         """Return the treated columns of an effect on one drive, (k, M)."""
-        parts = []
-        for recording in self.recordings:
-            pieces = [self._columns(effect, recording, part, drive, shape)
-                      for part in recording.segments]
-            parts.append(recording.treat(np.concatenate(pieces, axis=1).T).T)
-        return np.concatenate(parts, axis=1)
-
-    def _columns(self, effect: type[DriveEffect], recording: FullRate, part: slice, drive: int,
-                 shape: Mapping[str, float]) -> Array:
-        """Return an effect's columns in one segment, (k, N), as the sensors show them."""
-        time = recording.time[part]
         if issubclass(effect, MeasurementEffect):
-            effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
-            return np.stack(effect.sensor_columns(effort, time, **shape))
-        memory = effect.drive_memory()
-        if memory is not None:
-            effect.begin(memory, recording.start)
-        rows = np.stack(effect.columns(recording.samples(part, drive, memory), **shape))
-        return self.sensed(rows, time, drive)
+            return self._treated(lambda recording: np.concatenate([np.stack(effect.sensor_columns(
+                self.sensed(recording.effort[None, part, drive], recording.time[part], drive,
+                            effect)[0], recording.time[part], **shape))
+                for part in recording.segments], axis=1))
+
+        def columns(recording: FullRate, part: slice) -> Array:
+            memory = effect.drive_memory()
+            if memory is not None:
+                effect.begin(memory, recording.start)
+            return np.stack(effect.columns(recording.samples(part, drive, memory), **shape))
+
+        return self.shown(drive, lambda recording: np.concatenate(
+            [columns(recording, part) for part in recording.segments], axis=1))
+
+    def shown(self, drive: int, rows: Callable[[FullRate], Array]) -> Array:
+        """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""
+        def behind_sensor(recording: FullRate) -> Array:
+            whole = rows(recording)
+            return np.concatenate([self.sensed(whole[:, part], recording.time[part], drive)
+                                   for part in recording.segments], axis=1)
+        return self._treated(behind_sensor)
+
+    def _treated(self, rows: Callable[[FullRate], Array]) -> Array:
+        return np.concatenate([recording.treat(rows(recording).T).T
+                               for recording in self.recordings], axis=1)
 
     def sensed(self, rows: Array, time: Array, drive: int,
                without: type[CatalogueEffect] | None = None) -> Array:
@@ -274,7 +281,8 @@ class Design:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
                     and type(effect) is not without):
                 alone = type(effect)({name: effect.drives[name]})
-                rows = np.stack([alone.sensed(row[:, None], time, (name,))[:, 0] for row in rows])
+                rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
+                                   for row in rows], rows.shape)
         return rows
 
     def term(self, effect: type[DriveEffect], drive: int, shape: Mapping[str, float]) -> Term:

@@ -22,7 +22,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     passive_reversal_columns,
     reversal_columns,
 )
-from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.inference.regression.terms import FullRate, Term
 from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
@@ -51,17 +51,17 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
     if (term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect)
             or effect.drive_memory() is not None):
         return np.zeros((0, len(design.residuals)))
-    width = design.model.reversal.widths(len(design.drives))[term.drive]
-    parts = []
-    for recording in design.recordings:
-        samples = recording.samples(slice(None), term.drive)
+    d, width = term.drive, design.model.reversal.widths(len(design.drives))[term.drive]
+
+    def rows(recording: FullRate) -> Array:
+        samples = recording.samples(slice(None), d)
         forward, backward = (coefficients @ np.stack(effect.columns(
             replace(samples, direction=np.full_like(samples.velocity, sign)), **term.shape))
             for sign in (1.0, -1.0))
-        rows = np.stack(reversal_columns(
+        return np.stack(reversal_columns(
             (forward - backward) / 2, samples.velocity, samples.direction, width))
-        parts.append(recording.treat(rows.T).T)
-    return np.concatenate(parts, axis=1)
+
+    return design.shown(d, rows)
 
 
 def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
@@ -69,13 +69,14 @@ def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
     effect = term.effect
     if term.drive is None or not issubclass(effect, DriveEffect):
         return np.zeros((0, len(design.residuals)))
-    found = [effect.deviations(recording.samples(slice(None), term.drive), **term.shape)
-             for recording in design.recordings]
-    if not found[0]:
-        return np.zeros((0, len(design.residuals)))
-    return np.concatenate([
-        recording.treat(np.stack([coefficients @ np.stack(one) for one in columns], axis=-1)).T
-        for recording, columns in zip(design.recordings, found, strict=True)], axis=1)
+    d = term.drive
+
+    def rows(recording: FullRate) -> Array:
+        found = effect.deviations(recording.samples(slice(None), d), **term.shape)
+        return np.reshape([coefficients @ np.stack(one) for one in found],
+                          (len(found), len(recording.time)))
+
+    return design.shown(d, rows)
 
 
 def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dict[int, Array]:

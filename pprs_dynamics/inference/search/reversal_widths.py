@@ -18,6 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ReversalShape, present_values, rounded
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, MeasurementEffect
@@ -73,17 +74,14 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
         turning = _turning(design, found, d)
 
         def column(trial: float, d: int = d, turning: list[Turning] = turning) -> Array:
-            parts = []
-            for recording in design.recordings:
-                pieces = []
-                for part in recording.segments:
-                    drive = recording.samples(part, d)
-                    dry = friction.dry(recording.guide_load[part])[:, d]
-                    other = replace(drive, direction=smooth_sign(drive.velocity, trial))
-                    change = _dry_force(other, dry, turning) - _dry_force(drive, dry, turning)
-                    pieces.append(design.sensed(change[None], drive.time, d))
-                parts.append(recording.treat(np.concatenate(pieces, axis=1)[0][:, None])[:, 0])
-            return np.concatenate(parts)
+            def change(recording: FullRate) -> Array:
+                drive = recording.samples(slice(None), d)
+                dry = friction.dry(recording.guide_load)[:, d]
+                other = replace(drive, direction=smooth_sign(drive.velocity, trial))
+                changed: Array = _dry_force(other, dry, turning) - _dry_force(drive, dry, turning)
+                return changed[None]
+
+            return design.shown(d, change)[0]
 
         def loss(logarithm: float, d: int = d, width: float = width, rest: Array = rest,
                  root: Array = root, column: Callable[[float], Array] = column) -> float:
