@@ -81,7 +81,8 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
                 changed: Array = _dry_force(other, dry, turning) - _dry_force(drive, dry, turning)
                 return changed[None]
 
-            return design.shown(d, change)[0]
+            (row,) = design.shown(d, change)
+            return np.asarray(row)
 
         def loss(logarithm: float, d: int = d, width: float = width, rest: Array = rest,
                  root: Array = root, column: Callable[[float], Array] = column) -> float:
