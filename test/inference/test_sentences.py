@@ -137,6 +137,16 @@ def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:
     assert 'The noise is 0.05 N' in headline
 
 
+def test_a_drive_that_keeps_more_than_its_noise_is_named_beside_what_was_found() -> None:
+    words = word_diagnosis(made_up_diagnosis(
+        'unknown', effects=(found_effect('coulomb_friction', error_after=0.08),),
+        above_noise={'slide_3': 2.13}))
+    assert words.headline.startswith(
+        'Something is missing that no effect of the catalogue explains: slide_3 keeps 2.1 times '
+        'its noise. Beside it, the model lacks coulomb_friction')
+    assert words.following.startswith('Confirm it on the machine')
+
+
 def test_ambiguous_names_all_and_says_how_to_tell_them_apart() -> None:
     words = word_diagnosis(ambiguous())
     assert 'base_tilt or external_wrench: this data cannot tell which' in words.headline

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -86,6 +86,8 @@ class Diagnosis:
         Root of the mean square of the noise of each drive [N].
     noise_floor : float
         The same over drives [N].
+    above_noise : mapping of str to float
+        How many times its noise a drive keeps, where that is more than what was found may leave.
     held_out_on : {'blocks', 'validation'}
     selection : Ranking, optional
         All that was tried, for looking closer.
@@ -112,6 +114,7 @@ class Diagnosis:
     noise: dict[str, NoiseSpectrum]
     noise_floors: dict[str, float]
     noise_floor: float
+    above_noise: Mapping[str, float] = field(default_factory=dict)
     held_out_on: str = 'blocks'
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
@@ -132,7 +135,8 @@ class Diagnosis:
                          for s in self.suspects],
             'sets': [one.to_dict() for one in self.sets],
             'calibrated': [one.to_dict() for one in self.calibrated],
-            'held_out_on': self.held_out_on, 'noise_floor': self.noise_floor,
+            'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
+            'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
 
@@ -218,8 +222,9 @@ class _Answer:
         rivals = self._rivals()
         depends = self._depends_on(noise)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
-        is_left = unconfirmed and not effects and self._is_above_noise(remaining)
-        verdict = ('unknown' if depends or is_left else 'ambiguous' if sets
+        # Where nothing was found, what is left is the noise.
+        above = self._above_noise(remaining, floors) if effects or unconfirmed else {}
+        verdict = ('unknown' if depends or above else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
@@ -229,7 +234,7 @@ class _Answer:
                                                  self.ranking.remainders)), self._sets(),
             tuple(moved), find_cautions(fits, self.best, effects), first.notes,
             first.given, adopted, first.residuals, remaining, noise, floors,
-            root_mean_square(list(floors.values())),
+            root_mean_square(list(floors.values())), above,
             'validation' if self.validate else 'blocks', self.ranking, self.kept)
 
     def _effects(self, final: SettledSet, adopted: ForceModel, remaining: Array,
@@ -287,11 +292,11 @@ class _Answer:
             return rms(measure_residuals(model, self.validate)[0]) > held_out
         return self._is_predicted(without, self.kept)
 
-    def _is_above_noise(self, remaining: Array) -> bool:
-        """Return whether errors (M, D) leave a drive more than its noise allows for."""
-        regression = self.fits.regression
-        return any(root_mean_square(remaining[:, d]) > self.decisions.left_ratio
-                   * regression.noise_floor(self.best.fit, d) for d in regression.drives)
+    def _above_noise(self, remaining: Array, floors: Mapping[str, float]) -> dict[str, float]:
+        """Return the drives that keep an error (M, D) above their noise, as multiples of it."""
+        kept = {self.drives[d]: root_mean_square(remaining[:, d]) / max(
+            floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
+        return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio}
 
     def _evidence(self, candidate: Candidate) -> float:
         return self.ranking.without[candidate].total - self.kept.total

@@ -161,7 +161,9 @@ def _headline(diagnosis: Diagnosis) -> str:
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
-        places = listed([place_on(group) for group in groups[:2]])
+        places = listed([place_on(group) for group in groups[:2]] or [
+            f'{drive} keeps {ratio:.1f} times its noise'
+            for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
         beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
