@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -32,23 +31,10 @@ from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import (
-    RIGID_BODY,
-    ForceModel,
-    Forces,
-    ModelState,
-    total_force,
-)
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
-from pprs_dynamics.physics.model.keys import (
-    GAIN,
-    Key,
-    drives_key,
-    keys_of,
-    mechanism_block,
-)
+from pprs_dynamics.physics.model.keys import GAIN, Key, drives_key, keys_of, mechanism_block
 from pprs_dynamics.physics.model.limits import JointLimits
-from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.model.robot_block import joint_radii, passive_friction, read_structure
 
@@ -58,13 +44,6 @@ BLOCKS_PER_PERIOD = 100.0
 OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
 FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
 TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
-
-
-@dataclass(frozen=True)
-class ArmForces(Forces):
-    """Efforts of N samples, (N, n)."""
-
-    mechanism: LinkageState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,23 +133,8 @@ class ArmModel(ForceModel):
             structure.lower, structure.upper, structure.effort)
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> ArmModel:
-        """Read a model file, as `DriveModel.load`.
-
-        Raises
-        ------
-        UnreadableFileError
-            Where the file, or its description, does not exist or cannot be read.
-        ModelError
-            For a key that is unknown, missing, of the wrong type or impossible, and for a
-            mechanism that cannot be.
-        """
-        file = find_file(path)
-        return cls.from_parameters(read_parameters(file), source=str(file))
-
-    @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> ArmModel:
-        """Build the model from flat keys and values, each checked; see `build_model`."""
+        """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
             block = mechanism_block(parameters)
             if not block:
@@ -207,21 +171,6 @@ class ArmModel(ForceModel):
         """
         return ToolPose(self.robot.structure)
 
-    def drive_forces(self, motion: JointMotion | PlatformMotion,
-                     state: ModelState | None = None) -> ArmForces:
-        """Return the efforts that the joints need for a motion.
-
-        Parameters
-        ----------
-        motion : JointMotion or PlatformMotion
-            Of the drives, or of the tool in the base where its pose determines them.
-        state : ModelState, optional
-            Carries effects with memory from call to call; see `DriveModel.drive_forces`.
-        """
-        # Very large numbers overflow; users of the result check that it is finite.
-        with np.errstate(over='ignore', invalid='ignore'):
-            return self.forces_at(self.mechanism(motion), state)
-
     def mechanism(self, motion: JointMotion | PlatformMotion) -> LinkageState:
         """Return what effects take of a motion; see `drive_forces`."""
         known = None
@@ -229,23 +178,6 @@ class ArmModel(ForceModel):
             motion, known = self.tool_pose.linkage(motion)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
                             robot=self.robot, reversal=self.reversal, known=known)
-
-    def forces_at(self, mechanism: LinkageState, state: ModelState | None = None) -> ArmForces:
-        """Return the efforts at a state of the arm; see `drive_forces`."""
-        state = self.initial_state() if state is None else state
-        parts = {RIGID_BODY: mechanism.rigid_force}
-        for effect in self.effects:
-            effect.check_memory(state.memories)
-            # Bodies and what acts on them change the loads that friction follows: they go first.
-            if isinstance(effect, BodyEffect):
-                loaded = effect.apply(mechanism)
-                parts[effect.name] = loaded.rigid_force - mechanism.rigid_force
-                mechanism = loaded
-        at: Any = mechanism
-        for effect in self.effects:
-            if not effect.is_measurement and not isinstance(effect, BodyEffect):
-                parts[effect.name] = effect.force(at, state.memories[effect.name])
-        return ArmForces(total_force(tuple(parts.values())), parts, mechanism)
 
     def variables(self, state: LinkageState) -> dict[str, Array]:
         """Return the loads of the gears."""

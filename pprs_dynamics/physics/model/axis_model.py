@@ -9,9 +9,8 @@ F = M (q_ddot - g) + F_v q_dot + F_c sgn(q_dot) + offset + effects, positive alo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,15 +22,8 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisO
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import (
-    RIGID_BODY,
-    ForceModel,
-    Forces,
-    ModelState,
-    total_force,
-)
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import AXIS_KEYS, is_axis, is_mechanism
-from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.three_pprs.robot import AXIS
 
@@ -39,16 +31,31 @@ from pprs_dynamics.physics.three_pprs.robot import AXIS
 AxisMotion = JointMotion
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AxisState(JointMotion):
-    """A motion with the quantities that effects on drives take."""
+    """A motion with the quantities that effects on drives take.
 
-    reversal: Reversal = field(default_factory=Reversal)
+    Parameters
+    ----------
+    position, velocity, acceleration, time
+        See `JointMotion`.
+    mass, gravity, reversal
+        See `AxisModel`.
+    """
+
+    mass: float
+    gravity: float
+    reversal: Reversal
 
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
         return (AXIS,)
+
+    @property
+    def rigid_force(self) -> Array:
+        """Force without friction [N], (N, 1)."""
+        return self.mass * (self.acceleration - self.gravity)
 
     @cached_property
     def direction(self) -> Array:
@@ -60,13 +67,6 @@ class AxisState(JointMotion):
     def guide_load(self) -> Array:
         """Unknown, and constant: dry friction is a force here, not a coefficient; (N, 1) [N]."""
         return np.zeros_like(self.velocity)
-
-
-@dataclass(frozen=True)
-class AxisForces(Forces):
-    """Forces of N samples, (N, 1)."""
-
-    mechanism: AxisState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +84,7 @@ class AxisModel(ForceModel):
     """
 
     kind: ClassVar[str] = SINGLE_AXIS
+    default_file: ClassVar[str] = 'config/single_axis.yaml'
     drives: ClassVar[tuple[str, ...]] = (AXIS,)
     keys = AXIS_KEYS
 
@@ -91,29 +92,8 @@ class AxisModel(ForceModel):
     gravity: float = 0.0
 
     @classmethod
-    def load(cls, path: str | PathLike[str] = 'config/single_axis.yaml') -> AxisModel:
-        """Read a model file, as `DriveModel.load`.
-
-        Raises
-        ------
-        UnreadableFileError
-            Where the file does not exist or is not YAML.
-        ModelError
-            For a key that is unknown, missing, of the wrong type or impossible, and for a 3-PPRS.
-        """
-        file = find_file(path)
-        return cls.from_parameters(read_parameters(file), source=str(file))
-
-    @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> AxisModel:
-        """Build the model from flat keys and values, each checked; see `build_model`.
-
-        Raises
-        ------
-        ModelError
-            For a key that is unknown, missing, of the wrong type or impossible, and for those of
-            a 3-PPRS.
-        """
+        """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
             if not is_axis(parameters) or is_mechanism(parameters):
                 raise ModelError('axis.mass', MISSING, 'be given: this needs a single axis')
@@ -125,24 +105,10 @@ class AxisModel(ForceModel):
                        reversal=Reversal(values['friction.reversal_velocity']), values=values,
                        source=source)
 
-    def drive_forces(self, motion: AxisMotion, state: ModelState | None = None) -> AxisForces:
-        """Return the forces that the drive must apply for a motion.
-
-        Parameters
-        ----------
-        motion : AxisMotion
-        state : ModelState, optional
-            Carries effects with memory from call to call; see `DriveModel.drive_forces`.
-        """
-        mechanism: Any = AxisState(motion.position, motion.velocity, motion.acceleration,
-                                   motion.time, self.reversal)
-        state = self.initial_state() if state is None else state
-        parts = {RIGID_BODY: self.mass * (mechanism.acceleration - self.gravity)}
-        for effect in self.effects:
-            effect.check_memory(state.memories)
-            if not effect.is_measurement:
-                parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-        return AxisForces(total_force(tuple(parts.values())), parts, mechanism)
+    def mechanism(self, motion: AxisMotion) -> AxisState:
+        """Return what effects take of a motion; see `drive_forces`."""
+        return AxisState(motion.position, motion.velocity, motion.acceleration, motion.time,
+                         mass=self.mass, gravity=self.gravity, reversal=self.reversal)
 
     def variables(self, state: AxisState) -> dict[str, Array]:
         """Return nothing: an axis has its own motion alone."""

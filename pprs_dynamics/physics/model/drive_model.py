@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,17 +27,11 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import (
-    RIGID_BODY,
-    ForceModel,
-    Forces,
-    ModelState,
-    total_force,
-)
+from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
 from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
-from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
@@ -90,6 +83,7 @@ class DriveModel(ForceModel):
     """
 
     kind: ClassVar[str] = PLATFORM
+    default_file: ClassVar[str] = DEFAULT_MODEL
     drives: ClassVar[tuple[str, ...]] = DRIVES
     keys = KEYS
 
@@ -103,36 +97,8 @@ class DriveModel(ForceModel):
         return self.limits.efforts
 
     @classmethod
-    def load(cls, path: str | PathLike[str] = DEFAULT_MODEL) -> DriveModel:
-        """Read a model file.
-
-        Parameters
-        ----------
-        path : path
-            A file; or, where there is none of that name, one of the package's own, as in
-            'config/paper.yaml'.
-
-        Raises
-        ------
-        UnreadableFileError
-            Where the file does not exist or is not YAML.
-        ModelError
-            For a key that is unknown, missing, of the wrong type or impossible, and for a single
-            axis, which `AxisModel.load` and `load_model` read.
-        """
-        file = find_file(path)
-        return cls.from_parameters(read_parameters(file), source=str(file))
-
-    @classmethod
     def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> DriveModel:
-        """Build the model from flat keys and values, each checked; see `build_model`.
-
-        Raises
-        ------
-        ModelError
-            For a key that is unknown, missing, of the wrong type or impossible, and for those of
-            a single axis.
-        """
+        """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
             other = next((name for name in parameters if is_axis((name,)) or is_mechanism((name,))),
                          None)
@@ -176,31 +142,20 @@ class DriveModel(ForceModel):
     def drive_forces(
         self, motion: PlatformMotion, state: ModelState | None = None,
     ) -> DriveForces:
-        """Return the forces that the drives must apply for a platform motion.
-
-        Parameters
-        ----------
-        motion : PlatformMotion
-        state : ModelState, optional
-            Carries effects with memory from call to call, and is advanced to the last sample;
-            without it every call starts afresh.
-
-        Raises
-        ------
-        WorkspaceError, SingularityError
-            See `mechanism`. Strokes and efforts are not checked here: `limits` does that, so
-            that recordings beyond them can still be compared.
-        EffectError
-            Where an effect of another package fails.
-        """
+        """Return the forces for a platform motion; see `ForceModel.drive_forces`."""
         one_pass = self._one_pass
         table = None if one_pass is None else one_pass.forces(motion)
         if one_pass is None or table is None:
             return self.forces_at(self.mechanism(motion), state)
         parts, mechanism = _parts(table), one_pass.mechanism(motion, table)
         added = self.effects[2:]
-        return (self._with_effects(added, parts, mechanism, state) if added
+        return (self._with_effects(added, parts, mechanism, state, DriveForces) if added
                 else DriveForces(table[0], parts, mechanism))
+
+    def forces_at(self, mechanism: MechanismState, state: ModelState | None = None) -> DriveForces:
+        """Return the forces at a solved state of the mechanism; see `drive_forces`."""
+        return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
+                                  state, DriveForces)
 
     @cached_property
     def _one_pass(self) -> OnePass | None:
@@ -211,33 +166,6 @@ class DriveModel(ForceModel):
                     return OnePass(self.robot, active, passive, self.limits, self.reversal,
                                    self.equations == 'printed')
         return None
-
-    def forces_at(
-        self, mechanism: MechanismState, state: ModelState | None = None,
-    ) -> DriveForces:
-        """Return the forces at a solved state of the mechanism; see `drive_forces`."""
-        parts = {RIGID_BODY: mechanism.rigid_body.force}
-        return self._with_effects(self.effects, parts, mechanism, state)
-
-    def _with_effects(
-        self, effects: tuple[Effect, ...], parts: dict[str, Array], mechanism: MechanismState,
-        state: ModelState | None,
-    ) -> DriveForces:
-        """Return the forces of parts that are there and of effects."""
-        state = self.initial_state() if state is None else state
-        for effect in self.effects:
-            effect.check_memory(state.memories)
-        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            # Bodies and what acts on them change the loads that friction follows: they go first.
-            for effect in effects:
-                if isinstance(effect, BodyEffect):
-                    loaded = effect.apply(mechanism)
-                    parts[effect.name] = loaded.rigid_body.force - mechanism.rigid_body.force
-                    mechanism = loaded
-            for effect in effects:
-                if not effect.is_measurement and not isinstance(effect, BodyEffect):
-                    parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-            return DriveForces(total_force(tuple(parts.values())), parts, mechanism)
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return loads of the guides, rod angles, and where the platform is."""

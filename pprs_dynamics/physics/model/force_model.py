@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -23,8 +24,10 @@ from pprs_dynamics.drives import DriveUnits, RecordedDrives
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import Key, title_of
+from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 from pprs_dynamics.physics.three_pprs.state import DriveStates
 
@@ -114,6 +117,8 @@ class ForceModel(ABC):
     ----------------
     kind : {'platform', 'axis', 'arm'}
         Effects say in which kinds they act.
+    default_file : str
+        Model file that is read without another one; empty where there is none.
 
     Attributes
     ----------
@@ -123,11 +128,44 @@ class ForceModel(ABC):
     """
 
     kind: ClassVar[str]
+    default_file: ClassVar[str] = ''
 
     effects: tuple[Effect, ...]
     reversal: Reversal
     values: Mapping[str, Any] = field(default_factory=dict)
     source: str = ''
+
+    @classmethod
+    def load(cls, path: str | PathLike[str] | None = None) -> Self:
+        """Read a model file of this kind; `load_model` reads all.
+
+        Parameters
+        ----------
+        path : path, optional
+            A file; or, where there is none of that name, one of the package's own, as in
+            'config/paper.yaml'. By default `default_file`.
+
+        Raises
+        ------
+        UnreadableFileError
+            Where the file, or a description that it names, does not exist or cannot be read.
+        ModelError
+            See `from_parameters`.
+        """
+        file = find_file(cls.default_file if path is None else path)
+        return cls.from_parameters(read_parameters(file), source=str(file))
+
+    @classmethod
+    @abstractmethod
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> Self:
+        """Build the model from flat keys and values, each checked; see `build_model`.
+
+        Raises
+        ------
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible, and for those of
+            another kind of model.
+        """
 
     @property
     @abstractmethod
@@ -233,8 +271,53 @@ class ForceModel(ABC):
         return effect.bound(self.mechanism_of_effects)
 
     @abstractmethod
+    def mechanism(self, motion: Any) -> Any:
+        """Return what effects take of a motion of this kind; see `drive_forces`."""
+
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
-        """Return the forces for a motion of this kind."""
+        """Return the forces that the drives must apply for a motion of this kind.
+
+        Parameters
+        ----------
+        motion : PlatformMotion or JointMotion
+        state : ModelState, optional
+            Carries effects with memory from call to call, and is advanced to the last sample;
+            without it every call starts afresh.
+
+        Raises
+        ------
+        WorkspaceError, SingularityError
+            Where the mechanism cannot be there. Strokes and efforts are not checked here:
+            `limits` does that, so that recordings beyond them can still be compared.
+        EffectError
+            Where an effect of another package fails.
+        """
+        # Very large numbers overflow; users of the result check that it is finite.
+        with np.errstate(over='ignore', invalid='ignore'):
+            return self.forces_at(self.mechanism(motion), state)
+
+    def forces_at(self, mechanism: Any, state: ModelState | None = None) -> Forces:
+        """Return the forces at a state of the mechanism; see `drive_forces`."""
+        return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
+                                  state, Forces)
+
+    def _with_effects(self, effects: Sequence[Effect], parts: dict[str, Array], mechanism: Any,
+                      state: ModelState | None, kind: type[F]) -> F:
+        """Return the forces of parts that are there and of effects."""
+        state = self.initial_state() if state is None else state
+        for effect in self.effects:
+            effect.check_memory(state.memories)
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            # Bodies and what acts on them change the loads that friction follows: they go first.
+            for effect in effects:
+                if isinstance(effect, BodyEffect):
+                    loaded = effect.apply(mechanism)
+                    parts[effect.name] = loaded.rigid_force - mechanism.rigid_force
+                    mechanism = loaded
+            for effect in effects:
+                if not effect.is_measurement and not isinstance(effect, BodyEffect):
+                    parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
+            return kind(total_force(tuple(parts.values())), parts, mechanism)
 
     @abstractmethod
     def variables(self, state: Any) -> dict[str, Array]:

@@ -13,19 +13,11 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.laws.joint_friction import (
-    LinkageFriction,
-    friction_rows,
-)
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
 from pprs_dynamics.physics.mechanism.description import Description, Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf, transmissions
-from pprs_dynamics.physics.model.keys import (
-    ARM,
-    POSE,
-    drives_key,
-    mechanism_block,
-)
+from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
 
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
