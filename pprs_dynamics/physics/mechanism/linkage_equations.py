@@ -31,6 +31,7 @@ from pprs_dynamics.physics.mechanism.arithmetic import (
     sqrt,
     tanh,
 )
+from pprs_dynamics.physics.mechanism.vectors import Vector, dot, minus, plus, product, times
 
 CLOSED = 1e-7  # [m, rad] of a row before the last Newton step, which squares it
 MOST_STEPS = 25  # of Newton
@@ -135,23 +136,48 @@ class Motion(NamedTuple):
     state: Any
 
 
-def crossed(a_x: Any, a_y: Any, a_z: Any, b_x: Any, b_y: Any, b_z: Any) -> Any:
-    """Return the cross product of two vectors."""
-    return a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x
+def vector(table: Any, k: int) -> Vector:
+    """Return row k of a table as a vector."""
+    return Vector(table[k, 0], table[k, 1], table[k, 2])
 
 
-def turned(R: Any, j: int, x: Any, y: Any, z: Any) -> Any:
+def column(table: Any, k: int, c: int) -> Vector:
+    """Return column c of matrix k of a table as a vector."""
+    return Vector(table[k, 0, c], table[k, 1, c], table[k, 2, c])
+
+
+def put(table: Any, k: int, v: Vector) -> None:
+    """Write a vector to row k of a table."""
+    table[k, 0], table[k, 1], table[k, 2] = v.x, v.y, v.z
+
+
+def put_column(table: Any, k: int, c: int, v: Vector) -> None:
+    """Write a vector to column c of matrix k of a table."""
+    table[k, 0, c], table[k, 1, c], table[k, 2, c] = v.x, v.y, v.z
+
+
+def increase(table: Any, k: int, v: Vector) -> None:
+    """Add a vector to row k of a table."""
+    table[k, 0] += v.x
+    table[k, 1] += v.y
+    table[k, 2] += v.z
+
+
+def length(v: Vector) -> Any:
+    """Return |v|."""
+    return sqrt(dot(v, v))
+
+
+def turned(R: Any, j: int, v: Vector) -> Vector:
     """Return R[j] times a vector."""
-    return (R[j, 0, 0] * x + R[j, 0, 1] * y + R[j, 0, 2] * z,
-            R[j, 1, 0] * x + R[j, 1, 1] * y + R[j, 1, 2] * z,
-            R[j, 2, 0] * x + R[j, 2, 1] * y + R[j, 2, 2] * z)
+    return Vector(R[j, 0, 0] * v.x + R[j, 0, 1] * v.y + R[j, 0, 2] * v.z,
+                  R[j, 1, 0] * v.x + R[j, 1, 1] * v.y + R[j, 1, 2] * v.z,
+                  R[j, 2, 0] * v.x + R[j, 2, 1] * v.y + R[j, 2, 2] * v.z)
 
 
-def turned_back(R: Any, j: int, x: Any, y: Any, z: Any) -> Any:
+def turned_back(R: Any, j: int, v: Vector) -> Vector:
     """Return the transpose of R[j] times a vector."""
-    return (R[j, 0, 0] * x + R[j, 1, 0] * y + R[j, 2, 0] * z,
-            R[j, 0, 1] * x + R[j, 1, 1] * y + R[j, 2, 1] * z,
-            R[j, 0, 2] * x + R[j, 1, 2] * y + R[j, 2, 2] * z)
+    return Vector(dot(column(R, j, 0), v), dot(column(R, j, 1), v), dot(column(R, j, 2), v))
 
 
 def place(t: Tables, m: Motion) -> None:
@@ -163,74 +189,59 @@ def place(t: Tables, m: Motion) -> None:
     for j in range(1, len(t.parent)):
         i = t.parent[j]
         s = t.ratio[j] * m.q[t.coordinate[j]] + t.offset[j]
-        a_x, a_y, a_z = t.axis[j, 0], t.axis[j, 1], t.axis[j, 2]
-        x, y, z = turned(m.R, i, t.place_p[j, 0], t.place_p[j, 1], t.place_p[j, 2])
-        x, y, z = m.p[i, 0] + x, m.p[i, 1] + y, m.p[i, 2] + z
-        d_x, d_y, d_z = turned(t.place_R, j, a_x, a_y, a_z)
-        z_x, z_y, z_z = turned(m.R, i, d_x, d_y, d_z)
-        m.z[j, 0], m.z[j, 1], m.z[j, 2] = z_x, z_y, z_z
+        axis = vector(t.axis, j)
+        origin = plus(vector(m.p, i), turned(m.R, i, vector(t.place_p, j)))
+        z = turned(m.R, i, turned(t.place_R, j, axis))
         if t.turns[j]:
-            C, S = cos(s), sin(s)
-            V = 1.0 - C
-            # Columns of the rotation about the axis, each taken to the base.
-            for c in range(3):
-                e_x, e_y, e_z = V * a_x, V * a_y, V * a_z
-                if c == 0:
-                    e_x, e_y, e_z = C + e_x * a_x, e_y * a_x + S * a_z, e_z * a_x - S * a_y
-                elif c == 1:
-                    e_x, e_y, e_z = e_x * a_y - S * a_z, C + e_y * a_y, e_z * a_y + S * a_x
-                else:
-                    e_x, e_y, e_z = e_x * a_z + S * a_y, e_y * a_z - S * a_x, C + e_z * a_z
-                e_x, e_y, e_z = turned(t.place_R, j, e_x, e_y, e_z)
-                e_x, e_y, e_z = turned(m.R, i, e_x, e_y, e_z)
-                m.R[j, 0, c], m.R[j, 1, c], m.R[j, 2, c] = e_x, e_y, e_z
+            _turn(t, m, i, j, axis, cos(s), sin(s))
         else:
-            x, y, z = x + s * z_x, y + s * z_y, z + s * z_z
+            origin = plus(origin, times(s, z))
             for c in range(3):
-                e_x, e_y, e_z = turned(m.R, i, t.place_R[j, 0, c], t.place_R[j, 1, c],
-                                       t.place_R[j, 2, c])
-                m.R[j, 0, c], m.R[j, 1, c], m.R[j, 2, c] = e_x, e_y, e_z
-        m.p[j, 0], m.p[j, 1], m.p[j, 2] = x, y, z
+                put_column(m.R, j, c, turned(m.R, i, column(t.place_R, j, c)))
+        put(m.p, j, origin)
+        put(m.z, j, z)
     for k in range(len(t.loop_a)):
-        _place_frame(m.R, m.p, t.loop_a[k], t.a_R, t.a_p, k, m.A, m.pA)
-        _place_frame(m.R, m.p, t.loop_b[k], t.b_R, t.b_p, k, m.B, m.pB)
+        _place_frame(m, t.loop_a[k], t.a_R, t.a_p, k, m.A, m.pA)
+        _place_frame(m, t.loop_b[k], t.b_R, t.b_p, k, m.B, m.pB)
 
 
-def _place_frame(R: Any, p: Any, j: int, frame_R: Any, frame_p: Any, k: int, placed: Any,
+def _turn(t: Tables, m: Motion, i: int, j: int, a: Vector, C: Any, S: Any) -> None:
+    """Fill in the orientation of a joint's link after a turn about its axis."""
+    e = times(1.0 - C, a)
+    # Columns of the rotation about the axis, each taken to the base.
+    x = Vector(C + e.x * a.x, e.y * a.x + S * a.z, e.z * a.x - S * a.y)
+    y = Vector(e.x * a.y - S * a.z, C + e.y * a.y, e.z * a.y + S * a.x)
+    z = Vector(e.x * a.z + S * a.y, e.y * a.z - S * a.x, C + e.z * a.z)
+    put_column(m.R, j, 0, turned(m.R, i, turned(t.place_R, j, x)))
+    put_column(m.R, j, 1, turned(m.R, i, turned(t.place_R, j, y)))
+    put_column(m.R, j, 2, turned(m.R, i, turned(t.place_R, j, z)))
+
+
+def _place_frame(m: Motion, j: int, frame_R: Any, frame_p: Any, k: int, placed: Any,
                  origin: Any) -> None:
-    x, y, z = turned(R, j, frame_p[k, 0], frame_p[k, 1], frame_p[k, 2])
-    origin[k, 0], origin[k, 1], origin[k, 2] = p[j, 0] + x, p[j, 1] + y, p[j, 2] + z
+    put(origin, k, plus(vector(m.p, j), turned(m.R, j, vector(frame_p, k))))
     for c in range(3):
-        x, y, z = turned(R, j, frame_R[k, 0, c], frame_R[k, 1, c], frame_R[k, 2, c])
-        placed[k, 0, c], placed[k, 1, c], placed[k, 2, c] = x, y, z
+        put_column(placed, k, c, turned(m.R, j, column(frame_R, k, c)))
 
 
 def gap(t: Tables, m: Motion, r: int) -> Any:
     """Return a row's value: by how much a closure is open [m, rad]."""
     k, i = t.row_loop[r], t.row_axes[r, 0]
     if t.row_kind[r] == TRANSLATION:
-        return (m.A[k, 0, i] * (m.pB[k, 0] - m.pA[k, 0])
-                + m.A[k, 1, i] * (m.pB[k, 1] - m.pA[k, 1])
-                + m.A[k, 2, i] * (m.pB[k, 2] - m.pA[k, 2]))
+        return dot(column(m.A, k, i), minus(vector(m.pB, k), vector(m.pA, k)))
     j, g, h = t.row_axes[r, 1], t.row_axes[r, 2], t.row_axes[r, 3]
-    return (t.row_weights[r, 0] * (m.A[k, 0, i] * m.B[k, 0, j] + m.A[k, 1, i] * m.B[k, 1, j]
-                                   + m.A[k, 2, i] * m.B[k, 2, j])
-            + t.row_weights[r, 1] * (m.A[k, 0, g] * m.B[k, 0, h] + m.A[k, 1, g] * m.B[k, 1, h]
-                                     + m.A[k, 2, g] * m.B[k, 2, h]))
+    return (t.row_weights[r, 0] * dot(column(m.A, k, i), column(m.B, k, j))
+            + t.row_weights[r, 1] * dot(column(m.A, k, g), column(m.B, k, h)))
 
 
-def row_axis(t: Tables, m: Motion, r: int) -> Any:
+def row_axis(t: Tables, m: Motion, r: int) -> Vector:
     """Return what a row multiplies the relative velocity by: of points, or angular."""
     k, i = t.row_loop[r], t.row_axes[r, 0]
     if t.row_kind[r] == TRANSLATION:
-        return m.A[k, 0, i], m.A[k, 1, i], m.A[k, 2, i]
+        return column(m.A, k, i)
     j, g, h = t.row_axes[r, 1], t.row_axes[r, 2], t.row_axes[r, 3]
-    x, y, z = crossed(m.B[k, 0, j], m.B[k, 1, j], m.B[k, 2, j],
-                      m.A[k, 0, i], m.A[k, 1, i], m.A[k, 2, i])
-    X, Y, Z = crossed(m.B[k, 0, h], m.B[k, 1, h], m.B[k, 2, h],
-                      m.A[k, 0, g], m.A[k, 1, g], m.A[k, 2, g])
-    f, s = t.row_weights[r, 0], t.row_weights[r, 1]
-    return f * x + s * X, f * y + s * Y, f * z + s * Z
+    return plus(times(t.row_weights[r, 0], product(column(m.B, k, j), column(m.A, k, i))),
+                times(t.row_weights[r, 1], product(column(m.B, k, h), column(m.A, k, g))))
 
 
 def gradients(t: Tables, m: Motion, place_of: Any, J: Any) -> None:
@@ -244,9 +255,9 @@ def gradients(t: Tables, m: Motion, place_of: Any, J: Any) -> None:
         for c in range(len(J[0])):
             J[r, c] = 0.0
         k, of_points = t.row_loop[r], t.row_kind[r] == TRANSLATION
-        e_x, e_y, e_z = row_axis(t, m, r)
+        e = row_axis(t, m, r)
         # Per rate of a joint on the side of B: e' (z x (p_B - p)), e' z, or nothing.
-        f_x, f_y, f_z = crossed(pB[k, 0], pB[k, 1], pB[k, 2], e_x, e_y, e_z)
+        moment = product(vector(pB, k), e)
         for n in range(start[k], start[k + 1]):
             j = joint[n]
             c = place_of[coordinate[j]]
@@ -254,11 +265,9 @@ def gradients(t: Tables, m: Motion, place_of: Any, J: Any) -> None:
                 continue
             factor = sign[n] * ratio[j]
             if of_points and turns[j]:
-                x, y, z_ = crossed(p[j, 0], p[j, 1], p[j, 2], e_x, e_y, e_z)
-                J[r, c] += factor * (z[j, 0] * (f_x - x) + z[j, 1] * (f_y - y)
-                                     + z[j, 2] * (f_z - z_))
+                J[r, c] += factor * dot(vector(z, j), minus(moment, product(vector(p, j), e)))
             else:
-                J[r, c] += factor * (e_x * z[j, 0] + e_y * z[j, 1] + e_z * z[j, 2])
+                J[r, c] += factor * dot(e, vector(z, j))
 
 
 def close(t: Tables, m: Motion, passive_of: Any) -> Any:
@@ -382,18 +391,15 @@ def velocities(t: Tables, m: Motion) -> None:
         m.w[0, c] = m.u[0, c] = 0.0
     for j in range(1, len(t.parent)):
         i = t.parent[j]
-        s = t.ratio[j] * m.v[t.coordinate[j]]
-        w_x, w_y, w_z = m.w[i, 0], m.w[i, 1], m.w[i, 2]
-        x, y, z = crossed(w_x, w_y, w_z, m.p[j, 0] - m.p[i, 0], m.p[j, 1] - m.p[i, 1],
-                          m.p[j, 2] - m.p[i, 2])
-        x, y, z = m.u[i, 0] + x, m.u[i, 1] + y, m.u[i, 2] + z
-        s_x, s_y, s_z = s * m.z[j, 0], s * m.z[j, 1], s * m.z[j, 2]
+        w = vector(m.w, i)
+        u = plus(vector(m.u, i), product(w, minus(vector(m.p, j), vector(m.p, i))))
+        own = times(t.ratio[j] * m.v[t.coordinate[j]], vector(m.z, j))
         if t.turns[j]:
-            w_x, w_y, w_z = w_x + s_x, w_y + s_y, w_z + s_z
+            w = plus(w, own)
         else:
-            x, y, z = x + s_x, y + s_y, z + s_z
-        m.w[j, 0], m.w[j, 1], m.w[j, 2] = w_x, w_y, w_z
-        m.u[j, 0], m.u[j, 1], m.u[j, 2] = x, y, z
+            u = plus(u, own)
+        put(m.w, j, w)
+        put(m.u, j, u)
 
 
 def accelerations(t: Tables, m: Motion) -> None:
@@ -401,72 +407,55 @@ def accelerations(t: Tables, m: Motion) -> None:
     for c in range(3):
         m.wd[0, c] = m.ud[0, c] = 0.0
     for j in range(1, len(t.parent)):
-        i = t.parent[j]
-        rate = t.ratio[j] * m.v[t.coordinate[j]]
-        s = t.ratio[j] * m.a[t.coordinate[j]]
-        w_x, w_y, w_z = m.w[i, 0], m.w[i, 1], m.w[i, 2]
-        a_x, a_y, a_z = m.wd[i, 0], m.wd[i, 1], m.wd[i, 2]
-        d_x, d_y, d_z = m.p[j, 0] - m.p[i, 0], m.p[j, 1] - m.p[i, 1], m.p[j, 2] - m.p[i, 2]
-        x, y, z = crossed(a_x, a_y, a_z, d_x, d_y, d_z)
-        c_x, c_y, c_z = crossed(w_x, w_y, w_z, d_x, d_y, d_z)
-        c_x, c_y, c_z = crossed(w_x, w_y, w_z, c_x, c_y, c_z)
-        x, y, z = m.ud[i, 0] + x + c_x, m.ud[i, 1] + y + c_y, m.ud[i, 2] + z + c_z
-        c_x, c_y, c_z = crossed(w_x, w_y, w_z, rate * m.z[j, 0], rate * m.z[j, 1],
-                                rate * m.z[j, 2])
-        s_x, s_y, s_z = s * m.z[j, 0], s * m.z[j, 1], s * m.z[j, 2]
+        i, z = t.parent[j], vector(m.z, j)
+        w, wd = vector(m.w, i), vector(m.wd, i)
+        arm = minus(vector(m.p, j), vector(m.p, i))
+        ud = plus(plus(vector(m.ud, i), product(wd, arm)), product(w, product(w, arm)))
+        own = times(t.ratio[j] * m.a[t.coordinate[j]], z)
+        turning = product(w, times(t.ratio[j] * m.v[t.coordinate[j]], z))
         if t.turns[j]:
-            a_x, a_y, a_z = a_x + s_x + c_x, a_y + s_y + c_y, a_z + s_z + c_z
+            wd = plus(plus(wd, own), turning)
         else:
-            x, y, z = x + s_x + 2.0 * c_x, y + s_y + 2.0 * c_y, z + s_z + 2.0 * c_z
-        m.wd[j, 0], m.wd[j, 1], m.wd[j, 2] = a_x, a_y, a_z
-        m.ud[j, 0], m.ud[j, 1], m.ud[j, 2] = x, y, z
+            ud = plus(plus(ud, own), times(2.0, turning))
+        put(m.wd, j, wd)
+        put(m.ud, j, ud)
 
 
-def _point(m: Motion, j: int, x: Any, y: Any, z: Any) -> Any:
+def _point(m: Motion, j: int, place: Vector) -> Any:
     """Return velocity and acceleration of a link's point at a place."""
-    d_x, d_y, d_z = x - m.p[j, 0], y - m.p[j, 1], z - m.p[j, 2]
-    w_x, w_y, w_z = m.w[j, 0], m.w[j, 1], m.w[j, 2]
-    v_x, v_y, v_z = crossed(w_x, w_y, w_z, d_x, d_y, d_z)
-    a_x, a_y, a_z = crossed(m.wd[j, 0], m.wd[j, 1], m.wd[j, 2], d_x, d_y, d_z)
-    c_x, c_y, c_z = crossed(w_x, w_y, w_z, v_x, v_y, v_z)
-    return (m.u[j, 0] + v_x, m.u[j, 1] + v_y, m.u[j, 2] + v_z,
-            m.ud[j, 0] + a_x + c_x, m.ud[j, 1] + a_y + c_y, m.ud[j, 2] + a_z + c_z)
+    arm, w = minus(place, vector(m.p, j)), vector(m.w, j)
+    v = product(w, arm)
+    return (plus(vector(m.u, j), v),
+            plus(plus(vector(m.ud, j), product(vector(m.wd, j), arm)), product(w, v)))
 
 
-def _turning(m: Motion, j: int, x: Any, y: Any, z: Any) -> Any:
+def _turning(m: Motion, j: int, direction: Vector) -> Any:
     """Return first and second derivative of a direction fixed in a link."""
-    w_x, w_y, w_z = m.w[j, 0], m.w[j, 1], m.w[j, 2]
-    v_x, v_y, v_z = crossed(w_x, w_y, w_z, x, y, z)
-    a_x, a_y, a_z = crossed(m.wd[j, 0], m.wd[j, 1], m.wd[j, 2], x, y, z)
-    c_x, c_y, c_z = crossed(w_x, w_y, w_z, v_x, v_y, v_z)
-    return v_x, v_y, v_z, a_x + c_x, a_y + c_y, a_z + c_z
+    w = vector(m.w, j)
+    v = product(w, direction)
+    return v, plus(product(vector(m.wd, j), direction), product(w, v))
 
 
 def row_acceleration(t: Tables, m: Motion, r: int) -> Any:
     """Return the second derivative of a row by time."""
     k, i = t.row_loop[r], t.row_axes[r, 0]
-    a, b = t.loop_a[k], t.loop_b[k]
-    e_x, e_y, e_z = m.A[k, 0, i], m.A[k, 1, i], m.A[k, 2, i]
     if t.row_kind[r] == TRANSLATION:
-        f_x, f_y, f_z, g_x, g_y, g_z = _turning(m, a, e_x, e_y, e_z)
-        u_x, u_y, u_z, b_x, b_y, b_z = _point(m, b, m.pB[k, 0], m.pB[k, 1], m.pB[k, 2])
-        v_x, v_y, v_z, a_x, a_y, a_z = _point(m, a, m.pA[k, 0], m.pA[k, 1], m.pA[k, 2])
-        return (e_x * (b_x - a_x) + e_y * (b_y - a_y) + e_z * (b_z - a_z)
-                + 2.0 * (f_x * (u_x - v_x) + f_y * (u_y - v_y) + f_z * (u_z - v_z))
-                + g_x * (m.pB[k, 0] - m.pA[k, 0]) + g_y * (m.pB[k, 1] - m.pA[k, 1])
-                + g_z * (m.pB[k, 2] - m.pA[k, 2]))
+        e, p_a, p_b = column(m.A, k, i), vector(m.pA, k), vector(m.pB, k)
+        de, dde = _turning(m, t.loop_a[k], e)
+        v_a, a_a = _point(m, t.loop_a[k], p_a)
+        v_b, a_b = _point(m, t.loop_b[k], p_b)
+        return (dot(e, minus(a_b, a_a)) + 2.0 * dot(de, minus(v_b, v_a))
+                + dot(dde, minus(p_b, p_a)))
     total = t.row_weights[r, 0] * _angle_acceleration(t, m, k, i, t.row_axes[r, 1])
     return total + t.row_weights[r, 1] * _angle_acceleration(
         t, m, k, t.row_axes[r, 2], t.row_axes[r, 3])
 
 
 def _angle_acceleration(t: Tables, m: Motion, k: int, i: int, j: int) -> Any:
-    a_x, a_y, a_z = m.A[k, 0, i], m.A[k, 1, i], m.A[k, 2, i]
-    b_x, b_y, b_z = m.B[k, 0, j], m.B[k, 1, j], m.B[k, 2, j]
-    f_x, f_y, f_z, g_x, g_y, g_z = _turning(m, t.loop_a[k], a_x, a_y, a_z)
-    u_x, u_y, u_z, h_x, h_y, h_z = _turning(m, t.loop_b[k], b_x, b_y, b_z)
-    return (g_x * b_x + g_y * b_y + g_z * b_z + a_x * h_x + a_y * h_y + a_z * h_z
-            + 2.0 * (f_x * u_x + f_y * u_y + f_z * u_z))
+    a, b = column(m.A, k, i), column(m.B, k, j)
+    da, dda = _turning(m, t.loop_a[k], a)
+    db, ddb = _turning(m, t.loop_b[k], b)
+    return dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db)
 
 
 class Loads(NamedTuple):
@@ -499,34 +488,26 @@ def apply_bodies(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) ->
     for j in range(len(t.parent)):
         for c in range(3):
             o.f[j, c] = o.n[j, c] = 0.0
+    g = Vector(gravity[0], gravity[1], gravity[2])
     for j in range(1, len(t.parent)):
         mass = inertial[j, 0]
         if mass == 0.0 and inertial[j, 4] == 0.0 and inertial[j, 1] == 0.0:
             continue
-        h_x, h_y, h_z = turned(m.R, j, inertial[j, 1], inertial[j, 2], inertial[j, 3])
-        a_x, a_y, a_z = m.ud[j, 0] - gravity[0], m.ud[j, 1] - gravity[1], m.ud[j, 2] - gravity[2]
-        w_x, w_y, w_z = m.w[j, 0], m.w[j, 1], m.w[j, 2]
-        x, y, z = m.wd[j, 0], m.wd[j, 1], m.wd[j, 2]
-        v_x, v_y, v_z = crossed(w_x, w_y, w_z, h_x, h_y, h_z)
-        f_x, f_y, f_z = crossed(w_x, w_y, w_z, v_x, v_y, v_z)
-        v_x, v_y, v_z = crossed(x, y, z, h_x, h_y, h_z)
-        o.f[j, 0] = mass * a_x + v_x + f_x
-        o.f[j, 1] = mass * a_y + v_y + f_y
-        o.f[j, 2] = mass * a_z + v_z + f_z
-        x, y, z = _inertia_times(m.R, j, inertial, x, y, z)
-        v_x, v_y, v_z = _inertia_times(m.R, j, inertial, w_x, w_y, w_z)
-        v_x, v_y, v_z = crossed(w_x, w_y, w_z, v_x, v_y, v_z)
-        h_x, h_y, h_z = crossed(h_x, h_y, h_z, a_x, a_y, a_z)
-        o.n[j, 0], o.n[j, 1], o.n[j, 2] = x + v_x + h_x, y + v_y + h_y, z + v_z + h_z
+        h = turned(m.R, j, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
+        a, w, wd = minus(vector(m.ud, j), g), vector(m.w, j), vector(m.wd, j)
+        put(o.f, j, plus(plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
+        spin = plus(_inertia_times(m.R, j, inertial, wd),
+                    product(w, _inertia_times(m.R, j, inertial, w)))
+        put(o.n, j, plus(spin, product(h, a)))
     transmit(t, m, o)
 
 
-def _inertia_times(R: Any, j: int, inertial: Any, x: Any, y: Any, z: Any) -> Any:
-    x, y, z = turned_back(R, j, x, y, z)
+def _inertia_times(R: Any, j: int, inertial: Any, v: Vector) -> Vector:
+    x, y, z = turned_back(R, j, v)
     xx, xy, yy = inertial[j, 4], inertial[j, 5], inertial[j, 6]
     xz, yz, zz = inertial[j, 7], inertial[j, 8], inertial[j, 9]
-    return turned(R, j, xx * x + xy * y + xz * z, xy * x + yy * y + yz * z,
-                  xz * x + yz * y + zz * z)
+    return turned(R, j, Vector(xx * x + xy * y + xz * z, xy * x + yy * y + yz * z,
+                               xz * x + yz * y + zz * z))
 
 
 def transmit(t: Tables, m: Motion, o: Loads) -> None:
@@ -534,21 +515,12 @@ def transmit(t: Tables, m: Motion, o: Loads) -> None:
     for c in range(len(m.q)):
         o.coordinates[c] = 0.0
     for j in range(len(t.parent) - 1, 0, -1):
-        i = t.parent[j]
-        f_x, f_y, f_z = o.f[j, 0], o.f[j, 1], o.f[j, 2]
-        if t.turns[j]:
-            along = m.z[j, 0] * o.n[j, 0] + m.z[j, 1] * o.n[j, 1] + m.z[j, 2] * o.n[j, 2]
-        else:
-            along = m.z[j, 0] * f_x + m.z[j, 1] * f_y + m.z[j, 2] * f_z
+        i, z, f, n = t.parent[j], vector(m.z, j), vector(o.f, j), vector(o.n, j)
+        along = dot(z, n) if t.turns[j] else dot(z, f)
         o.coordinates[t.coordinate[j]] += t.ratio[j] * along
-        x, y, z = crossed(m.p[j, 0] - m.p[i, 0], m.p[j, 1] - m.p[i, 1], m.p[j, 2] - m.p[i, 2],
-                          f_x, f_y, f_z)
-        o.f[i, 0] += f_x
-        o.f[i, 1] += f_y
-        o.f[i, 2] += f_z
-        o.n[i, 0] += o.n[j, 0] + x
-        o.n[i, 1] += o.n[j, 1] + y
-        o.n[i, 2] += o.n[j, 2] + z
+        arm = minus(vector(m.p, j), vector(m.p, i))
+        increase(o.f, i, f)
+        increase(o.n, i, plus(n, product(arm, f)))
     T, of_tree, passive = m.T, o.coordinates, t.passive
     for d in range(len(t.drives)):
         x = of_tree[t.drives[d]] + 0.0
@@ -570,27 +542,17 @@ def react(t: Tables, m: Motion, o: Loads) -> None:
             x = x + inverse[c, r] * of_tree[passive[c]]
         o.rows[r] = x
         k = t.row_loop[r]
-        e_x, e_y, e_z = row_axis(t, m, r)
         if t.row_kind[r] == TRANSLATION:
-            o.F[k, 0] += x * e_x
-            o.F[k, 1] += x * e_y
-            o.F[k, 2] += x * e_z
+            increase(o.F, k, times(x, row_axis(t, m, r)))
         else:
-            o.N[k, 0] += x * e_x
-            o.N[k, 1] += x * e_y
-            o.N[k, 2] += x * e_z
+            increase(o.N, k, times(x, row_axis(t, m, r)))
     for k in range(len(t.loop_a)):
-        F_x, F_y, F_z = o.F[k, 0], o.F[k, 1], o.F[k, 2]
+        F, N, p_b = vector(o.F, k), vector(o.N, k), vector(m.pB, k)
         for s in range(t.path_start[k], t.path_start[k + 1]):
             j, sign = t.path_joint[s], t.path_sign[s]
-            x, y, z = crossed(m.pB[k, 0] - m.p[j, 0], m.pB[k, 1] - m.p[j, 1],
-                              m.pB[k, 2] - m.p[j, 2], F_x, F_y, F_z)
-            o.f[j, 0] -= sign * F_x
-            o.f[j, 1] -= sign * F_y
-            o.f[j, 2] -= sign * F_z
-            o.n[j, 0] -= sign * (o.N[k, 0] + x)
-            o.n[j, 1] -= sign * (o.N[k, 1] + y)
-            o.n[j, 2] -= sign * (o.N[k, 2] + z)
+            arm = minus(p_b, vector(m.p, j))
+            increase(o.f, j, times(-sign, F))
+            increase(o.n, j, times(-sign, plus(N, product(arm, F))))
 
 
 def twist(t: Tables, m: Motion, W: Any, U: Any) -> None:
@@ -602,19 +564,17 @@ def twist(t: Tables, m: Motion, W: Any, U: Any) -> None:
             W[0, c, d] = U[0, c, d] = 0.0
     for j in range(1, len(t.parent)):
         i, k, ratio = t.parent[j], t.coordinate[j], t.ratio[j]
-        x, y, z = m.p[j, 0] - m.p[i, 0], m.p[j, 1] - m.p[i, 1], m.p[j, 2] - m.p[i, 2]
-        z_x, z_y, z_z = axis[j, 0], axis[j, 1], axis[j, 2]
+        arm, z = minus(vector(m.p, j), vector(m.p, i)), vector(axis, j)
         for d in range(drives):
-            s = ratio * T[k, d]
-            w_x, w_y, w_z = W[i, 0, d], W[i, 1, d], W[i, 2, d]
-            u_x, u_y, u_z = crossed(w_x, w_y, w_z, x, y, z)
-            u_x, u_y, u_z = U[i, 0, d] + u_x, U[i, 1, d] + u_y, U[i, 2, d] + u_z
+            w = column(W, i, d)
+            u = plus(column(U, i, d), product(w, arm))
+            own = times(ratio * T[k, d], z)
             if turns[j]:
-                w_x, w_y, w_z = w_x + s * z_x, w_y + s * z_y, w_z + s * z_z
+                w = plus(w, own)
             else:
-                u_x, u_y, u_z = u_x + s * z_x, u_y + s * z_y, u_z + s * z_z
-            W[j, 0, d], W[j, 1, d], W[j, 2, d] = w_x, w_y, w_z
-            U[j, 0, d], U[j, 1, d], U[j, 2, d] = u_x, u_y, u_z
+                u = plus(u, own)
+            put_column(W, j, d, w)
+            put_column(U, j, d, u)
 
 
 class JointFriction(NamedTuple):
@@ -638,8 +598,7 @@ class JointFriction(NamedTuple):
 
 def load_across(t: Tables, m: Motion, o: Loads, j: int) -> Any:
     """Return the force that a joint transmits across its axis [N]."""
-    f_x, f_y, f_z = crossed(o.f[j, 0], o.f[j, 1], o.f[j, 2], m.z[j, 0], m.z[j, 1], m.z[j, 2])
-    return sqrt(f_x * f_x + f_y * f_y + f_z * f_z)
+    return length(product(vector(o.f, j), vector(m.z, j)))
 
 
 def rub(t: Tables, m: Motion, o: Loads, s: JointFriction, W: Any, efforts: Any) -> None:
@@ -656,11 +615,9 @@ def rub(t: Tables, m: Motion, o: Loads, s: JointFriction, W: Any, efforts: Any) 
         else:
             g = s.loop[k]
             a, b = t.loop_a[g], t.loop_b[g]
-            x, y, z = m.w[b, 0] - m.w[a, 0], m.w[b, 1] - m.w[a, 1], m.w[b, 2] - m.w[a, 2]
-            load = sqrt(o.F[g, 0] * o.F[g, 0] + o.F[g, 1] * o.F[g, 1] + o.F[g, 2] * o.F[g, 2])
-            speed = larger(sqrt(x * x + y * y + z * z), 1e-8 * s.width[k])
-            dry = s.torque[k] + s.lever[k] * load
+            relative = minus(vector(m.w, b), vector(m.w, a))
+            speed = larger(length(relative), 1e-8 * s.width[k])
+            dry = s.torque[k] + s.lever[k] * length(vector(o.F, g))
             f = s.viscous[k] + dry * tanh(speed / s.width[k]) / speed
             for d in range(len(t.drives)):
-                efforts[d] += f * (x * (W[b, 0, d] - W[a, 0, d]) + y * (W[b, 1, d] - W[a, 1, d])
-                                   + z * (W[b, 2, d] - W[a, 2, d]))
+                efforts[d] += f * dot(relative, minus(column(W, b, d), column(W, a, d)))

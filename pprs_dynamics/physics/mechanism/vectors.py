@@ -46,6 +46,11 @@ def plus(a: Vector, b: Vector) -> Vector:
     return Vector(a.x + b.x, a.y + b.y, a.z + b.z)
 
 
+def minus(a: Vector, b: Vector) -> Vector:
+    """Return a - b in `base`."""
+    return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
 def times(factor: Value, a: Vector) -> Vector:
     """Return a vector in `base` times a number."""
     return Vector(factor * a.x, factor * a.y, factor * a.z)

@@ -23,6 +23,7 @@ from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
     in_chain,
+    minus,
     plus,
     product,
     times,
@@ -140,7 +141,7 @@ def platform_wrench(body: PlatformBody, g: Vector, m: MotionSample) -> Wrench:
     """
     d = turned(m.rotation, body.centre)
     a_centre = plus(m.a, plus(product(m.epsilon, d), product(m.omega, product(m.omega, d))))
-    force = times(body.mass, _minus(a_centre, g))                              # Eq. (6)
+    force = times(body.mass, minus(a_centre, g))                              # Eq. (6)
     # In `platform`, where [I] is constant.
     omega, epsilon = turned_back(m.rotation, m.omega), turned_back(m.rotation, m.epsilon)
     spin = plus(_momentum(body, epsilon), product(omega, _momentum(body, omega)))
@@ -154,10 +155,6 @@ def _momentum(body: PlatformBody, omega: Vector) -> Vector:
     return Vector(xx * omega.x + xy * omega.y + xz * omega.z,
                   xy * omega.x + yy * omega.y + yz * omega.z,
                   xz * omega.x + yz * omega.y + zz * omega.z)
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return Vector(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 @each_chain
@@ -185,8 +182,8 @@ def less_rod_reactions(
     for i in range(CHAINS):
         unit = unit_wrench(p.geometry.chains[i], rod_normal(rods[i].cos_u, rods[i].sin_u),
                            rods[i].arm)
-        force = _minus(force, times(W[i], unit.force))
-        moment = _minus(moment, times(W[i], unit.moment))
+        force = minus(force, times(W[i], unit.force))
+        moment = minus(moment, times(W[i], unit.moment))
     return Wrench(force, moment)
 
 
