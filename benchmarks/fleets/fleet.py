@@ -37,7 +37,6 @@ from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.simulation.hidden_bodies import PayloadMass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_forces import DriveSpring
@@ -173,7 +172,7 @@ def _record(path: Path, plant: PrescribedPlant, truth: Truth | None, day: int, n
 def jobs(folder: Path) -> Iterator[SurveyJob]:
     """Yield the recordings of a fleet."""
     model = tolerant_model(TOLERANCE)
-    name = fingerprint(model)
+    name = model.fingerprint
     for entry in read_manifest(str(folder / 'robots.csv')):
         yield SurveyJob(entry, model.values, name, EFFECTS)
 

@@ -29,7 +29,6 @@ from pprs_dynamics.app.fleet.manifest import ManifestEntry
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.survey import SurveyJob, examine, identify
 from pprs_dynamics.physics.model.model_file import load_model
-from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 
 SEED = 700  # of no fleet in the table
 WARM = 6  # recordings that load libraries and compile
@@ -80,7 +79,7 @@ def workers(folder: Path, count: int) -> None:
 def small_jobs(folder: Path, count: int, refused: bool) -> Iterator[SurveyJob]:
     """Yield small recordings, or files that are refused, each written when it is asked for."""
     model = load_model(MODEL)
-    name = fingerprint(model)
+    name = model.fingerprint
     text = write_axis(folder / 'whole.csv').read_text().splitlines(keepends=True)[:SMALL + 1]
     for k in range(count):
         path = folder / f'robot_{k % 100}' / f'{k}.csv'

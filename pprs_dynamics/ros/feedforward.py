@@ -19,7 +19,6 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.margins import Margins, margins
-from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
 from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
@@ -335,4 +334,4 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
             lagging=bool(threshold and accepted > before and self._lag.median > threshold),
-            model={'files': self._files, 'sha256': fingerprint(self._settings.model)})
+            model={'files': self._files, 'sha256': self._settings.model.fingerprint})

@@ -32,7 +32,6 @@ from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.model_file import load_model
-from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 
 MODEL = 'config/single_axis.yaml'
 EFFECTS = 'coulomb_friction'
@@ -44,7 +43,7 @@ RNG_SEEDS = range(40)
 def job(path: Path | str, robot: str = 'a') -> SurveyJob:
     model = load_model(MODEL)
     entry = ManifestEntry(str(path), robot, 1e9)
-    return SurveyJob(entry, model.values, fingerprint(model), EFFECTS)
+    return SurveyJob(entry, model.values, model.fingerprint, EFFECTS)
 
 
 def write_values(store: Store, robot: str, values: np.ndarray, parameter: str = 'force') -> None:

@@ -30,7 +30,6 @@ from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.physics.model.model_writer import write_model
 
 SAMPLES = 40
@@ -212,9 +211,9 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
     for folder in (first, second):
         folder.mkdir()
     models = [ArmModel.load(arm.write_arm(folder)) for folder in (first, second)]
-    assert fingerprint(models[0]) == fingerprint(models[1])
+    assert models[0].fingerprint == models[1].fingerprint
     heavier = ArmModel.load(arm.write_arm(second, arm.urdf().replace('value="1.5"', 'value="1.6"')))
-    assert fingerprint(heavier) != fingerprint(models[0])
+    assert heavier.fingerprint != models[0].fingerprint
 
 
 def test_a_body_of_negative_mass_is_refused(tmp_path: Path) -> None:

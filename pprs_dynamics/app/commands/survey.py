@@ -30,7 +30,6 @@ from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
-from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.system.plain_text import displayed
 
 MOST_SHOWN = 10  # errors
@@ -125,4 +124,4 @@ def _check(options: argparse.Namespace) -> None:
 
 def _model(path: str) -> tuple[ForceModel, str]:
     model = load_model(path)
-    return model, fingerprint(model)
+    return model, model.fingerprint

@@ -78,17 +78,7 @@ def solve(A: Any, B: Any, size: int, columns: int) -> Any:
     return determinant
 
 
-# Compiled code calls these in their place.
-def compiled_sqrt(x: Any) -> Any:
-    """Return the square root, NaN below 0."""
-    return math.sqrt(x)
-
-
-def compiled_tanh(x: Any) -> Any:
-    """Return the hyperbolic tangent."""
-    return math.tanh(x)
-
-
+# Compiled code calls these in their place, and those of `math` for the others.
 def compiled_larger(x: Any, y: Any) -> Any:
     """Return the larger of two numbers; NaN where x is."""
     return y if x < y else x
@@ -97,16 +87,6 @@ def compiled_larger(x: Any, y: Any) -> Any:
 def compiled_everywhere(condition: Any) -> bool:
     """Return whether a condition holds."""
     return condition  # type: ignore[no-any-return]
-
-
-def compiled_sin(x: Any) -> Any:
-    """Return the sine [rad]."""
-    return math.sin(x)
-
-
-def compiled_cos(x: Any) -> Any:
-    """Return the cosine [rad]."""
-    return math.cos(x)
 
 
 def compiled_largest(x: Any) -> int:

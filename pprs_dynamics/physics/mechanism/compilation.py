@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dis
 import hashlib
+import math
 from collections.abc import Callable
 from functools import cache
 from itertools import count
@@ -18,12 +19,12 @@ from pprs_dynamics.physics.mechanism import arithmetic
 
 PACKAGE = 'pprs_dynamics'
 REPLACED: dict[Any, Any] = {
-    arithmetic.sqrt: arithmetic.compiled_sqrt,
-    arithmetic.tanh: arithmetic.compiled_tanh,
+    arithmetic.sqrt: math.sqrt,
+    arithmetic.tanh: math.tanh,
     arithmetic.larger: arithmetic.compiled_larger,
     arithmetic.everywhere: arithmetic.compiled_everywhere,
-    arithmetic.sin: arithmetic.compiled_sin,
-    arithmetic.cos: arithmetic.compiled_cos,
+    arithmetic.sin: math.sin,
+    arithmetic.cos: math.cos,
     arithmetic.largest: arithmetic.compiled_largest,
     arithmetic.solve: arithmetic.compiled_solve,
 }
@@ -92,7 +93,7 @@ def _code_digest(function: FunctionType) -> str:
     while waiting:
         one = waiting.pop()
         one = REPLACED.get(one, one)
-        if one in seen:
+        if one in seen or not isinstance(one, FunctionType):
             continue
         seen.add(one)
         content.update(one.__code__.co_code + repr(one.__code__.co_consts).encode())
@@ -162,7 +163,8 @@ def _clone(function: FunctionType, compile_one: Callable[[Any], Any]) -> Functio
     """Return a copy of a function whose callees of this package are compiled."""
     def callee(used: Any) -> Any:
         if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
-            return compile_one(REPLACED.get(used, used))
+            used = REPLACED.get(used, used)
+            return compile_one(used) if isinstance(used, FunctionType) else used
         return used
 
     namespace = dict(function.__globals__)

@@ -89,14 +89,10 @@ def with_lead_in(motion: PlatformMotion, duration: float, rate: float) -> Platfo
     # A turn about a fixed axis: its rate and gain are those of the angle.
     turn = Rotation.from_quat(motion.orientation[0]).as_rotvec()
     orientation = Rotation.from_rotvec(blend[:, None] * turn).as_quat()
-    way = (HOME + blend[:, None] * move, orientation, rate_of[:, None] * move,
-           rate_of[:, None] * turn, gain[:, None] * move, gain[:, None] * turn)
-    path = (motion.position, motion.orientation, motion.linear_velocity, motion.angular_velocity,
-            motion.linear_acceleration, motion.angular_acceleration)
-    position, orientation, v, omega, a, epsilon = (
-        np.concatenate(pair) for pair in zip(way, path, strict=True))
-    return PlatformMotion(position, orientation, v, omega, a, epsilon,
-                          np.arange(len(position)) / rate)
+    way = np.hstack((HOME + blend[:, None] * move, orientation, rate_of[:, None] * move,
+                     rate_of[:, None] * turn, gain[:, None] * move, gain[:, None] * turn))
+    rows = np.concatenate((way, motion.rows))
+    return PlatformMotion.from_rows(rows, np.arange(len(rows)) / rate)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ what its sensors say, never for what it moves.
 from __future__ import annotations
 
 import copy
+import hashlib
+import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,7 +28,7 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.model.keys import Key, title_of
+from pprs_dynamics.physics.model.keys import FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 from pprs_dynamics.physics.three_pprs.state import DriveStates
@@ -205,6 +207,15 @@ class ForceModel(ABC):
     def content(self) -> str:
         """What the model is built from beside its values: a hash of further files."""
         return ''
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of the values in force, which changes with every parameter."""
+        values = dict(self.values)
+        if self.content:  # the same wherever the files lie
+            values.update({key: self.content for key in FILES if values.get(key)})
+        text = json.dumps(values, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
 
     @property
     def gain(self) -> tuple[float, ...] | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING as NO_DEFAULT
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
@@ -20,7 +20,7 @@ from pprs_dynamics.physics.model.keys import LARGEST, as_list
 
 BLOCK = 'history'
 _STEP = re.compile(r'step_\d\d+')
-PREVIOUS, ADDED = 'previous', 'added'
+PREVIOUS = 'previous'
 NOT_KNOWN = 1e300  # a standard deviation that is none; ROS 2 files have no better word
 
 
@@ -89,23 +89,20 @@ class Step:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the step for JSON."""
-        data = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        data['drives'] = list(self.drives) or None
-        data['previous'] = {key: list(value) if isinstance(value, tuple) else value
-                            for key, value in self.previous.items()}
-        return {key: list(value) if isinstance(value, tuple) else value
-                for key, value in data.items()}
+        data = {name: as_list(value) for name, value in vars(self).items()}
+        data['drives'] = data['drives'] or None
+        data[PREVIOUS] = {key: as_list(value) for key, value in self.previous.items()}
+        return data
 
     def as_values(self, prefix: str) -> dict[str, Any]:
         """Return flat keys and values of a model file, empty lists left out."""
         flat: dict[str, Any] = {}
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if entry.name == PREVIOUS:
+        for name, value in vars(self).items():
+            if name == PREVIOUS:
                 flat.update((f'{prefix}.{PREVIOUS}.{key}', as_list(old))
                             for key, old in value.items())
             elif value != ():
-                flat[f'{prefix}.{entry.name}'] = as_list(value)
+                flat[f'{prefix}.{name}'] = as_list(value)
         return flat
 
 
@@ -148,9 +145,8 @@ def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -
     gone = changed - after.keys()
     if gone:
         raise ValueError(f'a step adds and changes, but {sorted(gone)} would go')
-    kept = Step(**{**{entry.name: getattr(step, entry.name) for entry in fields(step)},
-                   PREVIOUS: {key: before[key] for key in before if key in changed},
-                   ADDED: tuple(key for key in after if key in changed - before.keys())})
+    kept = replace(step, previous={key: before[key] for key in before if key in changed},
+                   added=tuple(key for key in after if key in changed - before.keys()))
     number = len(read_steps(before)) + 1
     return {**after, **kept.as_values(f'{BLOCK}.{step_name(number)}')}
 

@@ -62,11 +62,6 @@ class ChainKinematics:
     angular_velocity: ChainVector
 
     @property
-    def rod_direction(self) -> ChainVector:
-        """Unit vectors d_i along the rods, from C_i to A_i."""
-        return rod_direction(self.cos_u, self.sin_u)
-
-    @property
     def rod_normal(self) -> ChainVector:
         """Unit vectors w_i: minus the direction in which the rod's tip moves as u_i grows."""
         return rod_normal(self.cos_u, self.sin_u)
