@@ -157,9 +157,13 @@ def resistance_forces(state: MechanismState, resistances: Resistances) -> Array:
 
     By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
     """
-    k = np.concatenate(resistances, axis=1)
+    return _transferred(state, np.concatenate(resistances, axis=1), printed=False)
+
+
+def _transferred(state: MechanismState, k: Array, printed: bool) -> Array:
+    """Return the drive forces that overcome k_r and k_s, (N, 6) [N m s/rad], (N, 6) [N]."""
     force, kinematics = np.empty(k.shape), state.kinematics
-    parameters = state.robot.geometry.kernel_parameters.extended(TransferParameters, False)
+    parameters = state.robot.geometry.kernel_parameters.extended(TransferParameters, printed)
     evaluate(transfer_kernel, parameters, kinematics.chain_table, kinematics.inverse_table, k,
              force)
     return force
@@ -198,26 +202,6 @@ def resistance_kernel(
     return True
 
 
-class PassiveParameters(NamedTuple):
-    """Parameters of `passive_kernel`, see those of the two kernels that it joins."""
-
-    geometry: GeometryParameters
-    printed: Value
-    joints: Joints
-
-
-def passive_kernel(
-    p: PassiveParameters, s: Sample, chains: Array, inverse: Array, reactions: Array,
-    turnover: Array,
-    force: Array,
-) -> Any:
-    """Fill a table of forces: `resistance_kernel`, then `transfer_kernel`."""
-    _write_forces(force, s, friction_forces(
-        p.geometry, read_chains(chains, s), read_inverse(inverse, s),
-        _resistances_at(p.joints, reactions, turnover, s), p.printed))
-    return True
-
-
 @each_chain
 def _resistances_at(
     i: int, joints: Joints, reactions: Any, turnover: Any, s: Sample,
@@ -252,10 +236,15 @@ class PassiveFriction(Effect):
 
     def resistances(self, state: MechanismState) -> Resistances:
         """Return k_ri and k_si at the frictionless reactions, Eq. (9)."""
+        k = self._resistance_table(state)
+        return Resistances(k[:, :3], k[:, 3:])
+
+    def _resistance_table(self, state: MechanismState) -> Array:
+        """Return k_r and k_s, (N, 6)."""
         k, reactions = np.empty(state.rigid_body.force.shape), state.rigid_body.reaction_table
         evaluate(resistance_kernel, KernelParameters(self.joints), reactions,
                  state.kinematics.turnover(state.reversal.rate), k)
-        return Resistances(k[:, :3], k[:, 3:])
+        return k
 
     @cached_property
     def joints(self) -> Joints:
@@ -276,13 +265,7 @@ class WholeMechanismFriction(PassiveFriction):
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N], by virtual power."""
-        kinematics, reactions = state.kinematics, state.rigid_body.reaction_table
-        force = np.empty((len(reactions), 6))
-        parameters = state.robot.geometry.kernel_parameters.extended(
-            PassiveParameters, self.printed, self.joints)
-        evaluate(passive_kernel, parameters, kinematics.chain_table, kinematics.inverse_table,
-                 reactions, kinematics.turnover(state.reversal.rate), force)
-        return force
+        return _transferred(state, self._resistance_table(state), self.printed)
 
 
 @dataclass(frozen=True)
