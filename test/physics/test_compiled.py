@@ -291,6 +291,17 @@ def test_compiled_code_of_other_sources_is_another(tmp_path, monkeypatch):
         compilation._digest.cache_clear()
 
 
+def test_compiled_code_that_differs_in_a_name_alone_is_another():
+    def velocity(m):
+        return m.u
+
+    def rate(m):
+        return m.w
+
+    assert velocity.__code__.co_code == rate.__code__.co_code
+    assert compilation._code_digest(velocity) != compilation._code_digest(rate)
+
+
 def test_importing_and_loading_a_model_imports_no_compiler():
     code = ('import sys, pprs_dynamics; pprs_dynamics.DriveModel.load(); '
             'print("numba" in sys.modules)')

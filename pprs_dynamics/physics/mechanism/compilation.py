@@ -96,7 +96,9 @@ def _code_digest(function: FunctionType) -> str:
         if one in seen or not isinstance(one, FunctionType):
             continue
         seen.add(one)
-        content.update(one.__code__.co_code + repr(one.__code__.co_consts).encode())
+        code = one.__code__
+        # Instructions have numbers of names: those that read m.w and m.u are the same.
+        content.update(code.co_code + repr((code.co_consts, code.co_names)).encode())
         for name in sorted(_names(one.__code__) & one.__globals__.keys()):
             used = one.__globals__[name]
             if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
