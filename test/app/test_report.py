@@ -20,7 +20,8 @@ from rich.console import Console
 from rich.progress import Progress
 from ros_processes import executable
 
-from pprs_dynamics.app.report.comparison_figures import thinned, worst_spans
+from pprs_dynamics.app.report.charts import thinned
+from pprs_dynamics.app.report.comparison_figures import worst_spans
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.drives import DRIVES

@@ -13,7 +13,6 @@ from typing import Any
 
 from pprs_dynamics.app.commands.arguments import MODEL, PAGE, output_file
 from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.report.history_tables import history_view
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import ModelError
@@ -38,6 +37,9 @@ def run(options: argparse.Namespace) -> int:
     if options.undo != bool(options.output):
         raise ModelError('--output', options.output, 'be given with --undo, and only then')
     screen = console()
+    # What draws is imported here, where rich is known to be there.
+    from pprs_dynamics.app.report.history_report import history_view
+
     base = find_file(options.file)
     model = load_model(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
@@ -59,9 +61,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _write_report(options: argparse.Namespace, steps: Sequence[Step], unit: str,
                   screen: Any) -> None:
-    """Draw the falling error; what draws is imported here, it takes longer than all the rest."""
-    from pprs_dynamics.app.report.history_figures import draw_history
-    from pprs_dynamics.app.report.history_page import history_page
+    """Draw the falling error."""
+    from pprs_dynamics.app.report.history_report import draw_history, history_page
 
     if options.report.endswith('.png'):
         screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')

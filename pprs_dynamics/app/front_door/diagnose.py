@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
@@ -64,13 +64,13 @@ class DiagnosisResult(Result):
 
     def view(self, details: bool = False, next_step: bool = True) -> Any:
         """Return what the terminal shows, with the command to go on with, or without."""
-        from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+        from pprs_dynamics.app.report.diagnosis_report import diagnosis_view
 
         return diagnosis_view(self.diagnosis, self._words, details, next_step)
 
     def page(self) -> Page:
         """Return the page of `pprs diagnose --report`."""
-        from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+        from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
@@ -86,7 +86,7 @@ class DiagnosisResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""
-        from pprs_dynamics.app.report.plots import plot_errors
+        from pprs_dynamics.app.report.pictures import plot_errors
 
         residuals = self.diagnosis.residuals
         after = replace(residuals, model=residuals.measured - self.diagnosis.remaining)
@@ -127,6 +127,5 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
-    report = progress or (lambda what, share: None)
     return DiagnosisResult(inputs, diagnose_recordings(
-        inputs.model, inputs.fitted, inputs.held_out, lambda share: report('diagnosing', share)))
+        inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing')))

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.front_door.inputs import InputError, Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import (
+    InputError,
+    Inputs,
+    Model,
+    Progress,
+    Recordings,
+    stage,
+)
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
@@ -76,7 +83,7 @@ class ExperimentResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.experiment_tables import excitation_view, experiment_view
+        from pprs_dynamics.app.report.experiment_report import excitation_view, experiment_view
 
         if isinstance(self.design, ArmExcitation):
             return excitation_view(self.design)
@@ -84,7 +91,7 @@ class ExperimentResult(Result):
 
     def page(self, command: str = '') -> Page:
         """Return the page of `pprs next-experiment --report`, with the command that plays it."""
-        from pprs_dynamics.app.report.experiment_page import excitation_page, experiment_page
+        from pprs_dynamics.app.report.experiment_report import excitation_page, experiment_page
 
         if isinstance(self.design, ArmExcitation):
             return excitation_page(self.design)
@@ -99,7 +106,7 @@ class ExperimentResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""
-        from pprs_dynamics.app.report.plots import plot_over_time
+        from pprs_dynamics.app.report.pictures import plot_over_time
 
         motion = self.motion
         assert motion.time is not None
@@ -155,10 +162,7 @@ def next_experiment(
     inputs = Inputs.of(model, recordings, (), topic, progress)
     check_purpose(purpose, inputs.fitted)
     found = inputs.model
-    report = progress or (lambda what, share: None)
-
-    def share_done(share: float) -> None:
-        report('designing', share)
+    share_done = stage(progress, 'designing')
     designed: Experiment | ArmExcitation
     kind = ArmLimits if isinstance(found, ArmModel) else MotionLimits
     if limits is not None and not isinstance(limits, kind):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.front_door.inputs import Model, Progress
+from pprs_dynamics.app.front_door.inputs import Model, Progress, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
@@ -106,7 +106,7 @@ class SimulationResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""
-        from pprs_dynamics.app.report.plots import plot_over_time
+        from pprs_dynamics.app.report.pictures import plot_over_time
 
         names = self.recording.drives
         return plot_over_time(self.recording.time, {
@@ -156,10 +156,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     """
     found = model if isinstance(model, ForceModel) else load_model(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
-    report = progress or (lambda what, share: None)
-
-    def share_done(share: float) -> None:
-        report('simulating', share)
+    share_done = stage(progress, 'simulating')
     if isinstance(found, ArmModel):
         return _simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done)
     if not isinstance(found, DriveModel):

@@ -96,3 +96,24 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     for row in rows:
         table.add_row(*row)
     return table
+
+
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Headings and rows of plain text, for the terminal and for a page."""
+
+
+def plain_rows(table: Table) -> Table:
+    """Return a table whose rows no longer hold what rich would take for markup."""
+    from rich.markup import escape
+
+    headings, rows = table
+    return headings, [tuple(map(escape, row)) for row in rows]
+
+
+def titled_table(title: str, table: Table, right: Collection[int] | None = None,
+                 caption: str | None = None) -> Any:
+    """Return a table of plain text below its title."""
+    from rich.markup import escape
+
+    return text_table(*plain_rows(table), right=right, frame='head', title=escape(title),
+                      caption=caption and escape(caption), caption_justify='left')
