@@ -45,6 +45,26 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
                         'holds several')
 
 
+def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Declare RECORDING… and --topic."""
+    parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
+                        help='rosbag2 folder, .mcap, .db3, .csv or .csv.gz')
+    add_topic(parser)
+
+
+def add_validation(parser: argparse.ArgumentParser,
+                   what: str = 'held-out errors are taken on it') -> None:
+    """Declare --validate."""
+    parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
+                        help=f'a recording that is never fitted: {what}; may be repeated')
+
+
+def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:
+    """Declare --output of a model file."""
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
+                        required=required, help=what)
+
+
 def number(lower: float, upper: float, unit: str = '', above: bool = False,
            ) -> Callable[[str], float]:
     """Return a reader of numbers from `lower`, or above it, to `upper`."""

@@ -8,13 +8,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
-from pprs_dynamics.app.commands.output import tell, write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
+from pprs_dynamics.app.commands import arguments
+from pprs_dynamics.app.commands.input_output import read_inputs, tell, write_json
 from pprs_dynamics.app.front_door.adopt import adopt_all
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.base_fit import require_open_numbers
 
@@ -25,17 +23,16 @@ class OptionsError(PprsError, ValueError):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser)
-    add_validation(parser)
-    add_details(parser)
-    add_report(parser)
+    arguments.add_recordings(parser)
+    arguments.add_validation(parser)
+    arguments.add_details(parser)
+    arguments.add_report(parser)
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
                         help='then fit the base model again beside what was added, as pprs fit '
                         'does: to these recordings, or to those diagnosed')
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
-                        help='model file that --adopt-all writes')
+    arguments.add_model_output(parser, 'model file that --adopt-all writes', required=False)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import MODEL, PAGE, output_file
-from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.arguments import PAGE, add_model_output, output_file
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import ModelError
@@ -26,8 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
     parser.add_argument('--undo', action='store_true', help='take the last step back')
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
-                        help='model file that --undo writes')
+    add_model_output(parser, 'model file that --undo writes', required=False)
     parser.add_argument('--report', metavar='FILE', type=output_file(*PAGE, '.png'),
                         help='draw the falling error: a page (.html) or a picture (.png)')
 

@@ -10,18 +10,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import add_report
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings
+from pprs_dynamics.app.commands.arguments import add_recordings, add_report
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.front_door.inputs import read_checked
 from pprs_dynamics.app.report.mechanism_view import (
     describe_mechanism,
     mechanism_lines,
     write_mechanism_page,
 )
-from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.tables import recording_table
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.recording import describe
 from pprs_dynamics.measurement.files.repeats import find_repeat

@@ -17,7 +17,7 @@ from pprs_dynamics.app.commands.arguments import (
     output_folder,
     whole,
 )
-from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import entries
 from pprs_dynamics.app.fleet.store import Store, arrow
@@ -25,8 +25,7 @@ from pprs_dynamics.app.fleet.survey import AUTO, SurveyJob, requests_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page
-from pprs_dynamics.app.report.progress import counting_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, counting_bar, shown
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model

@@ -9,7 +9,7 @@ import argparse
 import math
 
 from pprs_dynamics.app.commands.arguments import add_report
-from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences, to_dict

@@ -11,8 +11,7 @@ from __future__ import annotations
 import argparse
 import re
 
-from pprs_dynamics.app.commands.arguments import add_topic, whole
-from pprs_dynamics.app.commands.recordings import add_validation
+from pprs_dynamics.app.commands.arguments import add_topic, add_validation, whole
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
