@@ -21,8 +21,8 @@ from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys
-from pprs_dynamics.app.workbench.server.folders import Folders, NotOfferedError
 from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS
+from pprs_dynamics.app.workbench.server.offered import Folders, NotOfferedError
 
 SECRET = 'no business of a browser'
 

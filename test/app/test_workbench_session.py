@@ -24,15 +24,13 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench import session as session_module
+from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.jobs import Cancelled, Job
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
-from pprs_dynamics.app.workbench.server.folders import Folders
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.surveys import Surveys
+from pprs_dynamics.app.workbench.server.offered import Folders, Surveys
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
-from pprs_dynamics.app.workbench.worker_process import EndedError, run_in_process
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps

@@ -13,10 +13,9 @@ import re
 
 from pprs_dynamics.app.commands.arguments import add_topic, add_validation, whole
 from pprs_dynamics.app.front_door.inputs import Inputs
-from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
+from pprs_dynamics.app.workbench.server.offered import Folders, Surveys, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
-from pprs_dynamics.app.workbench.server.surveys import Surveys
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.plain_text import displayed

@@ -8,32 +8,34 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from threading import Lock, RLock
 from typing import Any
 
 from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.workbench.background import Cancelled, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.jobs import Cancelled, Job
-from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed, judged
+from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
 from pprs_dynamics.app.workbench.tick_fits import Tick, TickFits
-from pprs_dynamics.app.workbench.view_stages import following, linear, without_ticks
 from pprs_dynamics.app.workbench.view_state import (
     DriveError,
     Share,
     ViewState,
     effect_to_dict,
     errors_of,
+    following,
+    linear,
     names_of,
     recordings_to_dict,
     units_to_dict,
+    without_ticks,
 )
-from pprs_dynamics.app.workbench.worker_process import run_in_process
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
@@ -448,8 +450,8 @@ class Session:
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
         answer: Adoption = run_in_process(
-            judged, fits.model, request, fits.recordings, inputs.held_out,
-            force, self.diagnosis, report=lambda share: report(0.9 * share))
+            partial(adopt, diagnosis=self.diagnosis), fits.model, request, fits.recordings,
+            inputs.held_out, force, report=lambda share: report(0.9 * share))
         if answer.adopted:
             after = TickFits(inputs.ledger.entered(answer), fits.recordings)
             report(0.95)

@@ -10,6 +10,7 @@ import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,17 +30,19 @@ from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.packing import attached, binary
-from pprs_dynamics.app.workbench.server.request_fields import (
+from pprs_dynamics.app.workbench.server.offered import index_of
+from pprs_dynamics.app.workbench.server.wire import (
     BadRequestError,
+    attached,
+    binary,
     body_of,
     drives_of,
-    index_of,
     number_of,
     range_of,
     revision_of,
     text_of,
 )
+from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
@@ -50,6 +53,18 @@ MOST_POINTS = 20_000  # of a scatter
 HEARTBEAT = 15.0  # [s] between signs of life
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
+
+# What the session is asked to do by POST, with a JSON object; all are answered by the screen.
+CHANGES: dict[str, Callable[[Session, Any], object]] = {
+    'choose': lambda session, body: session.choose(
+        text_of(body, 'effect'), text_of(body, 'key'), number_of(body, 'value'), revision_of(body)),
+    'release': lambda session, body: session.release(text_of(body, 'effect'), revision_of(body)),
+    'adopt': lambda session, body: session.adopt(
+        text_of(body, 'effect'), revision=revision_of(body)),
+    'cancel': lambda session, body: session.cancel(text_of(body, 'kind')),
+    'undo': lambda session, body: session.undo(revision_of(body)),
+    'experiment': lambda session, body: session.next_experiment(number_of(body, 'duration')),
+}
 
 
 def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -> Any:
@@ -130,8 +145,12 @@ class Api:
         """Return what is asked for by POST, with a JSON object."""
         return {'live/set': self.live_set, 'live/take': self.live_take,
                 **{work.__name__: work for work in (
-                    self.tick, self.choose, self.release, self.shares, self.adopt, self.cancel,
-                    self.undo, self.open, self.experiment, self.invite)}}
+                    self.tick, self.shares, self.open, self.invite)},
+                **{name: partial(self._change, change) for name, change in CHANGES.items()}}
+
+    def _change(self, change: Callable[[Session, Any], object], body: Any) -> Response:
+        change(self.hub.the_session, body)
+        return self.screen(body)
 
     def screen(self, query: Any) -> Response:
         """Answer what of the screen changed since a version, the errors now where they did."""
@@ -172,17 +191,6 @@ class Api:
             self.hub.the_session.untick(effect, revision)
         return self.screen(body)
 
-    def choose(self, body: Any) -> Response:
-        """Set a parameter."""
-        self.hub.the_session.choose(text_of(body, 'effect'), text_of(body, 'key'),
-                                    number_of(body, 'value'), revision_of(body))
-        return self.screen(body)
-
-    def release(self, body: Any) -> Response:
-        """Let the fit decide again."""
-        self.hub.the_session.release(text_of(body, 'effect'), revision_of(body))
-        return self.screen(body)
-
     def shares(self, body: Any) -> Response:
         """Say what unticked effects explain in a brush, and when that was."""
         session = self.hub.the_session
@@ -195,26 +203,6 @@ class Api:
         return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
-
-    def adopt(self, body: Any) -> Response:
-        """Begin the held-out check."""
-        self.hub.the_session.adopt(text_of(body, 'effect'), revision=revision_of(body))
-        return self.screen(body)
-
-    def cancel(self, body: Any) -> Response:
-        """Call work off."""
-        self.hub.the_session.cancel(text_of(body, 'kind'))
-        return self.screen(body)
-
-    def undo(self, body: Any) -> Response:
-        """Take the last step back."""
-        self.hub.the_session.undo(revision_of(body))
-        return self.screen(body)
-
-    def experiment(self, body: Any) -> Response:
-        """Begin to design the next experiment."""
-        self.hub.the_session.next_experiment(number_of(body, 'duration'))
-        return self.screen(body)
 
     def experiment_file(self, query: Any) -> Response:
         """Answer the poses, or the joints' positions, of the designed motion."""

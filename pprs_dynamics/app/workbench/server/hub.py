@@ -20,8 +20,7 @@ from typing import Any, Protocol
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.change_log import ChangeLog
-from pprs_dynamics.app.workbench.server.folders import ENDINGS, Folders
-from pprs_dynamics.app.workbench.server.surveys import PREFIX, Surveys
+from pprs_dynamics.app.workbench.server.offered import ENDINGS, PREFIX, Folders, Surveys
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel

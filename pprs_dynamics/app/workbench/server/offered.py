@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings in the folders that were given on the command line, and in nothing beside them."""
+"""Recordings that browsers may open: of folders and surveys of the command line, and no others."""
 
 from __future__ import annotations
 
@@ -10,18 +10,21 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from pprs_dynamics.app.workbench.server.request_fields import index_of
+from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.numbers import parse_whole
 from pprs_dynamics.system.plain_text import displayed
 
 ENDINGS = ('.csv', '.mcap', '.db3')
 METADATA = 'metadata.yaml'  # makes a folder a rosbag2 recording
 MOST_LISTED, DEEPEST = 2000, 6
+PREFIX = 'survey'  # of names of recordings that a survey knows
 
 
 class NotOfferedError(PprsError, ValueError):
-    """A recording that is not in a folder of the command line."""
+    """A recording that is in no folder and no survey of the command line."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +83,92 @@ class Folders:
                               'that were given')
 
 
+def index_of(text: str, count: int) -> int | None:
+    """Return a place in a list of so many entries, None where the text is none."""
+    with suppress(ValueError):
+        at = parse_whole(text)
+        return at if at < count else None
+    return None
+
+
 def is_folder(path: str) -> bool:
     """Return whether a path is a folder that holds recordings, and none itself."""
     # An empty name would be the present folder, which nobody named.
     return bool(path) and Path(path).is_dir() and not (
         (Path(path) / METADATA).exists() or any(Path(path).glob('*.db3')))
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """One recording of a survey.
+
+    Parameters
+    ----------
+    path : Path
+    robot, recording, time, verdict : str
+        As the store has them.
+    """
+
+    path: Path
+    robot: str
+    recording: str
+    time: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Surveys:
+    """Recordings that surveys name, as far as they are there.
+
+    Parameters
+    ----------
+    recordings : tuple of Surveyed
+        By robot, the latest first.
+    """
+
+    recordings: tuple[Surveyed, ...] = ()
+
+    @classmethod
+    def of(cls, paths: Sequence[str]) -> Surveys:
+        """Return those of the paths that are stores of `pprs survey`.
+
+        Raises
+        ------
+        PprsError
+            Where a store cannot be read.
+        """
+        found: dict[Path, Surveyed] = {}
+        for path in paths:
+            if not is_store(path):
+                continue
+            rows = Store(path).read(['robot', 'recording', 'path', 'time', 'verdict']).to_pylist()
+            for row in sorted(rows, key=lambda row: str(row['time']), reverse=True):
+                there = Path(row['path'] or '')
+                if row['path'] and there.exists() and there not in found:
+                    found[there] = Surveyed(there, row['robot'] or '', row['recording'] or '',
+                                            str(row['time'] or '')[:19], row['verdict'] or '')
+        return cls(tuple(sorted(found.values(), key=lambda one: one.robot))[:MOST_LISTED])
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return what may be opened."""
+        return [{'name': f'{PREFIX}/{number}', 'robot': displayed(one.robot),
+                 'recording': displayed(one.recording), 'time': one.time, 'verdict': one.verdict}
+                for number, one in enumerate(self.recordings)]
+
+    def path(self, name: str) -> Path:
+        """Return the path of a name from `listed`.
+
+        Raises
+        ------
+        NotOfferedError
+            For any other.
+        """
+        at = index_of(name.partition('/')[2], len(self.recordings))
+        if at is not None:
+            return self.recordings[at].path
+        raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the surveys')
+
+
+def is_store(path: str) -> bool:
+    """Return whether a path is a store of `pprs survey`."""
+    return Path(path).is_dir() and any(Path(path).glob('robot=*'))

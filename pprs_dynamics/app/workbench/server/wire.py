@@ -1,17 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Validation of the fields of requests.
+"""What goes over the wire: fields of requests, checked, and answers in binary.
 
-Every function raises `BadRequestError`.
+Every function that reads a field raises `BadRequestError`. An answer is a JSON header with arrays
+for typed arrays, or a file to download.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from starlette.responses import Response
+
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 
 MOST_DIGITS = 25  # of a number: a float has 17, and its exponent
@@ -72,12 +78,6 @@ def drives_of(body: Any) -> list[str] | None:
     return value
 
 
-def index_of(text: str, count: int) -> int | None:
-    """Return a place in a list of so many entries, None where the text is none."""
-    is_place = text.isascii() and text.isdecimal() and len(text) <= MOST_DIGITS
-    return int(text) if is_place and int(text) < count else None
-
-
 def _number(text: str) -> float:
     if len(text) > MOST_DIGITS or not math.isfinite(float(text)):
         raise ValueError(text)
@@ -88,3 +88,27 @@ def _is_number(value: Any, rule: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise BadRequestError(rule)
     return value
+
+
+def packed(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> bytes:
+    """Return the length of the header (uint32), the header, and float32 arrays; little-endian.
+
+    The header gets `arrays`: name and shape of each, in order. What is not known is NaN.
+    """
+    parts = [np.ascontiguousarray(array, dtype='<f4') for array in arrays.values()]
+    shapes = [{'name': name, 'shape': part.shape}
+              for name, part in zip(arrays, parts, strict=True)]
+    text = json.dumps({**header, 'arrays': shapes}, allow_nan=False).encode()
+    text += b' ' * (-len(text) % 4)  # so that numbers begin at a multiple of their size
+    return b''.join((len(text).to_bytes(4, 'little'), text, *(part.tobytes() for part in parts)))
+
+
+def binary(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Response:
+    """Return an answer of a header and numbers."""
+    return Response(packed(header, arrays), media_type='application/octet-stream')
+
+
+def attached(name: str, kind: str, content: bytes) -> Response:
+    """Return a file that the browser saves."""
+    return Response(content, media_type=kind, headers={
+        'Content-Disposition': f'attachment; filename="{name}"'})
