@@ -27,10 +27,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 class RefusedError(PprsError, ValueError):
@@ -99,7 +96,7 @@ class AdoptionResult(Result):
                              replace(self.inputs.files, model=saved_as).command(
                                  'diagnose', held_out=True))
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per parameter: its value, std and unit."""
         found = self.adoption.parameters
         return data_frame([{'value': one.value, 'std': one.std, 'unit': one.unit}
@@ -174,7 +171,7 @@ class AdoptionRunResult(Result):
         return history_page('the adopted model', read_steps(self.model.values),
                             common_effort(self.model.units))
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
         return data_frame([
             {'effect': one.effect, 'adopted': one.adopted, 'error_before': one.error_before,

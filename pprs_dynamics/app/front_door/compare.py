@@ -27,10 +27,7 @@ from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -123,7 +120,7 @@ class ComparisonResult(Result):
             write_text(written[-1], layout(self.residuals.drives))
         return written
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
         drives = self.comparison.drives
         return data_frame([{'rms': one.rms, 'relative': one.relative, 'bias': one.bias,

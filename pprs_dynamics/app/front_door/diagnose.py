@@ -22,10 +22,7 @@ from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -77,7 +74,7 @@ class DiagnosisResult(Result):
             self.diagnosis, self._words, after, [one.name for one in self.inputs.fitted],
             [one.name for one in self.inputs.held_out], self._rivals, what_if(self.diagnosis))
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
         return data_frame([
             {'effect': found.name, 'parameter': key, 'value': one.value, 'std': one.std,

@@ -17,10 +17,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -70,7 +67,7 @@ class FitResult(Result):
         return fit_page(self.inputs.model, self.fit, [one.name for one in self.inputs.fitted],
                         [one.name for one in self.inputs.held_out])
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per fitted number: before, after, std, unit."""
         return data_frame([one.to_dict() for one in self.fit.numbers])
 

@@ -32,10 +32,7 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 RATE = 100.0  # [Hz], the default of play_trajectory
 
@@ -97,7 +94,7 @@ class ExperimentResult(Result):
             return excitation_page(self.design)
         return experiment_page(self.design, self.motion, command)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per pair of effects: what a diagnosis would say if the first were true."""
         if isinstance(self.design, ArmExcitation):
             return data_frame([{'limit': name, 'use': share}

@@ -27,10 +27,7 @@ from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 RATE = 500.0  # [Hz], of the 3-PPRS
 NOISE = 0.08  # [N], of its efforts
@@ -95,7 +92,7 @@ class SimulationResult(Result):
         assert isinstance(self.model, (DriveModel, ArmModel))
         return robot_page(self.model, self.motion, 'The simulated motion')
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""
         drives = describe(self.recording).drives
         return data_frame([{'lowest_position': one.position[0],
