@@ -30,7 +30,7 @@ from pprs_dynamics.app.workbench.long_work import DesignedMotion
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Folders, Surveys
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
+from pprs_dynamics.app.workbench.views import EXACT, FITTED, LINEAR
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps

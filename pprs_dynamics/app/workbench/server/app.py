@@ -31,19 +31,9 @@ from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import index_of
-from pprs_dynamics.app.workbench.server.wire import (
-    BadRequestError,
-    attached,
-    binary,
-    body_of,
-    drives_of,
-    number_of,
-    range_of,
-    revision_of,
-    text_of,
-)
+from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
 from pprs_dynamics.app.workbench.session import Session
-from pprs_dynamics.app.workbench.view_state import units_to_dict
+from pprs_dynamics.app.workbench.views import units_to_dict
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
 
@@ -55,15 +45,14 @@ VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
 
 # What the session is asked to do by POST, with a JSON object; all are answered by the screen.
-CHANGES: dict[str, Callable[[Session, Any], object]] = {
+CHANGES: dict[str, Callable[[Session, Fields], object]] = {
     'choose': lambda session, body: session.choose(
-        text_of(body, 'effect'), text_of(body, 'key'), number_of(body, 'value'), revision_of(body)),
-    'release': lambda session, body: session.release(text_of(body, 'effect'), revision_of(body)),
-    'adopt': lambda session, body: session.adopt(
-        text_of(body, 'effect'), revision=revision_of(body)),
-    'cancel': lambda session, body: session.cancel(text_of(body, 'kind')),
-    'undo': lambda session, body: session.undo(revision_of(body)),
-    'experiment': lambda session, body: session.next_experiment(number_of(body, 'duration')),
+        body.text('effect'), body.text('key'), body.number('value'), body.revision()),
+    'release': lambda session, body: session.release(body.text('effect'), body.revision()),
+    'adopt': lambda session, body: session.adopt(body.text('effect'), revision=body.revision()),
+    'cancel': lambda session, body: session.cancel(body.text('kind')),
+    'undo': lambda session, body: session.undo(body.revision()),
+    'experiment': lambda session, body: session.next_experiment(body.number('duration')),
 }
 
 
@@ -99,12 +88,12 @@ def in_thread(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[
     return endpoint
 
 
-def with_body(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[Response]]:
+def with_body(work: Callable[[Fields], Response]) -> Callable[[Request], Awaitable[Response]]:
     """Return an endpoint that takes a JSON object."""
     async def endpoint(request: Request) -> Response:
         if request.headers.get('content-type') != 'application/json':
             raise BadRequestError('the body must be application/json')
-        return await run_in_threadpool(work, body_of(await request.body()))
+        return await run_in_threadpool(work, Fields.of(await request.body()))
     return endpoint
 
 
@@ -141,14 +130,14 @@ class Api:
                 'experiment.csv': self.experiment_file, **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
-    def changes(self) -> dict[str, Callable[[Any], Response]]:
+    def changes(self) -> dict[str, Callable[[Fields], Response]]:
         """Return what is asked for by POST, with a JSON object."""
         return {'live/set': self.live_set, 'live/take': self.live_take,
                 **{work.__name__: work for work in (
                     self.tick, self.shares, self.open, self.invite)},
                 **{name: partial(self._change, change) for name, change in CHANGES.items()}}
 
-    def _change(self, change: Callable[[Session, Any], object], body: Any) -> Response:
+    def _change(self, change: Callable[[Session, Fields], object], body: Fields) -> Response:
         change(self.hub.the_session, body)
         return self.screen(body)
 
@@ -182,24 +171,24 @@ class Api:
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
                  'before': session.before.T, 'measured': data.measured.T})
 
-    def tick(self, body: Any) -> Response:
+    def tick(self, body: Fields) -> Response:
         """Tick or untick an effect."""
-        effect, revision = text_of(body, 'effect'), revision_of(body)
+        effect, revision = body.text('effect'), body.revision()
         if body.get('is_ticked', True):
-            self.hub.the_session.tick(effect, drives_of(body), revision)
+            self.hub.the_session.tick(effect, body.drives(), revision)
         else:
             self.hub.the_session.untick(effect, revision)
         return self.screen(body)
 
-    def shares(self, body: Any) -> Response:
+    def shares(self, body: Fields) -> Response:
         """Say what unticked effects explain in a brush, and when that was."""
         session = self.hub.the_session
         if 'x' in body:
-            mask = session.region(text_of(body, 'x'), text_of(body, 'y'), range_of(body, 'x_range'),
-                                  range_of(body, 'y_range'), text_of(body, 'drive'))
+            mask = session.region(body.text('x'), body.text('y'), body.range('x_range'),
+                                  body.range('y_range'), body.text('drive'))
         else:
             drive = body.get('drive')
-            mask = session.span(*range_of(body, 'time'), None if drive is None else [str(drive)])
+            mask = session.span(*body.range('time'), None if drive is None else [str(drive)])
         return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
@@ -257,9 +246,9 @@ class Api:
         return JSONResponse({'files': self.hub.folders.listed(),
                              'surveyed': self.hub.surveys.listed()})
 
-    def open(self, body: Any) -> Response:
+    def open(self, body: Fields) -> Response:
         """Open a recording of the folders and surveys that were given."""
-        self.hub.open(self.hub.offered(text_of(body, 'name')), body.get('is_held_out') is True)
+        self.hub.open(self.hub.offered(body.text('name')), body.get('is_held_out') is True)
         return self.screen(body)
 
     async def upload(self, request: Request) -> Response:
@@ -272,7 +261,7 @@ class Api:
             await run_in_threadpool(self.hub.open, path, held_out)
         return await run_in_threadpool(self.screen, request.query_params)
 
-    def invite(self, body: Any) -> Response:
+    def invite(self, body: Fields) -> Response:
         """Answer an address for one more browser."""
         return JSONResponse({'address': self.keys.address})
 
@@ -280,11 +269,11 @@ class Api:
         """Answer how live data stand."""
         return JSONResponse(self._live.to_dict())
 
-    def live_set(self, body: Any) -> Response:
+    def live_set(self, body: Fields) -> Response:
         """Set the model with the ticked effects on the running nodes."""
         return JSONResponse({'nodes': self._live.set_model(self.hub.the_session.ticked_model())})
 
-    def live_take(self, body: Any) -> Response:
+    def live_take(self, body: Fields) -> Response:
         """Make what came in last a recording of the session."""
         with self.hub.upload('live.csv') as path:
             self._live.take(path)

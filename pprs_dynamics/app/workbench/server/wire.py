@@ -3,8 +3,7 @@
 
 """What goes over the wire: fields of requests, checked, and answers in binary.
 
-Every function that reads a field raises `BadRequestError`. An answer is a JSON header with arrays
-for typed arrays, or a file to download.
+An answer is a JSON header with arrays for typed arrays, or a file to download.
 """
 
 from __future__ import annotations
@@ -27,55 +26,54 @@ class BadRequestError(PprsError, ValueError):
     """A request that is not what the page sends."""
 
 
-def body_of(content: bytes) -> dict[str, Any]:
-    """Return the fields of a JSON object, all numbers finite and all text Unicode."""
-    try:
-        body = json.loads(content, parse_int=lambda text: int(_number(text)),
-                          parse_float=_number, parse_constant=_number)
-        json.dumps(body, ensure_ascii=False).encode()  # raises for lone surrogates
-    except (ValueError, RecursionError):
-        raise BadRequestError('the body is no JSON of finite numbers and of text') from None
-    if not isinstance(body, dict):
-        raise BadRequestError('the body must be an object')
-    return body
+class Fields(dict[str, Any]):
+    """Fields of a request. What reads one raises `BadRequestError` for any other."""
 
+    @classmethod
+    def of(cls, content: bytes) -> Fields:
+        """Return the fields of a JSON object, all numbers finite and all text Unicode."""
+        try:
+            body = json.loads(content, parse_int=lambda text: int(_number(text)),
+                              parse_float=_number, parse_constant=_number)
+            json.dumps(body, ensure_ascii=False).encode()  # raises for lone surrogates
+        except (ValueError, RecursionError):
+            raise BadRequestError('the body is no JSON of finite numbers and of text') from None
+        if not isinstance(body, dict):
+            raise BadRequestError('the body must be an object')
+        return cls(body)
 
-def text_of(body: Any, key: str) -> str:
-    """Return a text."""
-    value = body.get(key)
-    if not isinstance(value, str):
-        raise BadRequestError(f'{key} must be a text')
-    return value
+    def text(self, key: str) -> str:
+        """Return a text."""
+        value = self.get(key)
+        if not isinstance(value, str):
+            raise BadRequestError(f'{key} must be a text')
+        return value
 
+    def number(self, key: str) -> float:
+        """Return a number."""
+        return float(_is_number(self.get(key), f'{key} must be a number'))
 
-def number_of(body: Any, key: str) -> float:
-    """Return a number."""
-    return float(_is_number(body.get(key), f'{key} must be a number'))
+    def range(self, key: str) -> tuple[float, float]:
+        """Return two numbers."""
+        value, rule = self.get(key), f'{key} must be two numbers'
+        if not isinstance(value, list) or len(value) != 2:
+            raise BadRequestError(rule)
+        return float(_is_number(value[0], rule)), float(_is_number(value[1], rule))
 
+    def revision(self) -> int:
+        """Return the revision that a change counts on."""
+        value = _is_number(self.get('revision'), 'revision must be a whole number')
+        if value != int(value):
+            raise BadRequestError('revision must be a whole number')
+        return int(value)
 
-def range_of(body: Any, key: str) -> tuple[float, float]:
-    """Return two numbers."""
-    value, rule = body.get(key), f'{key} must be two numbers'
-    if not isinstance(value, list) or len(value) != 2:
-        raise BadRequestError(rule)
-    return float(_is_number(value[0], rule)), float(_is_number(value[1], rule))
-
-
-def revision_of(body: Any) -> int:
-    """Return the revision that a change counts on."""
-    value = _is_number(body.get('revision'), 'revision must be a whole number')
-    if value != int(value):
-        raise BadRequestError('revision must be a whole number')
-    return int(value)
-
-
-def drives_of(body: Any) -> list[str] | None:
-    """Return names of drives, None where none are given."""
-    value = body.get('drives')
-    if value is not None and not (isinstance(value, list) and value and all(
-            isinstance(name, str) for name in value)):
-        raise BadRequestError('drives must be a list of names')
-    return value
+    def drives(self) -> list[str] | None:
+        """Return names of drives, None where none are given."""
+        value = self.get('drives')
+        if value is not None and not (isinstance(value, list) and value and all(
+                isinstance(name, str) for name in value)):
+            raise BadRequestError('drives must be a list of names')
+        return value
 
 
 def _number(text: str) -> float:
