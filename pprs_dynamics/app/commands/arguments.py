@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.system.numbers import parse_number, parse_whole
 from pprs_dynamics.system.output_files import writable_file
 from pprs_dynamics.system.plain_text import displayed
@@ -26,6 +26,10 @@ OUTPUTS = ('output', 'json', 'report', 'mcap')
 INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
+
+
+class UsageError(PprsError, ValueError):
+    """Arguments that do not go together, or that what was read does not have."""
 
 
 def add_details(parser: argparse.ArgumentParser, what: str = 'print all there is to say') -> None:

@@ -13,12 +13,7 @@ from pprs_dynamics.app.commands.input_output import read_inputs, tell, write_jso
 from pprs_dynamics.app.front_door.adopt import adopt_all
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.base_fit import require_open_numbers
-
-
-class OptionsError(PprsError, ValueError):
-    """Options that do not go together."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,11 +68,11 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
 
 def _check(options: argparse.Namespace) -> None:
     if options.adopt_all and not options.output:
-        raise OptionsError('--adopt-all: no --output FILE is given, must say where the new '
-                           'model file goes')
+        raise arguments.UsageError('--adopt-all: no --output FILE is given, must say where the '
+                                   'new model file goes')
     if options.refit is not None and not options.adopt_all:
-        raise OptionsError('--refit: it is given without --adopt-all, which adds what the base '
-                           'model is fitted again beside')
+        raise arguments.UsageError('--refit: it is given without --adopt-all, which adds what the '
+                                   'base model is fitted again beside')
     if options.output and not options.adopt_all:
-        raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '
-                           'it then; --json and --report write the answer')
+        raise arguments.UsageError('--output: it is given without --adopt-all, but nothing is '
+                                   'written to it then; --json and --report write the answer')

@@ -12,6 +12,7 @@ from typing import Any
 
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
+    UsageError,
     add_report,
     add_topic,
     output_folder,
@@ -26,7 +27,6 @@ from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, counting_bar, shown
-from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
@@ -34,10 +34,6 @@ from pprs_dynamics.system.plain_text import displayed
 
 MOST_SHOWN = 10  # errors
 MOST_WORKERS = 1024
-
-
-class SurveyError(PprsError, ValueError):
-    """Arguments that do not go together."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     model_of = lru_cache(maxsize=None)(_model)
     base, _ = model_of(options.model)
     if options.effects != AUTO and not requests_of(options.effects, base):
-        raise SurveyError(f'--effects {options.effects!r}: must be auto or names of effects')
+        raise UsageError(f'--effects {options.effects!r}: must be auto or names of effects')
 
     def jobs() -> Iterator[SurveyJob]:
         for entry in entries(options.recordings, options.manifest):
@@ -77,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
     total = sum(1 for _ in entries(options.recordings, options.manifest))
     if not total:
-        raise SurveyError(f'{options.manifest}: no recording is listed')
+        raise UsageError(f'{options.manifest}: no recording is listed')
     store = Store(options.output)
     store.begin()
     done, failures = _run(options, screen, jobs(), total, store)
@@ -119,7 +115,7 @@ def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[SurveyJob], to
 
 def _check(options: argparse.Namespace) -> None:
     if not options.recordings and not options.manifest:
-        raise SurveyError('no recording is given, must be RECORDING… or --manifest')
+        raise UsageError('no recording is given, must be RECORDING… or --manifest')
 
 
 def _model(path: str) -> tuple[ForceModel, str]:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from rich.console import Group
 from rich.markup import escape
-from rich.panel import Panel
 
 from pprs_dynamics.app.report.diagnosis_figures import (
     add_contributions,
@@ -20,7 +19,7 @@ from pprs_dynamics.app.report.diagnosis_figures import (
     curve_with_band,
 )
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import Table, titled_table
+from pprs_dynamics.app.report.terminal import Table, titled_table, verdict_panel
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain, with_uncertainty
@@ -62,11 +61,10 @@ def _brief(answer: Adoption) -> Iterator[Any]:
         yield f'[yellow]![/] {escape(remark)}'
 
 
-def _verdict(answer: Adoption) -> Panel:
+def _verdict(answer: Adoption) -> Any:
     word, colour = (('refused', 'red') if not answer.adopted else
                     ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
-    return Panel(escape(headline(answer)), title=f'[bold {colour}]{word}[/]', border_style=colour,
-                 title_align='left')
+    return verdict_panel(word, colour, headline(answer))
 
 
 def headline(answer: Adoption) -> str:

@@ -137,9 +137,8 @@ def comparison_page(
                             'standard deviations under the noise.')
     if command and comparison.is_beyond_noise:
         page.command('Find out which physical effect is missing', command)
-    if len(statements) > FIRST:
-        with page.fold(f'{len(statements) - FIRST} more places'):
-            page.bullets([one.text for one in statements[FIRST:]])
+    page.folded_list(f'{len(statements) - FIRST} more places',
+                     [one.text for one in statements[FIRST:]])
     with page.fold('Drive by drive'):
         page.table(*drives_table(comparison),
                    [drive.grade for drive in comparison.drives.values()])
@@ -153,13 +152,10 @@ def comparison_page(
                     residuals, drive)), f'{name}: effort, model and their difference.',
                     over_time=True)
     _by_drive(page, residuals, comparison)
-    with page.fold('How it was computed'):
-        page.bullets(notes)
+    page.folded_list('How it was computed', notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
-    if findings:
-        with page.fold('What is wrong with the recordings'):
-            page.bullets(findings)
+    page.folded_list('What is wrong with the recordings', findings)
     return page
 
 

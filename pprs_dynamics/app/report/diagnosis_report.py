@@ -15,12 +15,11 @@ from typing import Any
 from rich.console import Group
 from rich.markup import escape
 from rich.padding import Padding
-from rich.panel import Panel
 from rich.table import Table
 
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import text_table
+from pprs_dynamics.app.report.terminal import text_table, verdict_panel
 from pprs_dynamics.app.report.what_if_part import add_what_if
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.error_steps import ErrorStep, error_steps
@@ -82,7 +81,7 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
 
 def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
-    yield _verdict(diagnosis, words)
+    yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
     if diagnosis.effects:
         yield text_table(_headings(diagnosis), _effect_rows(diagnosis)[:MOST_EFFECTS],
                          right=(2, 3, 4), whole=(0, 2, 3, 4), frame='none')
@@ -116,14 +115,8 @@ def _following(words: Sentences) -> Iterator[Any]:
         yield f'  [bold cyan]{escape(words.command)}[/]'
 
 
-def _verdict(diagnosis: Diagnosis, words: Sentences) -> Panel:
-    colour = COLOURS[diagnosis.verdict]
-    return Panel(escape(words.headline), title=f'[bold {colour}]{diagnosis.verdict}[/]',
-                 border_style=colour, title_align='left')
-
-
 def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
-    yield _verdict(diagnosis, words)
+    yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
     if diagnosis.effects:
         held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
                 else 'blocks of the same recordings')
@@ -247,9 +240,7 @@ def diagnosis_page(
         _errors(page, diagnosis, steps)
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
-    if words.warnings:
-        with page.fold('Warnings', is_open=True):
-            page.bullets(words.warnings)
+    page.folded_list('Warnings', words.warnings, is_open=True)
     if system is not None:
         add_what_if(page, system, diagnosis.residuals)
     _findings(page, diagnosis, words, rivals)
@@ -310,12 +301,8 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
                             for one in group]
                 page.card(finding.title, finding_lines(finding),
                           [(figure, text) for figure, text in pictures if figure is not None])
-    for title, lines in (('Suspects: effects that slow noise would explain as well',
-                          words.suspects), ('Within the model error of what was found',
-                                            words.within_model_error)):
-        if lines:
-            with page.fold(title):
-                page.bullets(lines)
+    page.folded_list('Suspects: effects that slow noise would explain as well', words.suspects)
+    page.folded_list('Within the model error of what was found', words.within_model_error)
 
 
 def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
@@ -367,6 +354,4 @@ def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
             page.table(('effect', 'drive', 'symbol', '± two standard deviations', 'parameter'),
                        [(one.effect, one.drive, one.parameter.symbol, one.text,
                          one.parameter.description) for one in values])
-    if words.calibrated:
-        with page.fold('Numbers of the model that moved within their tolerance'):
-            page.bullets(words.calibrated)
+    page.folded_list('Numbers of the model that moved within their tolerance', words.calibrated)

@@ -117,6 +117,12 @@ class Page:
         items = ''.join(f'<li>{escape(line)}</li>' for line in lines)
         self._body.append(f'<{tag}>{items}</{tag}>')
 
+    def folded_list(self, title: str, lines: Sequence[str], is_open: bool = False) -> None:
+        """Add a list behind a title that opens it, if there is anything in it."""
+        if lines:
+            with self.fold(title, is_open):
+                self.bullets(lines)
+
     def table(
         self, headings: Sequence[str], rows: Iterable[Sequence[str]],
         grades: Sequence[str] = (), caption: str = '',

@@ -56,6 +56,15 @@ def as_html(view: Any, width: int) -> str:
     return screen.export_html(inline_styles=True, code_format=HTML)
 
 
+def verdict_panel(word: str, colour: str, text: str) -> Any:
+    """Return an answer in a frame, its one word above it."""
+    from rich.markup import escape
+    from rich.panel import Panel
+
+    return Panel(escape(text), title=f'[bold {colour}]{word}[/]', border_style=colour,
+                 title_align='left')
+
+
 def shown(name: object) -> str:
     """Return a name, or other text from data, for a line that may hold rich's markup."""
     from rich.markup import escape
