@@ -160,19 +160,17 @@ def examine(job: SurveyJob, content: str | None) -> SurveyResult:
     key, path = job.key(content or job.entry.path), job.entry.path
     try:
         with local_copy(job.entry.path) as path:
-            rows = _examined(job, path, common)
+            rows, failed = _examined(job, path, common), False
     except PprsError as error:
         # A copy's name says nothing to anybody.
-        text = str(error).replace(path, job.entry.path)
+        text = displayed(str(error).replace(path, job.entry.path))
         # What could not even be read may be there the next time.
-        return SurveyResult(key, [{**common, 'error': displayed(text),
-                                   'seconds': perf_counter() - began}], failed=content is None)
+        rows, failed = [{**common, 'error': text}], content is None
     except Exception as error:  # of the package itself, but no end of a survey
-        return SurveyResult(key, [{
-            **common, 'seconds': perf_counter() - began,
-            'error': f'unexpected {type(error).__name__}: {error}'}], failed=True)
+        text = f'unexpected {type(error).__name__}: {error}'
+        rows, failed = [{**common, 'error': text}], True
     seconds = perf_counter() - began
-    return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows])
+    return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows], failed)
 
 
 def lost(job: SurveyJob, content: str | None, reason: str) -> SurveyResult:
@@ -201,17 +199,14 @@ def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[st
     summary = describe(recording)
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}
-    common = {**common, 'duration': summary.duration}
-    found = _judged(model, recording, job)
-    rows, residuals, noise, verdict = found
-    common = {**common, 'verdict': verdict}
-    drives = _drives(residuals, noise)
-    quantities = [{'drive': drive, **numbers} for drive, numbers in drives.items()]
-    return [{**common, **row} for row in quantities] + [
+    rows, drives, verdict = _judged(model, recording, job)
+    common = {**common, 'duration': summary.duration, 'verdict': verdict}
+    return [{**common, 'drive': drive, **numbers} for drive, numbers in drives.items()] + [
         {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
 
 
-Examined = tuple[list[dict[str, Any]], Residuals, Mapping[str, float], str]
+Examined = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
+"""Rows of values, numbers by drive, and the verdict."""
 
 
 def _judged(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
@@ -223,13 +218,15 @@ def _judged(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined
         _refuse_mistakes(model, recording, job)
         return _diagnosed(model, recording)
     try:
-        found = _fitted(model, recording, job)
+        rows, residuals, noise = fit_named_effects(model, recording,
+                                                   requests_of(job.options, model))
     except PprsError:
         _refuse_mistakes(model, recording, job)
         raise
-    if any(one['relative'] > SUSPECT for one in _drives(found[1], found[2]).values()):
+    drives = _drives(residuals, noise)
+    if any(one['relative'] > SUSPECT for one in drives.values()):
         _refuse_mistakes(model, recording, job)
-    return found
+    return rows, drives, FITTED
 
 
 def _refuse_mistakes(model: ForceModel, recording: Recording, job: SurveyJob) -> None:
@@ -250,13 +247,6 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
     return found
 
 
-def _fitted(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
-    fit = fit_named_effects(model, recording, requests_of(job.options, model))
-    drives = fit.design.drives
-    return (fit.rows, fit.design.residuals, {drives[d]: one for d, one in fit.noise.items()},
-            FITTED)
-
-
 def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
     diagnosis = diagnose(model, [recording])
     rows: list[dict[str, Any]] = []
@@ -268,4 +258,4 @@ def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
                          'evidence': effect.evidence})
     rows += [{'effect': OWN, 'parameter': one.label, 'value': one.after, 'std': one.std,
               'unit': one.unit} for one in diagnosis.calibrated]
-    return rows, diagnosis.residuals, diagnosis.noise_floors, diagnosis.verdict
+    return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict

@@ -14,6 +14,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 from itertools import count
 from threading import Event, Thread
 from typing import Any, BinaryIO, Generic, TypeVar
@@ -50,10 +51,9 @@ class Job(Generic[Result]):
                  changed: Callable[[Job[Any]], None] | None = None) -> None:
         self.kind, self.what, self.share = kind, what, 0.0
         self.number = next(NUMBERS)
-        self.error: BaseException | None = None
-        self._result: Result | None = None
+        self._future: Future[Result] = Future()
         self._work, self._changed = work, changed or (lambda job: None)
-        self._cancel, self._ended = Event(), Event()
+        self._cancel = Event()
         self._thread = Thread(target=self._run, name=f'{kind} {what}', daemon=True)
 
     def start(self) -> Job[Result]:
@@ -64,7 +64,12 @@ class Job(Generic[Result]):
     @property
     def is_running(self) -> bool:
         """True until it has ended, however."""
-        return not self._ended.is_set()
+        return not self._future.done()
+
+    @property
+    def error(self) -> BaseException | None:
+        """What it ended with, if that was no result."""
+        return None if self.is_running else self._future.exception()
 
     @property
     def is_cancelled(self) -> bool:
@@ -87,11 +92,9 @@ class Job(Generic[Result]):
         PprsError
             As the work.
         """
-        if not self._ended.wait(timeout):
+        if not wait([self._future], timeout).done:
             raise TimeoutError(f'{self.kind} {self.what} has not ended after {timeout:g} s')
-        if self.error is not None:
-            raise self.error
-        return self._result  # type: ignore[return-value]
+        return self._future.result()
 
     def to_dict(self) -> dict[str, Any]:
         """Return how it stands."""
@@ -114,10 +117,9 @@ class Job(Generic[Result]):
     def _run(self) -> None:
         try:
             self._report(0.0)
-            self._result = self._work(self._report)
+            self._future.set_result(self._work(self._report))
         except BaseException as error:  # raised again by `result`
-            self.error = error
-        self._ended.set()
+            self._future.set_exception(error)
         self._changed(self)
 
 
