@@ -28,7 +28,7 @@ from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, r
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.offered import Folders, Surveys
+from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.views import EXACT, FITTED, LINEAR
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
@@ -302,7 +302,7 @@ def test_a_recording_that_is_opened_while_the_first_are_read_comes_on_top(
         return session
 
     monkeypatch.setattr(Session, 'of', slow)
-    hub = Hub(session.inputs, Folders.of([]), Surveys.of([]))
+    hub = Hub(session.inputs, Offered.of([]))
     loop = asyncio.new_event_loop()
     hub.start(loop)
     try:

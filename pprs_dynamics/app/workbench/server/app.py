@@ -148,7 +148,7 @@ class Api:
             session, count = hub.session, hub.count
             state = {'generation': hub.generation, 'failure': hub.failure,
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
-                     'has_folders': bool(hub.folders.roots or hub.surveys.recordings),
+                     'has_folders': bool(hub.offered.folders or hub.offered.surveyed),
                      'is_empty': session is None,
                      **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
             state['drawn'] = [state.get(key) for key in ('generation', 'revision', 'stage')]
@@ -243,12 +243,12 @@ class Api:
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
-        return JSONResponse({'files': self.hub.folders.listed(),
-                             'surveyed': self.hub.surveys.listed()})
+        return JSONResponse({'files': self.hub.offered.in_folders(),
+                             'surveyed': self.hub.offered.in_surveys()})
 
     def open(self, body: Fields) -> Response:
         """Open a recording of the folders and surveys that were given."""
-        self.hub.open(self.hub.offered(body.text('name')), body.get('is_held_out') is True)
+        self.hub.open(self.hub.offered.path(body.text('name')), body.get('is_held_out') is True)
         return self.screen(body)
 
     async def upload(self, request: Request) -> Response:

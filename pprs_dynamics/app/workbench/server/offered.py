@@ -28,25 +28,62 @@ class NotOfferedError(PprsError, ValueError):
 
 
 @dataclass(frozen=True)
-class Folders:
-    """Folders in which the browser may choose.
+class Surveyed:
+    """One recording of a survey.
 
     Parameters
     ----------
-    roots : tuple of Path
+    path : Path
+    robot, recording, time, verdict : str
+        As the store has them.
     """
 
-    roots: tuple[Path, ...]
+    path: Path
+    robot: str
+    recording: str
+    time: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Offered:
+    """What browsers may choose from.
+
+    Parameters
+    ----------
+    folders : tuple of Path
+        With all recordings in them.
+    surveyed : tuple of Surveyed
+        Recordings that surveys name, as far as they are there; by robot, the latest first.
+    """
+
+    folders: tuple[Path, ...] = ()
+    surveyed: tuple[Surveyed, ...] = ()
 
     @classmethod
-    def of(cls, paths: Sequence[str]) -> Folders:
-        """Return those of the paths that are folders and no recordings themselves."""
-        return cls(tuple(Path(path) for path in paths if is_folder(path)))
+    def of(cls, paths: Sequence[str]) -> Offered:
+        """Return what is in those of the paths that are folders and no recordings themselves.
 
-    def listed(self) -> list[str]:
+        Raises
+        ------
+        PprsError
+            Where a store of `pprs survey` cannot be read.
+        """
+        found: dict[Path, Surveyed] = {}
+        for path in filter(is_store, paths):
+            rows = Store(path).read(['robot', 'recording', 'path', 'time', 'verdict']).to_pylist()
+            for row in sorted(rows, key=lambda row: str(row['time']), reverse=True):
+                there = Path(row['path'] or '')
+                if row['path'] and there.exists() and there not in found:
+                    found[there] = Surveyed(there, row['robot'] or '', row['recording'] or '',
+                                            str(row['time'] or '')[:19], row['verdict'] or '')
+        return cls(tuple(Path(path) for path in paths if is_folder(path)),
+                   tuple(sorted(found.values(), key=lambda one: one.robot))[:MOST_LISTED])
+
+    def in_folders(self) -> list[str]:
         """Return what may be opened, each as `number/path within its folder`."""
         found: list[str] = []
-        for number, root in enumerate(self.roots):
+        for number, root in enumerate(self.folders):
             for place, folders, files in os.walk(root):
                 inside = Path(place).relative_to(root)
                 if METADATA in files:
@@ -62,8 +99,14 @@ class Folders:
                     return found[:MOST_LISTED]
         return found
 
+    def in_surveys(self) -> list[dict[str, Any]]:
+        """Return what may be opened, each with a name for it."""
+        return [{'name': f'{PREFIX}/{number}', 'robot': displayed(one.robot),
+                 'recording': displayed(one.recording), 'time': one.time, 'verdict': one.verdict}
+                for number, one in enumerate(self.surveyed)]
+
     def path(self, name: str) -> Path:
-        """Return the path of a name from `listed`.
+        """Return the path of a name of `in_folders` or `in_surveys`.
 
         Raises
         ------
@@ -71,9 +114,14 @@ class Folders:
             For any other, by whatever way it leads outside: `..`, an absolute path, a link.
         """
         number, _, inside = name.partition('/')
-        at = index_of(number, len(self.roots))
+        if number == PREFIX:
+            at = index_of(inside, len(self.surveyed))
+            if at is not None:
+                return self.surveyed[at].path
+            raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the surveys')
+        at = index_of(number, len(self.folders))
         if at is not None and inside:
-            root = self.roots[at].resolve()
+            root = self.folders[at].resolve()
             # Too long, or with characters that no file system has.
             with suppress(OSError, ValueError):
                 path = (root / inside).resolve()
@@ -96,77 +144,6 @@ def is_folder(path: str) -> bool:
     # An empty name would be the present folder, which nobody named.
     return bool(path) and Path(path).is_dir() and not (
         (Path(path) / METADATA).exists() or any(Path(path).glob('*.db3')))
-
-
-@dataclass(frozen=True)
-class Surveyed:
-    """One recording of a survey.
-
-    Parameters
-    ----------
-    path : Path
-    robot, recording, time, verdict : str
-        As the store has them.
-    """
-
-    path: Path
-    robot: str
-    recording: str
-    time: str
-    verdict: str
-
-
-@dataclass(frozen=True)
-class Surveys:
-    """Recordings that surveys name, as far as they are there.
-
-    Parameters
-    ----------
-    recordings : tuple of Surveyed
-        By robot, the latest first.
-    """
-
-    recordings: tuple[Surveyed, ...] = ()
-
-    @classmethod
-    def of(cls, paths: Sequence[str]) -> Surveys:
-        """Return those of the paths that are stores of `pprs survey`.
-
-        Raises
-        ------
-        PprsError
-            Where a store cannot be read.
-        """
-        found: dict[Path, Surveyed] = {}
-        for path in paths:
-            if not is_store(path):
-                continue
-            rows = Store(path).read(['robot', 'recording', 'path', 'time', 'verdict']).to_pylist()
-            for row in sorted(rows, key=lambda row: str(row['time']), reverse=True):
-                there = Path(row['path'] or '')
-                if row['path'] and there.exists() and there not in found:
-                    found[there] = Surveyed(there, row['robot'] or '', row['recording'] or '',
-                                            str(row['time'] or '')[:19], row['verdict'] or '')
-        return cls(tuple(sorted(found.values(), key=lambda one: one.robot))[:MOST_LISTED])
-
-    def listed(self) -> list[dict[str, Any]]:
-        """Return what may be opened."""
-        return [{'name': f'{PREFIX}/{number}', 'robot': displayed(one.robot),
-                 'recording': displayed(one.recording), 'time': one.time, 'verdict': one.verdict}
-                for number, one in enumerate(self.recordings)]
-
-    def path(self, name: str) -> Path:
-        """Return the path of a name from `listed`.
-
-        Raises
-        ------
-        NotOfferedError
-            For any other.
-        """
-        at = index_of(name.partition('/')[2], len(self.recordings))
-        if at is not None:
-            return self.recordings[at].path
-        raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the surveys')
 
 
 def is_store(path: str) -> bool:
