@@ -12,13 +12,7 @@ import argparse
 
 import numpy as np
 
-from pprs_dynamics.app.commands.arguments import (
-    RECORDING,
-    add_report,
-    number,
-    output_file,
-    seed,
-)
+from pprs_dynamics.app.commands.arguments import RECORDING, add_report, number, output_file, seed
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar

@@ -19,7 +19,7 @@ from pprs_dynamics.app.report.diagnosis_figures import (
     curve_with_band,
 )
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import Table, titled_table, verdict_panel
+from pprs_dynamics.app.report.terminal import PlainTable, titled_table, verdict_panel
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain, with_uncertainty
@@ -83,7 +83,7 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
             for key, one in answer.parameters.items() if one.value != 0.0]
 
 
-def errors_table(answer: Adoption, first: str) -> Table:
+def errors_table(answer: Adoption, first: str) -> PlainTable:
     """Return what was measured on, errors before and after, and their change."""
     held = ('validation recordings' if answer.held_out_on == VALIDATION
             else 'held-out blocks of the recordings')

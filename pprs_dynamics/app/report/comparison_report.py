@@ -14,7 +14,7 @@ from rich.markup import escape
 
 from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import Table, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, text_table
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -28,7 +28,7 @@ MOST_LINES, LINE = 9, 70
 EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 
-def drives_table(comparison: Comparison) -> Table:
+def drives_table(comparison: Comparison) -> PlainTable:
     """Return the numbers of every drive; the page shows all of them, the terminal the first."""
     headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')
     return ('drive', *(f'{name} [{comparison.unit}]' if name in EFFORTS else name

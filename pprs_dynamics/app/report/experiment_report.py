@@ -13,7 +13,7 @@ from rich.markup import escape
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.robot_view import animate_robot
-from pprs_dynamics.app.report.terminal import Table, titled_table
+from pprs_dynamics.app.report.terminal import PlainTable, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
 from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
@@ -28,14 +28,14 @@ MOST_SHOWN = 12
 HIGH = 0.5  # use of a limit, from which on it is shown
 
 
-def contests_table(experiment: Experiment) -> Table:
+def contests_table(experiment: Experiment) -> PlainTable:
     """Return pairs of effects with their evidence, now and expected."""
     return ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance'), [
         (one.truth, one.rival, f'{one.now:.0f}', f'{one.expected:.0f}', f'{one.probability:.0%}')
         for one in experiment.contests]
 
 
-def accuracies_table(experiment: Experiment) -> Table:
+def accuracies_table(experiment: Experiment) -> PlainTable:
     """Return numbers with their standard deviations, before and after."""
     return ('number', 'before', 'after', 'matters from', 'unit'), [
         (one.label, _number(one.before), _number(one.after), f'{one.scale:.3g}', one.unit)

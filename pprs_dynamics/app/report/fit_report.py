@@ -14,7 +14,7 @@ from rich.console import Group
 from rich.markup import escape
 
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import Table, plain_rows, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, plain_rows, text_table
 from pprs_dynamics.inference.diagnosis.quantities import plain, sentence
 from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -24,7 +24,7 @@ HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
             VALIDATION: 'the validation recordings'}
 
 
-def errors_table(model: ForceModel, fit: BaseFit) -> Table:
+def errors_table(model: ForceModel, fit: BaseFit) -> PlainTable:
     """Return drives, units, errors before, after and held out."""
     return ('drive', 'unit', 'before', 'after', 'held out'), [
         (drive, unit.effort, plain(fit.before[drive]), plain(fit.after[drive]),
@@ -32,7 +32,7 @@ def errors_table(model: ForceModel, fit: BaseFit) -> Table:
         for drive, unit in zip(model.drives, model.units, strict=True) if drive in fit.after]
 
 
-def numbers_table(fit: BaseFit) -> Table:
+def numbers_table(fit: BaseFit) -> PlainTable:
     """Return the fitted numbers."""
     return ('number', 'drive', 'before', 'after', '± two std', 'unit'), [
         (one.key, one.drive, plain(one.before), plain(one.after),

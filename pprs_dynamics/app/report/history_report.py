@@ -18,7 +18,7 @@ from rich.markup import escape
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import BLUE, GREY, RED, finish, new_figure, save
-from pprs_dynamics.app.report.terminal import Table, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, text_table
 from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
 from pprs_dynamics.system.plain_text import counted
@@ -32,7 +32,7 @@ def history_view(steps: Sequence[Step], unit: str = 'N') -> Group:
     return Group(*_parts(steps, unit))
 
 
-def steps_table(steps: Sequence[Step], unit: str) -> Table:
+def steps_table(steps: Sequence[Step], unit: str) -> PlainTable:
     """Return every step with its errors."""
     return ('step', 'effect', 'on', f'error before [{unit}]', f'after [{unit}]',
             f'held out before [{unit}]', f'after [{unit}]', 'held out', 'date'), [

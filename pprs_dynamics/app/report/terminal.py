@@ -108,11 +108,11 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     return table
 
 
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+PlainTable = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings and rows of plain text, for the terminal and for a page."""
 
 
-def plain_rows(table: Table) -> Table:
+def plain_rows(table: PlainTable) -> PlainTable:
     """Return a table whose rows no longer hold what rich would take for markup."""
     from rich.markup import escape
 
@@ -120,7 +120,7 @@ def plain_rows(table: Table) -> Table:
     return headings, [tuple(map(escape, row)) for row in rows]
 
 
-def titled_table(title: str, table: Table, right: Collection[int] | None = None,
+def titled_table(title: str, table: PlainTable, right: Collection[int] | None = None,
                  caption: str | None = None) -> Any:
     """Return a table of plain text below its title."""
     from rich.markup import escape
@@ -135,13 +135,10 @@ def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
 
     Each stage has a bar of its own in place of the one before; none goes back.
     """
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich import progress
 
-    columns = (TextColumn('{task.description}', markup=False), BarColumn(),
-               TextColumn('{task.percentage:3.0f} %'), TimeElapsedColumn())
-    # In a file or a pipe it would leave an empty line.
-    with Progress(*columns, console=console, transient=True,
-                  disable=not console.is_terminal) as bar:
+    with _bar(console, progress.TextColumn('{task.percentage:3.0f} %'),
+              progress.TimeElapsedColumn()) as bar:
         task, stage, furthest = None, '', 0.0
 
         def advance(what: str, share: float) -> None:
@@ -159,24 +156,23 @@ def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
 @contextmanager
 def counting_bar(console: Any, what: str, total: int) -> Iterator[Callable[[], None]]:
     """Show a bar with count, rate and remaining time; call the given function for each done."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        ProgressColumn,
-        Task,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress
     from rich.text import Text
 
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> Text:
+    class Rate(progress.ProgressColumn):
+        def render(self, task: progress.Task) -> Text:
             return Text(f'{60 * task.speed:.0f}/min' if task.speed else '')
 
-    columns = (TextColumn('{task.description}', markup=False), BarColumn(), MofNCompleteColumn(),
-               Rate(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True,
-                  disable=not console.is_terminal) as bar:
+    with _bar(console, progress.MofNCompleteColumn(), Rate(),
+              progress.TimeRemainingColumn()) as bar:
         task = bar.add_task(what, total=total)
         yield lambda: bar.update(task, advance=1)
+
+
+def _bar(console: Any, *columns: Any) -> Any:
+    """Return rich's progress with a bar, and further columns beside it."""
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    # In a file or a pipe it would leave an empty line.
+    return Progress(TextColumn('{task.description}', markup=False), BarColumn(), *columns,
+                    console=console, transient=True, disable=not console.is_terminal)
