@@ -114,11 +114,8 @@ def identify(path: str) -> str | None:
         if system.isdir(within):
             with local_copy(path) as copy:
                 return fingerprint(copy)
-        whole = hashlib.sha256()
         with system.open(within, 'rb') as file:
-            while block := file.read(1 << 20):
-                whole.update(block)
-        return whole.hexdigest()
+            return hashlib.file_digest(file, 'sha256').hexdigest()
     except Exception:  # libraries of file systems raise what they like; examine tells the reason
         return None
 
