@@ -54,8 +54,8 @@ def rows_over_time(count: int, height: int, heights: Sequence[float] | None = No
     return figure
 
 
-def line(x: Any, y: Any, name: str, colour: str, width: float = 1.3, **options: Any) -> Any:
-    """Return a line, or what `options` of Plotly's Scatter make of it."""
+def trace(x: Any, y: Any, name: str, colour: str, width: float = 1.3, **options: Any) -> Any:
+    """Return a trace of a figure: a line, or what options of Plotly's Scatter make of it."""
     return plotly_objects().Scatter(**{
         'x': x, 'y': y, 'name': name, 'mode': 'lines', 'line': {'color': colour, 'width': width},
         **options})

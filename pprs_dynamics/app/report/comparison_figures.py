@@ -57,8 +57,8 @@ def effort_over_error(residuals: Residuals, drive: int, time: Array, efforts: Se
         for label, values, colour in curves:
             # Errors of models that are named above need no names of their own.
             figure.add_trace(
-                charts.line(time, values, label, colour, hovertemplate=charts.hover(units),
-                            showlegend=row == 1 or len(errors) == 1), row=row, col=1)
+                charts.trace(time, values, label, colour, hovertemplate=charts.hover(units),
+                             showlegend=row == 1 or len(errors) == 1), row=row, col=1)
     return figure
 
 
@@ -103,9 +103,9 @@ def _means(profile: Profile, variable: str, residuals: Residuals, drive: str,
            meta: Any = None) -> Any:
     factor, unit = read_in(variable, residuals.units_of(variable.partition(' of ')[2] or drive))
     effort = charts.hover(residuals.units_of(drive))
-    return charts.line(
-        factor * middles(profile), profile.mean, 'mean', charts.ERROR, mode='lines+markers',
-        meta=meta, line={'color': charts.ERROR}, marker={'size': 5},
+    return charts.trace(
+        factor * middles(profile), profile.mean, 'mean', charts.ERROR, 2, mode='lines+markers',
+        meta=meta, marker={'size': 5},
         error_y=charts.deviations(profile.uncertainty),
         hovertemplate=f'%{{x:.4g}} {unit}: {effort}<extra></extra>')
 
@@ -140,9 +140,8 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     factor, label = axis_of(variable, residuals, statement.drive)
     kind = 'rms' if statement.kind == 'scatter' else 'mean'
     trace = (_means(profile, variable, residuals, statement.drive) if kind == 'mean' else
-             charts.line(factor * middles(profile), profile.rms, kind, charts.ERROR,
-                         mode='lines+markers', line={'color': charts.ERROR},
-                         hovertemplate=charts.hover(units)))
+             charts.trace(factor * middles(profile), profile.rms, kind, charts.ERROR, 2,
+                          mode='lines+markers', hovertemplate=charts.hover(units)))
     figure = charts.figure([trace], 300, margin={**charts.MARGIN, 't': 15}, showlegend=False,
                            xaxis_title=label,
                            yaxis_title=f'{kind} {what} on {statement.drive} [{units.effort}]')
@@ -170,8 +169,8 @@ def _line(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
     found = error_spectrum(residuals, residuals.drives.index(statement.drive), noise)
     keep = found.frequency > 0
     figure = _over_frequency(
-        [charts.line(found.frequency[keep], power[keep], name, colour, 1.2,
-                     hovertemplate=f'%{{y:.3g}} {unit}')
+        [charts.trace(found.frequency[keep], power[keep], name, colour, 1.2,
+                      hovertemplate=f'%{{y:.3g}} {unit}')
          for name, power, colour in (('error', found.power, charts.ERROR),
                                      ('noise', found.background, charts.MEASURED))],
         300, f'{what} on {statement.drive} [{unit}]')
@@ -244,8 +243,8 @@ def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
         unit = _power(residuals.units_of(name).effort)
         for label, values, colour in (('error', power, charts.ERROR),
                                       ('noise', background, charts.MEASURED)):
-            traces.append(charts.line(frequency, values, f'{name}: {label}', colour, 1.2,
-                                      meta={'drive': name}, hovertemplate=f'%{{y:.3g}} {unit}'))
+            traces.append(charts.trace(frequency, values, f'{name}: {label}', colour, 1.2,
+                                       meta={'drive': name}, hovertemplate=f'%{{y:.3g}} {unit}'))
     return _over_frequency(traces, 360, f'power [{_power(residuals.unit)}]')
 
 

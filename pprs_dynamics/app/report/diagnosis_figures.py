@@ -75,14 +75,14 @@ def curve_with_band(answer: Adoption) -> Any:
     y, band = curve.force(x), 2 * answer.curve.band(x)
     units = after.units_of(answer.request.drive)
     return charts.figure([
-        charts.line(factor * seen[shown], left[shown], 'without it', OTHER, mode='markers',
-                    marker={'size': 3, 'color': OTHER}, hoverinfo='skip'),
-        charts.line(factor * np.concatenate((x, x[::-1])),
-                    np.concatenate((y + band, (y - band)[::-1])), 'two standard deviations',
-                    AFTER, 0, fill='toself', fillcolor='rgba(0, 158, 115, 0.25)',
-                    hoverinfo='skip'),
-        charts.line(factor * x, y, 'measured curve', AFTER, 1.5,
-                    hovertemplate=charts.hover(units))],
+        charts.trace(factor * seen[shown], left[shown], 'without it', OTHER, mode='markers',
+                     marker={'size': 3, 'color': OTHER}, hoverinfo='skip'),
+        charts.trace(factor * np.concatenate((x, x[::-1])),
+                     np.concatenate((y + band, (y - band)[::-1])), 'two standard deviations',
+                     AFTER, 0, fill='toself', fillcolor='rgba(0, 158, 115, 0.25)',
+                     hoverinfo='skip'),
+        charts.trace(factor * x, y, 'measured curve', AFTER, 1.5,
+                     hovertemplate=charts.hover(units))],
         300, xaxis_title=label, yaxis_title=f'{answer.request.drive} [{units.effort}]')
 
 
@@ -103,7 +103,7 @@ def contributions(residuals: Residuals, forces: dict[str, Any]) -> Any:
             continue
         time, *curves = curves_of(residuals, *acting.values())
         for name, values, colour in zip(acting, curves, cycle(charts.LINES), strict=False):
-            traces.append(charts.line(
+            traces.append(charts.trace(
                 time, values, name, colour, showlegend=True, meta={'drive': drive_name},
                 hovertemplate=charts.hover(residuals.units_of(drive_name))))
     return charts.figure(traces, 320, hovermode='x unified', xaxis=TIME,
@@ -137,17 +137,17 @@ def effect_pictures(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
         factor, label = axis_of(part.variable, residuals, drive)
         x = factor * middles(part.profile)
         figures.append((charts.figure([
-            charts.line(x, part.profile.mean, without, charts.MEASURED, mode='markers',
-                        marker={'color': charts.MEASURED, 'size': 6}, hovertemplate=hover,
-                        error_y=charts.deviations(part.profile.uncertainty)),
-            charts.line(x, part.fitted, found.name, charts.MODEL, 2, hovertemplate=hover)],
+            charts.trace(x, part.profile.mean, without, charts.MEASURED, mode='markers',
+                         marker={'color': charts.MEASURED, 'size': 6}, hovertemplate=hover,
+                         error_y=charts.deviations(part.profile.uncertainty)),
+            charts.trace(x, part.fitted, found.name, charts.MODEL, 2, hovertemplate=hover)],
             320, xaxis_title=label, **layout),
             f'{found.name} on {drive}: means over bins with two standard deviations, and the '
             'fitted effect.'))
     time = residuals.time[part.span]
     figures.append((charts.figure([
-        charts.line(time, values[part.span].astype(np.float32), name, colour, width,
-                    hovertemplate=hover)
+        charts.trace(time, values[part.span].astype(np.float32), name, colour, width,
+                     hovertemplate=hover)
         for name, values, colour, width in ((without, part.error, charts.MEASURED, 1.0),
                                             (found.name, part.force, charts.MODEL, 2.0))],
         320, xaxis=TIME, **layout), f'{found.name} on {drive}, where it changes most.'))

@@ -155,8 +155,8 @@ def _stacked(motion: Motion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...
             time, shown = charts.thinned(motion.time, values, points=POINTS)
             is_new = name not in colours
             colour = colours.setdefault(name, charts.LINES[len(colours) % len(charts.LINES)])
-            figure.add_trace(charts.line(time, shown, name, colour, legendgroup=name,
-                                         showlegend=is_new), row=row, col=1)
+            figure.add_trace(charts.trace(time, shown, name, colour, legendgroup=name,
+                                          showlegend=is_new), row=row, col=1)
         figure.update_yaxes(title_text=label, row=row, col=1)
     return figure
 

@@ -147,8 +147,8 @@ def falling_error_by_drive(steps: Sequence[Step], unit: str) -> Any:
         if all(drive in step.measured for step in steps):
             errors = [steps[0].drive_errors_before[number],
                       *(step.drive_errors_after[step.measured.index(drive)] for step in steps)]
-            traces.append(charts.line(labels, errors, drive, colour, mode='lines+markers',
-                                      hovertemplate=f'%{{y:.3f}} {unit}', line={'color': colour}))
+            traces.append(charts.trace(labels, errors, drive, colour, 2, mode='lines+markers',
+                                       hovertemplate=f'%{{y:.3f}} {unit}'))
     return charts.figure(traces, 360, yaxis={'title': f'error, rms [{unit}]',
                                              'rangemode': 'tozero'})
 

@@ -65,21 +65,16 @@ class Offer:
     Parameters
     ----------
     candidate : EffectCandidate
-    gain, price : float
-        By which the penalised deviance would fall at the noise as it is, and what it costs.
+    gain, evidence : float
+        By which the penalised deviance would fall at the noise as it is; and less its price.
     residual : (M, D) array
         What would be left [N].
     """
 
     candidate: EffectCandidate
     gain: float
-    price: float
+    evidence: float
     residual: Array = field(repr=False)
-
-    @property
-    def evidence(self) -> float:
-        """Gain less price."""
-        return self.gain - self.price
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,9 +188,8 @@ class TickFits:
     def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
         """Return what one candidate would gain beside a set at its noise."""
         more = self.at((*found.effects, candidate), found)
-        gain = found.fit.deviance - more.fit.deviance
-        evidence = found.total - more.total
-        return Offer(candidate, gain, gain - evidence, self.residual(more).astype(np.float32))
+        return Offer(candidate, found.fit.deviance - more.fit.deviance, found.total - more.total,
+                     self.residual(more).astype(np.float32))
 
     def with_chosen(self, tick: Tick) -> EffectCandidate:
         """Return a tick's candidate in the shapes that somebody chose."""
