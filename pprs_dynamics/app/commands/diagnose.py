@@ -14,6 +14,7 @@ from pprs_dynamics.app.front_door.adopt import adopt_all
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.fit.base_fit import require_open_numbers
+from pprs_dynamics.system.plain_text import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,7 +63,7 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
         result.save(options.output)
         if result.refit is not None:
             screen.print(result.refit.reason)
-        screen.print(f'model, {count} effect{"s" * (count != 1)} added: {shown(options.output)}')
+        screen.print(f'model, {counted(count, "effect")} added: {shown(options.output)}')
     return int(result.refused)
 
 

@@ -9,8 +9,6 @@ import argparse
 import math
 import shlex
 
-from rich.markup import escape
-
 from pprs_dynamics.app.commands.arguments import (
     POSES,
     add_recordings,
@@ -21,7 +19,7 @@ from pprs_dynamics.app.commands.arguments import (
 )
 from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.next_experiment import RATE, next_experiment
-from pprs_dynamics.app.report.terminal import console, staged_bar
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import (
@@ -89,10 +87,10 @@ def run(options: argparse.Namespace) -> int:
     tell(result, options, screen, lambda: result.page(command), output=options.output)
     result.save(options.output)
     if command:
-        screen.print(f'[bold]play it[/]: {escape(command)}')
+        screen.print(f'[bold]play it[/]: {shown(command)}')
     else:
-        screen.print(f'[bold]play it[/] with a controller of joint trajectories: {escape(PLAYED)} '
-                     f'stand in {escape(options.output)}')
+        screen.print(f'[bold]play it[/] with a controller of joint trajectories: {PLAYED} '
+                     f'stand in {shown(options.output)}')
     return 0
 
 

@@ -30,7 +30,7 @@ from pprs_dynamics.app.report.terminal import console, counting_bar, shown
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import counted, displayed
 
 MOST_SHOWN = 10  # errors
 MOST_WORKERS = 1024
@@ -59,7 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    _check(options)
+    if not options.recordings and not options.manifest:
+        raise UsageError('no recording is given, must be RECORDING… or --manifest')
     arrow()
     model_of = lru_cache(maxsize=None)(_model)
     base, _ = model_of(options.model)
@@ -82,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     if len(failures) > MOST_SHOWN:
         screen.print(f'… and {len(failures) - MOST_SHOWN} more, in the store')
     earlier = total - done - len(failures)
-    screen.print(f'{total} recording{"s" * (total != 1)}: {done} done, {earlier} done before, '
+    screen.print(f'{counted(total, "recording")}: {done} done, {earlier} done before, '
                  f'{len(failures)} without a result; store: {shown(options.output)}')
     if options.json:
         write_json(options.json, {
@@ -111,11 +112,6 @@ def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[SurveyJob], to
                 failures.append((displayed(result.rows[0]['recording']), result.error or ''))
             advance()
     return done, failures
-
-
-def _check(options: argparse.Namespace) -> None:
-    if not options.recordings and not options.manifest:
-        raise UsageError('no recording is given, must be RECORDING… or --manifest')
 
 
 def _model(path: str) -> tuple[ForceModel, str]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.report.terminal import text_table
+from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
     from pprs_dynamics.drives import DriveUnits
@@ -49,7 +50,7 @@ def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str])
           f'{found.measured:.1%}') for drive in drives for found in [summary.drives[drive]]],
         caption=escape(summary.source), title=escape(
             f'{summary.name}: {summary.used} of {summary.samples} samples in '
-            f'{len(summary.segments)} segment{"s" * (len(summary.segments) != 1)}, '
+            f'{counted(len(summary.segments), "segment")}, '
             f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
 
 
