@@ -23,7 +23,6 @@ from pprs_dynamics.app.report.terminal import text_table, verdict_panel
 from pprs_dynamics.app.report.what_if_part import add_what_if
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.error_steps import ErrorStep, error_steps
-from pprs_dynamics.inference.diagnosis.found_effects import RankedEffect
 from pprs_dynamics.inference.diagnosis.quantities import (
     in_unit,
     listed,
@@ -134,8 +133,9 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
                      [(cost, escape(text)) for text, cost in set_rows(diagnosis)])
     if diagnosis.candidates:
         yield _table('Each effect alone', (
-            'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'),
-                     [_ranked(one, diagnosis) for one in diagnosis.candidates], right=(2, 3))
+            'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'), [
+            (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
+             f'{one.error_after:.3f}') for one in diagnosis.candidates], right=(2, 3))
     yield from _list('Within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
     yield from _list('Within model error', words.within_model_error, 'blue')
@@ -184,11 +184,6 @@ def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
     if places:
         return listed([listed(names, 'or') for names in places])
     return EVERYWHERE if drives is None else name_drives(drives, diagnosis.residuals.drives)
-
-
-def _ranked(one: RankedEffect, diagnosis: Diagnosis) -> tuple[str, ...]:
-    return (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
-            f'{one.error_after:.3f}')
 
 
 def _fall(before: float, after: float) -> str:
