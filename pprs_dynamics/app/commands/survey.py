@@ -21,8 +21,8 @@ from pprs_dynamics.app.commands.arguments import (
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import entries
-from pprs_dynamics.app.fleet.store import Store, arrow
-from pprs_dynamics.app.fleet.survey import AUTO, SurveyJob, requests_of
+from pprs_dynamics.app.fleet.store import AUTO, Store, arrow
+from pprs_dynamics.app.fleet.survey import SurveyJob, requests_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page

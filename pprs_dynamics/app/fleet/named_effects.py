@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.app.fleet.store import OWN
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
@@ -25,8 +26,6 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
-
-OWN = 'model'  # stands for an effect's name in rows of the model's own numbers
 
 
 def fit_named_effects(model: ForceModel, recording: Recording,

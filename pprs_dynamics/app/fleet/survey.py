@@ -24,8 +24,8 @@ import numpy as np
 
 from pprs_dynamics import __version__
 from pprs_dynamics.app.fleet.manifest import ManifestEntry, filesystem, is_remote
-from pprs_dynamics.app.fleet.named_effects import OWN, fit_named_effects
-from pprs_dynamics.app.fleet.store import key_of
+from pprs_dynamics.app.fleet.named_effects import fit_named_effects
+from pprs_dynamics.app.fleet.store import AUTO, OWN, key_of
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -39,7 +39,6 @@ from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
-AUTO = 'auto'
 FITTED = 'fitted'  # the verdict where only named effects were fitted
 # Of the model's error over the changing effort on a drive, beyond which units, signs and order of
 # drives are looked at: wrong ones leave as much as the effort or more.

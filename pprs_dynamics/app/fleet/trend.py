@@ -18,9 +18,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.fleet.changes import NORMAL, Change, Changes, find_changes
-from pprs_dynamics.app.fleet.named_effects import OWN
-from pprs_dynamics.app.fleet.store import Store
-from pprs_dynamics.app.fleet.survey import AUTO
+from pprs_dynamics.app.fleet.store import AUTO, OWN, Store
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import find_effect
 
