@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     if options.undo != bool(options.output):
         raise ModelError('--output', options.output, 'be given with --undo, and only then')
     screen = console()
-    # What draws is imported here, where rich is known to be there.
+    # Here, as --help draws nothing.
     from pprs_dynamics.app.report.history_report import draw_history, history_page, history_view
 
     base = find_file(options.file)

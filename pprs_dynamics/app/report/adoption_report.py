@@ -9,8 +9,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from rich.console import Group
-from rich.markup import escape
 
 from pprs_dynamics.app.report.diagnosis_figures import (
     add_contributions,
@@ -19,7 +17,13 @@ from pprs_dynamics.app.report.diagnosis_figures import (
     curve_with_band,
 )
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import PlainTable, titled_table, verdict_panel
+from pprs_dynamics.app.report.terminal import (
+    PlainTable,
+    escape,
+    stacked,
+    titled_table,
+    verdict_panel,
+)
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain, with_uncertainty
@@ -32,16 +36,16 @@ MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2
 
 
-def adoption_view(answer: Adoption, details: bool = False) -> Group:
+def adoption_view(answer: Adoption, details: bool = False) -> Any:
     """Return what the terminal shows, most important first; all there is with `details`."""
-    return Group(*(_parts if details else _brief)(answer))
+    return stacked(*(_parts if details else _brief)(answer))
 
 
-def run_view(run: AdoptionRun, details: bool = False) -> Group:
+def run_view(run: AdoptionRun, details: bool = False) -> Any:
     """Return what was adopted and refused, a line each, or all of each, and why it ended."""
     steps = [adoption_view(step, True) if details else escape(headline(step))
              for step in run.steps]
-    return Group(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
+    return stacked(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
 
 
 def _brief(answer: Adoption) -> Iterator[Any]:

@@ -9,12 +9,9 @@ from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any
 
-from rich.console import Group
-from rich.markup import escape
-
 from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import PlainTable, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -68,7 +65,7 @@ def comparison_view(comparison: Comparison, command: str, details: bool = False,
                   f'  [bold cyan]{escape(command)}[/]']
     if beside is not None:
         parts.append(_beside_table(comparison, beside))
-    return Group(*parts)
+    return stacked(*parts)
 
 
 def _beside_table(comparison: Comparison, beside: Beside) -> Any:

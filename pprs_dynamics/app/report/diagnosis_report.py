@@ -12,14 +12,9 @@ from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import Any
 
-from rich.console import Group
-from rich.markup import escape
-from rich.padding import Padding
-from rich.table import Table
-
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import text_table, verdict_panel
+from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
 from pprs_dynamics.app.report.what_if_part import add_what_if
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.error_steps import ErrorStep, error_steps
@@ -60,7 +55,7 @@ METHOD = (
 
 
 def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
-                   next_step: bool = True) -> Group:
+                   next_step: bool = True) -> Any:
     """Return what the terminal shows, most important first.
 
     Parameters
@@ -73,7 +68,7 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
     next_step : bool
         Whether the command to go on with is told; not where it runs already.
     """
-    return Group(*(_parts if details else _brief)(diagnosis, words),
+    return stacked(*(_parts if details else _brief)(diagnosis, words),
                  *(_following(words) if next_step else ()),
                  *(() if details else (ELSEWHERE,)))
 
@@ -162,14 +157,17 @@ def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
     return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
 
 
-def _finding(number: int, finding: Finding) -> Padding:
+def _finding(number: int, finding: Finding) -> Any:
+    from rich.padding import Padding
+    from rich.table import Table
+
     grid = Table.grid(padding=(0, 1))
     grid.add_column(style='bold', width=8)
     grid.add_column(ratio=1)
     for label, text in finding_lines(finding):
         grid.add_row(label, escape(text))
     title = f'[bold]{number}. {escape(finding.title)}[/]'
-    return Padding(Group(title, Padding(grid, (0, 0, 0, 3))), (0, 0, 1, 0))
+    return Padding(stacked(title, Padding(grid, (0, 0, 0, 3))), (0, 0, 1, 0))
 
 
 def finding_lines(finding: Finding) -> list[tuple[str, str]]:
@@ -192,6 +190,8 @@ def _fall(before: float, after: float) -> str:
 
 
 def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
+    from rich.table import Table
+
     if lines:
         yield f'[bold {colour}]{title}[/]'
         for line in lines:

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.console import Group
-from rich.markup import escape
-
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.robot_view import animate_robot
-from pprs_dynamics.app.report.terminal import PlainTable, titled_table
+from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
 from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
@@ -65,12 +62,12 @@ def experiment_view(experiment: Experiment) -> Any:
     used = [row for row in limit_rows(experiment) if float(row[1].rstrip(' %')) >= 100 * HIGH]
     parts.append('limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share}' for name, share in used[:6]) + '; all others less')
-    return Group(*parts)
+    return stacked(*parts)
 
 
 def excitation_view(excitation: ArmExcitation) -> Any:
     """Return what an arm's first motion is for, and which limits it uses."""
-    return Group(escape(excitation.text), 'limits, of what their margin leaves: ' + ', '.join(
+    return stacked(escape(excitation.text), 'limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 

@@ -10,11 +10,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group
-from rich.markup import escape
-
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import PlainTable, plain_rows, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import plain, sentence
 from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -44,7 +41,7 @@ def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
     errors = text_table(*plain_rows(errors_table(model, fit)), right=(2, 3, 4),
                         title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
     numbers = [text_table(*plain_rows(numbers_table(fit)), right=(2, 3, 4))] if details else []
-    return Group(errors, *map(escape, fit.told), *numbers)
+    return stacked(errors, *map(escape, fit.told), *numbers)
 
 
 def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],

@@ -12,13 +12,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group
-from rich.markup import escape
-
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.pictures import BLUE, GREY, RED, finish, new_figure, save
-from pprs_dynamics.app.report.terminal import PlainTable, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
 from pprs_dynamics.system.plain_text import counted
@@ -27,9 +24,9 @@ MOST_LISTED = 3  # numbers of the model that a line names
 BAR = 24  # characters, of the largest error
 
 
-def history_view(steps: Sequence[Step], unit: str = 'N') -> Group:
+def history_view(steps: Sequence[Step], unit: str = 'N') -> Any:
     """Return the ledger: the error's fall first, then what each step was made from."""
-    return Group(*_parts(steps, unit))
+    return stacked(*_parts(steps, unit))
 
 
 def steps_table(steps: Sequence[Step], unit: str) -> PlainTable:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.report.terminal import text_table
+from pprs_dynamics.app.report.terminal import escape, stacked, text_table
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 def claims_table(claims: Iterable[Claim]) -> Any:
     """Return the paper's claims against what comes out."""
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table(title='The paper\'s claims, and what comes out', show_lines=True)
@@ -40,8 +39,6 @@ def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
 
 
 def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
-    from rich.markup import escape
-
     position = units.of('m')
     return text_table(
         ('drive', f'position [{position}]', f'velocity [{position}/s]', f'effort [{units.effort}]',
@@ -60,9 +57,6 @@ def _span(bounds: tuple[float, float] | None) -> str:
 
 def simulation_view(samples: int, rate: float, hidden: int, notes: Iterable[Note]) -> Any:
     """Return what a simulation made and what happened on the way; not what was hidden."""
-    from rich.console import Group
-    from rich.markup import escape
-
-    return Group(*(f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}'
+    return stacked(*(f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}'
                    for note in notes),
                  f'{samples} samples at {rate:g} Hz, {hidden} hidden effect{"s" * (hidden != 1)}')

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
@@ -19,10 +20,8 @@ HTML = '<pre style="line-height:1.2;white-space:pre;overflow-x:auto">{code}</pre
 
 def console(**options: Any) -> Any:
     """Return rich's console, or raise MissingLibraryError."""
-    try:
-        from rich.console import Console
-    except ImportError:
-        raise MissingLibraryError('rich', 'showing tables', 'report') from None
+    _rich('console')  # or says what is missing
+    from rich.console import Console
 
     class PlainConsole(Console):
         """Puts plain characters in place before widths are counted, so that tables stay even."""
@@ -33,6 +32,24 @@ def console(**options: Any) -> Any:
 
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False, **options)
+
+
+def _rich(name: str) -> Any:
+    """Return a module of rich, or raise MissingLibraryError."""
+    try:
+        return import_module(f'rich.{name}')
+    except ImportError:
+        raise MissingLibraryError('rich', 'showing tables', 'report') from None
+
+
+def escape(text: str) -> str:
+    """Return a text in which rich finds no markup."""
+    return str(_rich('markup').escape(text))
+
+
+def stacked(*parts: Any) -> Any:
+    """Return parts of a view, one below the other."""
+    return _rich('console').Group(*parts)
 
 
 def as_text(view: Any, width: int) -> str:
@@ -46,7 +63,7 @@ def as_text(view: Any, width: int) -> str:
 
 def as_html(view: Any, width: int) -> str:
     """Return what the terminal would show as HTML, with its colours."""
-    console()  # says what is missing
+    _rich('console')  # or says what is missing
     from rich.console import Console
 
     # In a notebook rich would show it at once, too.
@@ -58,17 +75,12 @@ def as_html(view: Any, width: int) -> str:
 
 def verdict_panel(word: str, colour: str, text: str) -> Any:
     """Return an answer in a frame, its one word above it."""
-    from rich.markup import escape
-    from rich.panel import Panel
-
-    return Panel(escape(text), title=f'[bold {colour}]{word}[/]', border_style=colour,
-                 title_align='left')
+    return _rich('panel').Panel(escape(text), title=f'[bold {colour}]{word}[/]',
+                                border_style=colour, title_align='left')
 
 
 def shown(name: object) -> str:
     """Return a name, or other text from data, for a line that may hold rich's markup."""
-    from rich.markup import escape
-
     return escape(displayed(name))
 
 
@@ -91,14 +103,10 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     **options
         Of rich's Table.
     """
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-    from rich.table import Table
-
     frames: dict[str, dict[str, Any]] = {
         'box': {}, 'none': {'box': None, 'padding': (0, 1)},
-        'head': {'box': SIMPLE_HEAD, 'title_justify': 'left', 'title_style': 'bold'}}
-    table = Table(**{**frames[frame], **options})
+        'head': {'box': _rich('box').SIMPLE_HEAD, 'title_justify': 'left', 'title_style': 'bold'}}
+    table = _rich('table').Table(**{**frames[frame], **options})
     numbers = range(1, len(headings)) if right is None else right
     for number, heading in enumerate(headings):
         table.add_column(escape(heading), justify='right' if number in numbers else 'left',
@@ -114,8 +122,6 @@ PlainTable = tuple[Sequence[str], Sequence[Sequence[str]]]
 
 def plain_rows(table: PlainTable) -> PlainTable:
     """Return a table whose rows no longer hold what rich would take for markup."""
-    from rich.markup import escape
-
     headings, rows = table
     return headings, [tuple(map(escape, row)) for row in rows]
 
@@ -123,8 +129,6 @@ def plain_rows(table: PlainTable) -> PlainTable:
 def titled_table(title: str, table: PlainTable, right: Collection[int] | None = None,
                  caption: str | None = None) -> Any:
     """Return a table of plain text below its title."""
-    from rich.markup import escape
-
     return text_table(*plain_rows(table), right=right, frame='head', title=escape(title),
                       caption=caption and escape(caption), caption_justify='left')
 
