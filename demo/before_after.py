@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.report.figures import BLUE, GREY, RED, pyplot_module, save
+from pprs_dynamics.app.report.pictures import BLUE, GREY, RED, new_figure, save
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 SHOWN = 5.0  # [s] of the drive in detail
@@ -41,10 +41,9 @@ def draw_before_after(
     sentence : str
         Heading; it may have several lines.
     """
-    pyplot = pyplot_module()
-    figure, axes = pyplot.subplot_mosaic(
-        [['bars', 'effort'], ['bars', 'error']], figsize=(12, 6), layout='constrained',
-        width_ratios=(2, 3), height_ratios=(3, 2))
+    figure = new_figure(12, 6)
+    axes = figure.subplot_mosaic([['bars', 'effort'], ['bars', 'error']], width_ratios=(2, 3),
+                                 height_ratios=(3, 2))
     curves: Curves = [(before, 'model as it was', RED)]
     if after is not None:
         curves.append((after, 'with the added effect', BLUE))
@@ -55,7 +54,7 @@ def draw_before_after(
         axis.grid(alpha=0.25)
         axis.spines[['top', 'right']].set_visible(False)
     figure.suptitle('\n'.join(fill(line, 135) for line in sentence.splitlines()), fontsize=11)
-    return save(pyplot, figure, path)
+    return save(figure, path)
 
 
 def _draw_bars(axis: Any, curves: Curves, noise: float) -> None:

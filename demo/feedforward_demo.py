@@ -20,7 +20,7 @@ from rich.progress import Progress
 from rich.table import Table
 from ros_processes import executable, node_process, reserve_domain
 
-from pprs_dynamics.app.report.figures import BLUE, GREEN, ORANGE, SKY, pyplot_module, save
+from pprs_dynamics.app.report.pictures import BLUE, GREEN, ORANGE, SKY, new_figure, save
 from pprs_dynamics.drives import DRIVES
 
 PARTS = ('rigid_body', 'active_friction', 'passive_friction')
@@ -152,9 +152,8 @@ def draw_forces(path: Path, time: np.ndarray, total: np.ndarray, parts: dict[str
         `rigid_body`, `active_friction`, `passive_friction` [N].
     title : str
     """
-    pyplot = pyplot_module()
-    figure, axes = pyplot.subplots(4, 3, figsize=(12, 8.5), sharex=True, layout='constrained',
-                                   height_ratios=(2, 1, 2, 1))
+    figure = new_figure(12, 8.5)
+    axes = figure.subplots(4, 3, sharex=True, height_ratios=(2, 1, 2, 1))
     for drive, name in enumerate(DRIVES):
         row, column = 2 * (drive // 3), drive % 3
         upper, lower = axes[row, column], axes[row + 1, column]
@@ -176,7 +175,7 @@ def draw_forces(path: Path, time: np.ndarray, total: np.ndarray, parts: dict[str
     handles = [*axes[0, 0].get_lines(), *axes[1, 0].get_lines()]
     figure.suptitle(title)
     figure.legend(handles=handles, loc='outside lower center', ncols=4, frameon=False)
-    return save(pyplot, figure, path)
+    return save(figure, path)
 
 
 if __name__ == '__main__':

@@ -28,7 +28,7 @@ from rich.progress import track  # noqa: E402
 from ros_processes import executable  # noqa: E402
 
 from pprs_dynamics import DriveModel  # noqa: E402
-from pprs_dynamics.app.report.figures import BLUE, GREY, RED, pyplot_module, save  # noqa: E402
+from pprs_dynamics.app.report.pictures import BLUE, GREY, RED, new_figure, save  # noqa: E402
 from pprs_dynamics.inference.residuals.measuring import measure_residuals  # noqa: E402
 from pprs_dynamics.inference.residuals.residuals import Residuals  # noqa: E402
 from pprs_dynamics.measurement.files.recording import read_recording  # noqa: E402
@@ -122,9 +122,8 @@ def write_page(folder: Path) -> None:
 
 def draw_where(residuals: Residuals) -> None:
     """Draw the error of every drive, and of the worst one against its velocity."""
-    pyplot = pyplot_module()
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4), layout='constrained',
-                                            width_ratios=(2, 3))
+    figure = new_figure(11, 4)
+    left, right = figure.subplots(1, 2, width_ratios=(2, 3))
     sizes = rms_of(residuals.error)
     worst = int(np.argmax(sizes))
     left.barh(residuals.drives, sizes, color=[
@@ -142,13 +141,13 @@ def draw_where(residuals: Residuals) -> None:
     right.set(xlabel='velocity [mm/s]', ylabel='measured minus model [N]',
               title=f'{residuals.drives[worst]}, against its velocity')
     right.legend(frameon=False)
-    _finish(pyplot, figure, (left, right), 'tutorial_where.png')
+    _finish(figure, (left, right), 'tutorial_where.png')
 
 
 def draw_candidates(answer: Mapping[str, Any]) -> None:
     """Draw the evidence of the best candidates for the first place."""
-    pyplot = pyplot_module()
-    figure, axis = pyplot.subplots(figsize=(8, 3.5), layout='constrained')
+    figure = new_figure(8, 3.5)
+    axis = figure.subplots()
     best = answer['candidates'][:MOST_CANDIDATES]
     names = [one['name'] + (f' on {", ".join(one["drives"])}' if one['drives'] and len(
         one['drives']) < 4 else '') for one in best]
@@ -157,14 +156,14 @@ def draw_candidates(answer: Mapping[str, Any]) -> None:
     axis.axvline(0, color='black', lw=0.8)
     axis.invert_yaxis()
     axis.set(xlabel='evidence: twice the gain in log-likelihood, less penalties')
-    _finish(pyplot, figure, (axis,), 'tutorial_why.png')
+    _finish(figure, (axis,), 'tutorial_why.png')
 
 
-def _finish(pyplot: Any, figure: Any, axes: tuple[Any, ...], name: str) -> None:
+def _finish(figure: Any, axes: tuple[Any, ...], name: str) -> None:
     for axis in axes:
         axis.grid(alpha=0.25)
         axis.spines[['top', 'right']].set_visible(False)
-    save(pyplot, figure, IMAGES / name)
+    save(figure, IMAGES / name)
 
 
 if __name__ == '__main__':

@@ -25,7 +25,7 @@ from pprs_dynamics.app.commands.arguments import (
     output_file,
 )
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser, main
-from pprs_dynamics.app.workbench.server.folders import is_folder
+from pprs_dynamics.app.workbench.server.offered import is_folder
 from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.system.output_files import scratch_folder
 

@@ -188,9 +188,19 @@ def test_a_missing_library_is_named(compared: ComparisonResult,
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'pandas', None)
     monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
-    for show, library in ((compared.table, 'pandas'), (compared.plot, 'matplotlib')):
+    for module in ('box', 'console', 'markup', 'table'):
+        monkeypatch.setitem(sys.modules, f'rich.{module}', None)
+    for show, library in ((compared.table, 'pandas'), (compared.plot, 'matplotlib'),
+                          (compared.view, 'rich')):
         with pytest.raises(pprs_dynamics.MissingLibraryError, match=library):
             show()
+
+
+def test_pages_need_no_terminal() -> None:
+    reports = 'adoption', 'comparison', 'diagnosis', 'experiment', 'fit', 'history'
+    loaded = modules_after('from pprs_dynamics.app.report import ' + ', '.join(
+        f'{name}_report' for name in reports))
+    assert not loaded & {'rich', 'plotly', 'matplotlib'}
 
 
 def test_an_experiment_that_has_nothing_to_read_from_is_refused() -> None:

@@ -17,7 +17,7 @@ from made_up_diagnosis import NOISE, made_up_diagnosis, made_up_residuals
 from made_up_pages import made_up_pages
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.app.report.robot_view import robot_page
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.comparison import compare

@@ -20,9 +20,10 @@ from rich.console import Console
 from rich.progress import Progress
 from ros_processes import executable
 
-from pprs_dynamics.app.report.comparison_figures import thinned, worst_spans
+from pprs_dynamics.app.report.charts import thinned
+from pprs_dynamics.app.report.comparison_figures import worst_spans
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.progress import staged_bar
+from pprs_dynamics.app.report.terminal import staged_bar
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording

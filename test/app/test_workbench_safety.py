@@ -21,8 +21,8 @@ from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys
-from pprs_dynamics.app.workbench.server.folders import Folders, NotOfferedError
 from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS
+from pprs_dynamics.app.workbench.server.offered import NotOfferedError, Offered
 
 SECRET = 'no business of a browser'
 
@@ -199,7 +199,7 @@ def test_no_path_outside_the_given_folders_is_opened(
     assert answer.status == 400
     assert SECRET.encode() not in answer.body
     with pytest.raises(NotOfferedError):
-        Folders.of([str(folder / 'given')]).path(name)
+        Offered.of([str(folder / 'given')]).path(name)
 
 
 @pytest.mark.parametrize('path', ['/static/../hub.py', '/static/..%2fhub.py', '/static/hub.py',

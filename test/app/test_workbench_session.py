@@ -24,15 +24,13 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench import session as session_module
+from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.jobs import Cancelled, Job
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
-from pprs_dynamics.app.workbench.server.folders import Folders
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.surveys import Surveys
+from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
-from pprs_dynamics.app.workbench.worker_process import EndedError, run_in_process
+from pprs_dynamics.app.workbench.views import EXACT, FITTED, LINEAR
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
@@ -304,7 +302,7 @@ def test_a_recording_that_is_opened_while_the_first_are_read_comes_on_top(
         return session
 
     monkeypatch.setattr(Session, 'of', slow)
-    hub = Hub(session.inputs, Folders.of([]), Surveys.of([]))
+    hub = Hub(session.inputs, Offered.of([]))
     loop = asyncio.new_event_loop()
     hub.start(loop)
     try:

@@ -16,7 +16,7 @@ from made_up_diagnosis import NOISE, made_up_residuals, statement
 from rich.console import Console
 from scipy.signal import lfilter
 
-from pprs_dynamics.app.report.tables import comparison_view
+from pprs_dynamics.app.report.comparison_report import comparison_view
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.localisation import DriveFindings, Localisation, localise
 from pprs_dynamics.inference.regression.joint_fit import Regression

@@ -28,8 +28,7 @@ from rich.console import Console
 
 from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
-from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
-from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
 from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis

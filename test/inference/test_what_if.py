@@ -15,7 +15,7 @@ import pytest
 from browser import Seen, chromium, needs_browser
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose

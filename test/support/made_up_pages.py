@@ -21,12 +21,12 @@ from made_up_diagnosis import (
 from pprs_dynamics import DriveModel, __version__
 from pprs_dynamics.app.fleet.store import Store, key_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
-from pprs_dynamics.app.report.adoption_page import adoption_page
-from pprs_dynamics.app.report.comparison_page import comparison_page
-from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
-from pprs_dynamics.app.report.experiment_page import experiment_page
+from pprs_dynamics.app.report.adoption_report import adoption_page
+from pprs_dynamics.app.report.comparison_report import comparison_page
+from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
+from pprs_dynamics.app.report.experiment_report import experiment_page
 from pprs_dynamics.app.report.fleet_page import fleet_page
-from pprs_dynamics.app.report.history_page import history_page
+from pprs_dynamics.app.report.history_report import history_page
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption

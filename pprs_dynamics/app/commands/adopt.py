@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
-from pprs_dynamics.app.commands.output import tell
-from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
+from pprs_dynamics.app.commands import arguments
+from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.adopt import adopt
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
@@ -26,14 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('effect', metavar='EFFECT', help='name of an effect, on the drives that '
                         'the recordings call for; or EFFECT:drive,drive; or '
                         'measured_curve:DRIVE@VARIABLE for what no effect explains')
-    add_recordings(parser)
-    add_validation(parser)
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL), required=True,
-                        help='model file to write')
+    arguments.add_recordings(parser)
+    arguments.add_validation(parser)
+    arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
-    add_details(parser)
-    add_report(parser)
+    arguments.add_details(parser)
+    arguments.add_report(parser)
 
 
 def run(options: argparse.Namespace) -> int:

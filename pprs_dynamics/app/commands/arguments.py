@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.system.numbers import parse_number, parse_whole
 from pprs_dynamics.system.output_files import writable_file
 from pprs_dynamics.system.plain_text import displayed
@@ -26,6 +26,10 @@ OUTPUTS = ('output', 'json', 'report', 'mcap')
 INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
+
+
+class UsageError(PprsError, ValueError):
+    """Arguments that do not go together, or that what was read does not have."""
 
 
 def add_details(parser: argparse.ArgumentParser, what: str = 'print all there is to say') -> None:
@@ -43,6 +47,26 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
     """Declare --topic."""
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
                         'holds several')
+
+
+def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
+    """Declare RECORDING… and --topic."""
+    parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
+                        help='rosbag2 folder, .mcap, .db3, .csv or .csv.gz')
+    add_topic(parser)
+
+
+def add_validation(parser: argparse.ArgumentParser,
+                   what: str = 'held-out errors are taken on it') -> None:
+    """Declare --validate."""
+    parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
+                        help=f'a recording that is never fitted: {what}; may be repeated')
+
+
+def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:
+    """Declare --output of a model file."""
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
+                        required=required, help=what)
 
 
 def number(lower: float, upper: float, unit: str = '', above: bool = False,

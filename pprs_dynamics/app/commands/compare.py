@@ -7,24 +7,22 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import add_details, add_report, output_file
-from pprs_dynamics.app.commands.output import tell
-from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
+from pprs_dynamics.app.commands import arguments
+from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.compare import compare
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser)
-    add_details(parser)
-    parser.add_argument('--mcap', metavar='FILE.mcap', type=output_file('.mcap'),
+    arguments.add_recordings(parser)
+    arguments.add_details(parser)
+    parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states, '
                         'with layouts for PlotJuggler and Foxglove beside it')
     parser.add_argument('--beside', metavar='FILE', help='another model file on the same '
                         'recordings, or another recording: its errors stand beside')
-    add_report(parser)
+    arguments.add_report(parser)
 
 
 def run(options: argparse.Namespace) -> int:

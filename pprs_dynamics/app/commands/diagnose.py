@@ -8,34 +8,27 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
-from pprs_dynamics.app.commands.output import tell, write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
+from pprs_dynamics.app.commands import arguments
+from pprs_dynamics.app.commands.input_output import read_inputs, tell, write_json
 from pprs_dynamics.app.front_door.adopt import adopt_all
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.fit.base_fit import require_open_numbers
-
-
-class OptionsError(PprsError, ValueError):
-    """Options that do not go together."""
+from pprs_dynamics.system.plain_text import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser)
-    add_validation(parser)
-    add_details(parser)
-    add_report(parser)
+    arguments.add_recordings(parser)
+    arguments.add_validation(parser)
+    arguments.add_details(parser)
+    arguments.add_report(parser)
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
                         help='then fit the base model again beside what was added, as pprs fit '
                         'does: to these recordings, or to those diagnosed')
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
-                        help='model file that --adopt-all writes')
+    arguments.add_model_output(parser, 'model file that --adopt-all writes', required=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -70,17 +63,17 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
         result.save(options.output)
         if result.refit is not None:
             screen.print(result.refit.reason)
-        screen.print(f'model, {count} effect{"s" * (count != 1)} added: {shown(options.output)}')
+        screen.print(f'model, {counted(count, "effect")} added: {shown(options.output)}')
     return int(result.refused)
 
 
 def _check(options: argparse.Namespace) -> None:
     if options.adopt_all and not options.output:
-        raise OptionsError('--adopt-all: no --output FILE is given, must say where the new '
-                           'model file goes')
+        raise arguments.UsageError('--adopt-all: no --output FILE is given, must say where the '
+                                   'new model file goes')
     if options.refit is not None and not options.adopt_all:
-        raise OptionsError('--refit: it is given without --adopt-all, which adds what the base '
-                           'model is fitted again beside')
+        raise arguments.UsageError('--refit: it is given without --adopt-all, which adds what the '
+                                   'base model is fitted again beside')
     if options.output and not options.adopt_all:
-        raise OptionsError('--output: it is given without --adopt-all, but nothing is written to '
-                           'it then; --json and --report write the answer')
+        raise arguments.UsageError('--output: it is given without --adopt-all, but nothing is '
+                                   'written to it then; --json and --report write the answer')

@@ -12,10 +12,8 @@ import argparse
 from typing import Any
 
 from pprs_dynamics.app.commands.arguments import add_topic, output_file
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import read_inputs
-from pprs_dynamics.app.report.progress import progress_bar
-from pprs_dynamics.app.report.terminal import console, shown, text_table
+from pprs_dynamics.app.commands.input_output import read_inputs, write_json
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar, text_table
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import FORMATS, express
 from pprs_dynamics.simulation.export.replay import (
@@ -53,8 +51,9 @@ def run(options: argparse.Namespace) -> int:
     robot = export_robot(expressed, options.to)
     text = written(robot, options.to)
     replay = Replay(expressed, robot, text, options.to)
-    with progress_bar(screen, 'replaying') as progress:
-        found = (replay_recordings(model, replay, recordings, progress) if recordings
+    with staged_bar(screen) as progress:
+        found = (replay_recordings(model, replay, recordings, lambda done, total: progress(
+            'replaying', done / total if total else 0.0)) if recordings
                  else replay_excitation(model, replay))
     write_text(options.output, text)
     if options.json:

@@ -7,22 +7,19 @@ from __future__ import annotations
 
 import argparse
 
-from pprs_dynamics.app.commands.arguments import MODEL, add_details, add_report, output_file
-from pprs_dynamics.app.commands.output import tell
-from pprs_dynamics.app.commands.recordings import add_recordings, add_validation, read_inputs
+from pprs_dynamics.app.commands import arguments
+from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.fit import fit
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser)
-    add_validation(parser)
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL), required=True,
-                        help='model file that is written')
-    add_report(parser)
-    add_details(parser, 'print every fitted number')
+    arguments.add_recordings(parser)
+    arguments.add_validation(parser)
+    arguments.add_model_output(parser, 'model file that is written')
+    arguments.add_report(parser)
+    arguments.add_details(parser, 'print every fitted number')
 
 
 def run(options: argparse.Namespace) -> int:

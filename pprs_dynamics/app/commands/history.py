@@ -7,17 +7,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from pprs_dynamics.app.commands.arguments import MODEL, PAGE, output_file
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.report.history_tables import history_view
+from pprs_dynamics.app.commands.arguments import PAGE, add_model_output, output_file
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
+from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
@@ -27,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
     parser.add_argument('--undo', action='store_true', help='take the last step back')
-    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
-                        help='model file that --undo writes')
+    add_model_output(parser, 'model file that --undo writes', required=False)
     parser.add_argument('--report', metavar='FILE', type=output_file(*PAGE, '.png'),
                         help='draw the falling error: a page (.html) or a picture (.png)')
 
@@ -38,6 +34,9 @@ def run(options: argparse.Namespace) -> int:
     if options.undo != bool(options.output):
         raise ModelError('--output', options.output, 'be given with --undo, and only then')
     screen = console()
+    # Here, as --help draws nothing.
+    from pprs_dynamics.app.report.history_report import draw_history, history_page, history_view
+
     base = find_file(options.file)
     model = load_model(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
@@ -48,23 +47,13 @@ def run(options: argparse.Namespace) -> int:
     screen.print(history_view(steps, unit))
     if options.json:
         write_json(options.json, {'steps': [step.to_dict() for step in steps]})
-    if options.report:
-        _write_report(options, steps, unit, screen)
+    if options.report and options.report.endswith('.png'):
+        screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')
+    elif options.report:
+        page = history_page(Path(options.file).name, steps, unit)
+        screen.print(f'page: {shown(page.write(options.report))}')
     if options.undo:
         values, step = without_last_step(model.values)
         write_model(options.output, values, base)
         screen.print(f'{step.effect} taken back: {shown(options.output)}')
     return 0
-
-
-def _write_report(options: argparse.Namespace, steps: Sequence[Step], unit: str,
-                  screen: Any) -> None:
-    """Draw the falling error; what draws is imported here, it takes longer than all the rest."""
-    from pprs_dynamics.app.report.history_figures import draw_history
-    from pprs_dynamics.app.report.history_page import history_page
-
-    if options.report.endswith('.png'):
-        screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')
-    else:
-        page = history_page(Path(options.file).name, steps, unit)
-        screen.print(f'page: {shown(page.write(options.report))}')

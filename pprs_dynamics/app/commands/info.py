@@ -10,27 +10,20 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import add_report
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings
+from pprs_dynamics.app.commands.arguments import UsageError, add_recordings, add_report
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.front_door.inputs import read_checked
 from pprs_dynamics.app.report.mechanism_view import (
     describe_mechanism,
     mechanism_lines,
     write_mechanism_page,
 )
-from pprs_dynamics.app.report.progress import staged_bar
 from pprs_dynamics.app.report.tables import recording_table
-from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.measurement.files.recording import describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.model_file import load_model
-
-
-class InfoError(PprsError, ValueError):
-    """Nothing that could be told."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,8 +44,8 @@ def run(options: argparse.Namespace) -> int:
         if options.report:
             write_mechanism_page(options.report, model, Path(options.model).stem)
     elif options.report or not options.recordings:
-        raise InfoError('a RECORDING is needed: without one, info tells of an arm or of a robot '
-                        'with loops, and --report draws it')
+        raise UsageError('a RECORDING is needed: without one, info tells of an arm or of a robot '
+                         'with loops, and --report draws it')
     with staged_bar(screen) as progress:
         recordings = [read_checked(model, path, options.topic, progress)
                       for path in options.recordings]

@@ -9,14 +9,17 @@ import argparse
 import math
 import shlex
 
-from rich.markup import escape
-
-from pprs_dynamics.app.commands.arguments import POSES, add_report, number, output_file, seed
-from pprs_dynamics.app.commands.output import write_json
-from pprs_dynamics.app.commands.recordings import add_recordings, read_inputs
+from pprs_dynamics.app.commands.arguments import (
+    POSES,
+    add_recordings,
+    add_report,
+    number,
+    output_file,
+    seed,
+)
+from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.next_experiment import RATE, next_experiment
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import (
@@ -78,20 +81,16 @@ def run(options: argparse.Namespace) -> int:
             inputs.model, inputs, purpose=options.purpose, limits=_limits(options, inputs.model),
             duration=options.duration, seed=options.seed, noise=options.noise,
             rate=options.rate, progress=progress)
-    screen.print(result.view())
-    result.save(options.output)
     command = '' if isinstance(inputs.model, ArmModel) else shlex.join([
         'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
         '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
-    if options.json:
-        write_json(options.json, {**result.to_dict(), 'output': options.output})
-    if options.report:
-        screen.print(f'page: {shown(result.page(command).write(options.report))}')
+    tell(result, options, screen, lambda: result.page(command), output=options.output)
+    result.save(options.output)
     if command:
-        screen.print(f'[bold]play it[/]: {escape(command)}')
+        screen.print(f'[bold]play it[/]: {shown(command)}')
     else:
-        screen.print(f'[bold]play it[/] with a controller of joint trajectories: {escape(PLAYED)} '
-                     f'stand in {escape(options.output)}')
+        screen.print(f'[bold]play it[/] with a controller of joint trajectories: {PLAYED} '
+                     f'stand in {shown(options.output)}')
     return 0
 
 

@@ -22,12 +22,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.commands.arguments import (
-    DEFAULT_MODEL,
-    JSON,
-    check_files,
-    output_file,
-)
+from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, check_files, output_file
 from pprs_dynamics.app.commands.streams import lasting_output
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.plain_text import displayed

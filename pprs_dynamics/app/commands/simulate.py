@@ -12,17 +12,10 @@ import argparse
 
 import numpy as np
 
-from pprs_dynamics.app.commands.arguments import (
-    RECORDING,
-    add_report,
-    number,
-    output_file,
-    seed,
-)
-from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.arguments import RECORDING, add_report, number, output_file, seed
+from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -72,11 +65,7 @@ def run(options: argparse.Namespace) -> int:
             duration=options.duration, path_seed=options.path_seed, noise=options.noise,
             feedforward=options.feedforward, progress=progress)
     result.save(options.output)
-    screen.print(result.view())
-    if options.json:
-        write_json(options.json, {'recording': options.output, **result.to_dict()})
-    if options.report:
-        screen.print(f'page: {shown(result.report(options.report))}')
+    tell(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}')
     return 0
 

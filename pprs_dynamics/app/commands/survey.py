@@ -12,32 +12,27 @@ from typing import Any
 
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
+    UsageError,
     add_report,
     add_topic,
     output_folder,
     whole,
 )
-from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.engine import cluster, run_survey
 from pprs_dynamics.app.fleet.manifest import entries
-from pprs_dynamics.app.fleet.store import Store, arrow
-from pprs_dynamics.app.fleet.survey import AUTO, SurveyJob, requests_of
+from pprs_dynamics.app.fleet.store import AUTO, Store, arrow
+from pprs_dynamics.app.fleet.survey import SurveyJob, requests_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page
-from pprs_dynamics.app.report.progress import counting_bar
-from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.app.report.terminal import console, counting_bar, shown
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import counted, displayed
 
 MOST_SHOWN = 10  # errors
 MOST_WORKERS = 1024
-
-
-class SurveyError(PprsError, ValueError):
-    """Arguments that do not go together."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,12 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    _check(options)
+    if not options.recordings and not options.manifest:
+        raise UsageError('no recording is given, must be RECORDING… or --manifest')
     arrow()
     model_of = lru_cache(maxsize=None)(_model)
     base, _ = model_of(options.model)
     if options.effects != AUTO and not requests_of(options.effects, base):
-        raise SurveyError(f'--effects {options.effects!r}: must be auto or names of effects')
+        raise UsageError(f'--effects {options.effects!r}: must be auto or names of effects')
 
     def jobs() -> Iterator[SurveyJob]:
         for entry in entries(options.recordings, options.manifest):
@@ -77,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
     total = sum(1 for _ in entries(options.recordings, options.manifest))
     if not total:
-        raise SurveyError(f'{options.manifest}: no recording is listed')
+        raise UsageError(f'{options.manifest}: no recording is listed')
     store = Store(options.output)
     store.begin()
     done, failures = _run(options, screen, jobs(), total, store)
@@ -86,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     if len(failures) > MOST_SHOWN:
         screen.print(f'… and {len(failures) - MOST_SHOWN} more, in the store')
     earlier = total - done - len(failures)
-    screen.print(f'{total} recording{"s" * (total != 1)}: {done} done, {earlier} done before, '
+    screen.print(f'{counted(total, "recording")}: {done} done, {earlier} done before, '
                  f'{len(failures)} without a result; store: {shown(options.output)}')
     if options.json:
         write_json(options.json, {
@@ -115,11 +111,6 @@ def _run(options: argparse.Namespace, screen: Any, jobs: Iterator[SurveyJob], to
                 failures.append((displayed(result.rows[0]['recording']), result.error or ''))
             advance()
     return done, failures
-
-
-def _check(options: argparse.Namespace) -> None:
-    if not options.recordings and not options.manifest:
-        raise SurveyError('no recording is given, must be RECORDING… or --manifest')
 
 
 def _model(path: str) -> tuple[ForceModel, str]:

@@ -8,19 +8,14 @@ from __future__ import annotations
 import argparse
 import math
 
-from pprs_dynamics.app.commands.arguments import add_report
-from pprs_dynamics.app.commands.output import write_json
+from pprs_dynamics.app.commands.arguments import UsageError, add_report
+from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences, to_dict
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.numbers import parse_number
-
-
-class TrendError(PprsError, ValueError):
-    """A limit or a condition that the store does not have."""
 
 
 def _limit(text: str) -> tuple[str, float]:
@@ -52,11 +47,11 @@ def run(options: argparse.Namespace) -> int:
     names = {quantity.name for quantity in fleet.quantities}
     for name, _ in options.limit:
         if name not in names:
-            raise TrendError(f'--limit: unknown quantity {name!r}, must be one of '
+            raise UsageError(f'--limit: unknown quantity {name!r}, must be one of '
                              f'{", ".join(sorted(names))}')
     columns = {name for one in fleet.recordings.values() for name in one['conditions']}
     if options.beside and options.beside not in columns:
-        raise TrendError(f'--beside: unknown column {options.beside!r}, must be one of '
+        raise UsageError(f'--beside: unknown column {options.beside!r}, must be one of '
                          f'{", ".join(sorted(columns)) or "those of the manifest (there is none)"}')
     for text in sentences(fleet):
         screen.print(shown(text))

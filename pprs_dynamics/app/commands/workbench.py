@@ -11,13 +11,11 @@ from __future__ import annotations
 import argparse
 import re
 
-from pprs_dynamics.app.commands.arguments import add_topic, whole
-from pprs_dynamics.app.commands.recordings import add_validation
+from pprs_dynamics.app.commands.arguments import add_topic, add_validation, whole
 from pprs_dynamics.app.front_door.inputs import Inputs
-from pprs_dynamics.app.workbench.server.folders import Folders, is_folder
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
+from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
-from pprs_dynamics.app.workbench.server.surveys import Surveys
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.plain_text import displayed
@@ -56,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
     inputs = Inputs.read(options.model, given, options.validate, options.topic)
     live = _live(options, inputs.model) if options.live else None
-    hub = Hub(inputs, Folders.of(options.recordings), Surveys.of(options.recordings), live)
+    hub = Hub(inputs, Offered.of(options.recordings), live)
     serve(hub, options.host, options.port, not options.no_browser)
     return 0
 

@@ -11,7 +11,7 @@ not change from day to day, such as tolerances.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
 from typing import Any
@@ -109,12 +109,11 @@ def find_changes(time: Array, value: Array, threshold: float) -> Changes:
     best = min((slope, *steps), key=lambda one: one.information)
     probability, statistic = series.chance(best)
     if probability > threshold:
-        return Changes((), probability, statistic, series.scatter, constant.fitted,
-                       constant.draws)
+        return replace(constant, probability=probability, statistic=statistic)
     rest = float(np.sqrt(best.squares / max(len(time) - best.count - 1, 1)))
-    found, draws = (series.told_slope() if best is slope else (series.told_steps(best), None))
-    return Changes(found, probability, statistic, rest, best.fitted,
-                   np.zeros((0, 3)) if draws is None else draws)
+    found, draws = (series.told_slope() if best is slope
+                    else (series.told_steps(best), constant.draws))
+    return Changes(found, probability, statistic, rest, best.fitted, draws)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from __future__ import annotations
 import logging
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import resource_tracker
 from time import monotonic
 from typing import Any
@@ -31,6 +32,9 @@ REACHED_WITHIN = '15s'  # the scheduler
 # Without a word from a worker of a cluster of its own, which tells of itself twice a second: it is
 # killed and started again, and others do its work.
 SILENCE = '60s'
+
+Task = Generator[Callable[[], Any], tuple[Any, str | None], Any]
+"""The steps of one item: yields what submits the next one, gets that one's value or error."""
 
 
 class SchedulerError(PprsError, ConnectionError):
@@ -141,14 +145,11 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
     SchedulerError
         Where the scheduler goes.
     """
-    def begin(item: Any) -> Any:
-        return client.submit(work, item, pure=False)
+    def steps(item: Any) -> Task:
+        value, error = yield partial(client.submit, work, item, pure=False)
+        return item, value, error
 
-    def after(item: Any, value: Any, error: str | None) -> None:
-        return None
-
-    for item, value, _, error in _two_steps(client, items, begin, after):
-        yield item, value, error
+    yield from _carried_out(client, map(steps, items))
 
 
 def run_survey(client: Any, jobs: Iterable[SurveyJob], store: Store,
@@ -160,42 +161,34 @@ def run_survey(client: Any, jobs: Iterable[SurveyJob], store: Store,
     SchedulerError
         Where the scheduler goes; what was written stays, and the same survey goes on from there.
     """
-    def begin(job: SurveyJob) -> Any:
-        return client.submit(identify, job.entry.path, pure=False)
-
-    def after(job: SurveyJob, content: str | None, error: str | None) -> Any:
+    def steps(job: SurveyJob) -> Task:
+        content, error = yield partial(client.submit, identify, job.entry.path, pure=False)
+        if error is None:
+            if content is not None and store.has(job.entry.robot, job.key(content)):
+                return None
+            # Ahead of other recordings' beginnings, so that what was begun is ended.
+            result, error = yield partial(client.submit, examine, job, content, pure=False,
+                                          priority=1)
         if error is not None:
-            return None
-        if content is not None and store.has(job.entry.robot, job.key(content)):
-            return None
-        # Ahead of other recordings' beginnings, so that what was begun is ended.
-        return client.submit(examine, job, content, pure=False, priority=1)
-
-    for job, first, second, error in _two_steps(client, jobs, begin, after):
-        if error is not None:
-            result = lost(job, first, error)
-        elif second is None:
-            yield None
-            continue
-        else:
-            result = second
+            result = lost(job, content, error)
         store.write(job.entry.robot, result.key, result.rows, result.failed)
-        yield result
+        return result
+
+    yield from _carried_out(client, map(steps, jobs))
 
 
-def _two_steps(client: Any, items: Iterable[Any], begin: Callable[[Any], Any],
-               after: Callable[[Any, Any, str | None], Any],
-               ) -> Iterator[tuple[Any, Any, Any, str | None]]:
-    """Yield item, results of its first and second step, and the error of either, as they come."""
+def _carried_out(client: Any, tasks: Iterable[Task]) -> Iterator[Any]:
+    """Yield what tasks return, as they come; a bounded number is in the cluster at a time."""
     import distributed
 
     library: Any = distributed
-    waiting = iter(items)
-    there: dict[Any, tuple[Any, Any, bool]] = {}
+    waiting = iter(tasks)
+    there: dict[Any, tuple[Task, Callable[[], Any]]] = {}
     queue = library.as_completed(loop=client.loop)
 
-    def add(future: Any, item: Any, first: Any, is_second: bool) -> None:
-        there[future.key] = (item, first, is_second)
+    def add(task: Task, submit: Callable[[], Any]) -> None:
+        future = submit()
+        there[future.key] = (task, submit)
         queue.add(future)
 
     most, asked = 0, -ASKED_EVERY
@@ -204,34 +197,23 @@ def _two_steps(client: Any, items: Iterable[Any], begin: Callable[[Any], Any],
         nonlocal most, asked
         if monotonic() > asked + ASKED_EVERY:
             most, asked = PER_WORKER * max(len(client.ncores()), 1), monotonic()
-        while len(there) < most:
-            try:
-                item = next(waiting)
-            except StopIteration:
-                return
-            add(begin(item), item, None, False)
+        while len(there) < most and (task := next(waiting, None)) is not None:
+            add(task, next(task))
 
     fill()
     while there:
         future = next(queue)
-        item, first, is_second = there.pop(future.key)
+        task, submit = there.pop(future.key)
         outcome = _outcome(client, future)
         future.release()
         if outcome is None:
             # Done, but on a worker that was killed before it handed the result over.
-            again = after(item, first, None) if is_second else begin(item)
-            if again is not None:
-                add(again, item, first, is_second)
+            add(task, submit)
             continue
-        value, error = outcome
-        if not is_second and error is None:
-            following = after(item, value, error)
-            if following is not None:
-                add(following, item, value, True)
-            else:
-                yield item, value, None, None
-        else:
-            yield item, first, value, error
+        try:
+            add(task, task.send(outcome))
+        except StopIteration as end:
+            yield end.value
         fill()
 
 

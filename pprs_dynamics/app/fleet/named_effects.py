@@ -11,47 +11,38 @@ forces are linear in, whose errors are Gaussian even where the effect is not the
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.app.fleet.store import OWN
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.terms import Term
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-OWN = 'model'  # stands for an effect's name in rows of the model's own numbers
-
-
-@dataclass(frozen=True)
-class NamedFit:
-    """Rows of values, and the noise that the fit leaves.
-
-    Parameters
-    ----------
-    rows : list of dict
-        drive, effect, parameter, value, std, unit, evidence.
-    design : Design
-    noise : dict of int to float
-        By drive [N].
-    """
-
-    rows: list[dict[str, Any]]
-    design: Design
-    noise: dict[int, float]
-
 
 def fit_named_effects(model: ForceModel, recording: Recording,
-                      requests: Sequence[EffectRequest]) -> NamedFit:
+                      requests: Sequence[EffectRequest],
+                      ) -> tuple[list[dict[str, Any]], Residuals, dict[str, float]]:
     """Return the values of named effects and of the model's numbers.
 
     An effect that the model has already, or that cannot act on a drive, gives no row there.
+
+    Returns
+    -------
+    rows : list of dict
+        drive, effect, parameter, value, std, unit, evidence.
+    residuals : Residuals
+        Of the model as given.
+    noise : dict of str to float
+        That the fit leaves, by drive [N].
 
     Raises
     ------
@@ -67,7 +58,8 @@ def fit_named_effects(model: ForceModel, recording: Recording,
     rows = [row for term, block in zip(terms, blocks, strict=True)
             for row in _rows(design, regression, fit, term, block)]
     rows += _own_numbers(design, fit)
-    return NamedFit(rows, design, {d: regression.noise_floor(fit, d) for d in regression.drives})
+    return rows, design.residuals, {design.drives[d]: regression.noise_floor(fit, d)
+                                    for d in regression.drives}
 
 
 def _terms(design: Design, regression: Regression, request: EffectRequest) -> Iterator[Term]:

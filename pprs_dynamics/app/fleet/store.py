@@ -25,6 +25,8 @@ from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.system.output_files import new_file
 
 DONE, FAILED = '.parquet', '.failed.parquet'
+AUTO = 'auto'  # options of a survey that diagnosed
+OWN = 'model'  # stands for an effect's name in rows of the model's own numbers
 KEY_LENGTH = 40  # hexadecimal digits of the key: 160 bits, as of a git object
 
 # Name, Arrow type, unit, meaning; docs/fleets.md prints this table. `robot` is the folder.

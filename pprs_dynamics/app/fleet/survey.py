@@ -24,8 +24,8 @@ import numpy as np
 
 from pprs_dynamics import __version__
 from pprs_dynamics.app.fleet.manifest import ManifestEntry, filesystem, is_remote
-from pprs_dynamics.app.fleet.named_effects import OWN, fit_named_effects
-from pprs_dynamics.app.fleet.store import key_of
+from pprs_dynamics.app.fleet.named_effects import fit_named_effects
+from pprs_dynamics.app.fleet.store import AUTO, OWN, key_of
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -39,7 +39,6 @@ from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
-AUTO = 'auto'
 FITTED = 'fitted'  # the verdict where only named effects were fitted
 # Of the model's error over the changing effort on a drive, beyond which units, signs and order of
 # drives are looked at: wrong ones leave as much as the effort or more.
@@ -114,11 +113,8 @@ def identify(path: str) -> str | None:
         if system.isdir(within):
             with local_copy(path) as copy:
                 return fingerprint(copy)
-        whole = hashlib.sha256()
         with system.open(within, 'rb') as file:
-            while block := file.read(1 << 20):
-                whole.update(block)
-        return whole.hexdigest()
+            return hashlib.file_digest(file, 'sha256').hexdigest()
     except Exception:  # libraries of file systems raise what they like; examine tells the reason
         return None
 
@@ -160,19 +156,17 @@ def examine(job: SurveyJob, content: str | None) -> SurveyResult:
     key, path = job.key(content or job.entry.path), job.entry.path
     try:
         with local_copy(job.entry.path) as path:
-            rows = _examined(job, path, common)
+            rows, failed = _examined(job, path, common), False
     except PprsError as error:
         # A copy's name says nothing to anybody.
-        text = str(error).replace(path, job.entry.path)
+        text = displayed(str(error).replace(path, job.entry.path))
         # What could not even be read may be there the next time.
-        return SurveyResult(key, [{**common, 'error': displayed(text),
-                                   'seconds': perf_counter() - began}], failed=content is None)
+        rows, failed = [{**common, 'error': text}], content is None
     except Exception as error:  # of the package itself, but no end of a survey
-        return SurveyResult(key, [{
-            **common, 'seconds': perf_counter() - began,
-            'error': f'unexpected {type(error).__name__}: {error}'}], failed=True)
+        text = f'unexpected {type(error).__name__}: {error}'
+        rows, failed = [{**common, 'error': text}], True
     seconds = perf_counter() - began
-    return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows])
+    return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows], failed)
 
 
 def lost(job: SurveyJob, content: str | None, reason: str) -> SurveyResult:
@@ -201,17 +195,14 @@ def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[st
     summary = describe(recording)
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}
-    common = {**common, 'duration': summary.duration}
-    found = _judged(model, recording, job)
-    rows, residuals, noise, verdict = found
-    common = {**common, 'verdict': verdict}
-    drives = _drives(residuals, noise)
-    quantities = [{'drive': drive, **numbers} for drive, numbers in drives.items()]
-    return [{**common, **row} for row in quantities] + [
+    rows, drives, verdict = _judged(model, recording, job)
+    common = {**common, 'duration': summary.duration, 'verdict': verdict}
+    return [{**common, 'drive': drive, **numbers} for drive, numbers in drives.items()] + [
         {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
 
 
-Examined = tuple[list[dict[str, Any]], Residuals, Mapping[str, float], str]
+Examined = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
+"""Rows of values, numbers by drive, and the verdict."""
 
 
 def _judged(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
@@ -223,13 +214,15 @@ def _judged(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined
         _refuse_mistakes(model, recording, job)
         return _diagnosed(model, recording)
     try:
-        found = _fitted(model, recording, job)
+        rows, residuals, noise = fit_named_effects(model, recording,
+                                                   requests_of(job.options, model))
     except PprsError:
         _refuse_mistakes(model, recording, job)
         raise
-    if any(one['relative'] > SUSPECT for one in _drives(found[1], found[2]).values()):
+    drives = _drives(residuals, noise)
+    if any(one['relative'] > SUSPECT for one in drives.values()):
         _refuse_mistakes(model, recording, job)
-    return found
+    return rows, drives, FITTED
 
 
 def _refuse_mistakes(model: ForceModel, recording: Recording, job: SurveyJob) -> None:
@@ -250,13 +243,6 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
     return found
 
 
-def _fitted(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
-    fit = fit_named_effects(model, recording, requests_of(job.options, model))
-    drives = fit.design.drives
-    return (fit.rows, fit.design.residuals, {drives[d]: one for d, one in fit.noise.items()},
-            FITTED)
-
-
 def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
     diagnosis = diagnose(model, [recording])
     rows: list[dict[str, Any]] = []
@@ -268,4 +254,4 @@ def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
                          'evidence': effect.evidence})
     rows += [{'effect': OWN, 'parameter': one.label, 'value': one.after, 'std': one.std,
               'unit': one.unit} for one in diagnosis.calibrated]
-    return rows, diagnosis.residuals, diagnosis.noise_floors, diagnosis.verdict
+    return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict

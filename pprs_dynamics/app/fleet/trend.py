@@ -18,9 +18,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.fleet.changes import NORMAL, Change, Changes, find_changes
-from pprs_dynamics.app.fleet.named_effects import OWN
-from pprs_dynamics.app.fleet.store import Store
-from pprs_dynamics.app.fleet.survey import AUTO
+from pprs_dynamics.app.fleet.store import AUTO, OWN, Store
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import find_effect
 
@@ -179,13 +177,12 @@ def fleet_trends(store: Store, limits: Mapping[str, float] | None = None) -> Fle
     trends = []
     spreads = _fleet_levels(series)
     for (robot, quantity), values in series.items():
-        order = np.argsort(values.time, kind='stable')
-        time, value = values.time[order], values.value[order]
+        time, value = values.time, values.value
         changes = find_changes(time, value, FALSE_ALARMS / per_robot[robot])
         level, spread = spreads.get(quantity, (np.nan, np.nan))
         trends.append(Trend(
-            robot, quantity, time, value, values.std[order],
-            tuple(values.recordings[k] for k in order), changes, bool(changes.found),
+            robot, quantity, time, value, values.std, values.recordings, changes,
+            bool(changes.found),
             _deviations(float(np.median(value[-FIRST:])) - level, spread),
             _from_first(value, changes.scatter if not changes.found else _noise(value)),
             _reach(changes, time, value, (limits or {}).get(quantity.name))))
@@ -198,7 +195,7 @@ class _Values:
     time: Array
     value: Array
     std: Array
-    recordings: list[str]
+    recordings: tuple[str, ...]
 
 
 class _Rows:
@@ -253,7 +250,7 @@ class _Rows:
         return options, used, len(results) - kept
 
     def series(self) -> dict[tuple[str, Quantity], _Values]:
-        """Return values by robot and quantity."""
+        """Return values by robot and quantity, in order of time."""
         gathered: dict[tuple[str, Quantity], list[tuple[float, float, float, str]]] = {}
         every: dict[str, dict[str, float]] = {}
         for robot, quantity, time, value, std, sha256 in self._values():
@@ -264,8 +261,9 @@ class _Rows:
             _add_absent(gathered, every)
         found = {}
         for key, values in gathered.items():
+            values.sort(key=lambda one: one[0])
             time, value, std = np.array([one[:3] for one in values], dtype=float).T
-            found[key] = _Values(time, value, std, [one[3] for one in values])
+            found[key] = _Values(time, value, std, tuple(one[3] for one in values))
         return found
 
     def _values(self) -> Iterator[tuple[str, Quantity, float, float, float, str]]:
@@ -299,8 +297,7 @@ def _fleet_levels(series: Mapping[tuple[str, Quantity], _Values],
     """Return median and robust standard deviation over robots, by quantity."""
     levels: dict[Quantity, list[float]] = {}
     for (_, quantity), values in series.items():
-        last = np.argsort(values.time, kind='stable')[-FIRST:]
-        levels.setdefault(quantity, []).append(float(np.median(values.value[last])))
+        levels.setdefault(quantity, []).append(float(np.median(values.value[-FIRST:])))
     found = {}
     for quantity, values_of in levels.items():
         if len(values_of) >= LEAST_FLEET:

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
@@ -28,10 +27,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 class RefusedError(PprsError, ValueError):
@@ -88,19 +84,19 @@ class AdoptionResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.adoption_tables import adoption_view
+        from pprs_dynamics.app.report.adoption_report import adoption_view
 
         return adoption_view(self.adoption, details)
 
     def page(self, saved_as: str = 'better.yaml') -> Page:
         """Return the page of `pprs adopt --report`; its next command names the file of `save`."""
-        from pprs_dynamics.app.report.adoption_page import adoption_page
+        from pprs_dynamics.app.report.adoption_report import adoption_page
 
         return adoption_page(self.adoption, self.inputs.fitted, self.inputs.held_out,
                              replace(self.inputs.files, model=saved_as).command(
                                  'diagnose', held_out=True))
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per parameter: its value, std and unit."""
         found = self.adoption.parameters
         return data_frame([{'value': one.value, 'std': one.std, 'unit': one.unit}
@@ -162,20 +158,20 @@ class AdoptionRunResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.adoption_tables import run_view
+        from pprs_dynamics.app.report.adoption_report import run_view
 
         return run_view(self.run, details)
 
     def page(self) -> Page:
         """Return the page of `pprs history --report` of the model."""
-        from pprs_dynamics.app.report.history_page import history_page
+        from pprs_dynamics.app.report.history_report import history_page
         from pprs_dynamics.drives import common_effort
         from pprs_dynamics.physics.model.ledger import read_steps
 
         return history_page('the adopted model', read_steps(self.model.values),
                             common_effort(self.model.units))
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
         return data_frame([
             {'effect': one.effect, 'adopted': one.adopted, 'error_before': one.error_before,
@@ -229,10 +225,9 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
     request = requested(effect, inputs.model)
-    report = progress or (lambda what, share: None)
     return AdoptionResult(inputs, adopt_effect(
         inputs.model, request, inputs.fitted, inputs.held_out, force,
-        lambda share: report(f'adopting {request.name}', share),
+        stage(progress, f'adopting {request.name}'),
         None if diagnosis is None else diagnosis.diagnosis))
 
 
@@ -271,16 +266,13 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
         None if diagnosis is None else diagnosis.diagnosis)
     if not again or not run.adopted:
         return AdoptionRunResult(inputs, run)
-    report = progress or (lambda what, share: None)
     return AdoptionRunResult(inputs, run, refit_base(
-        run.model, again, inputs.held_out, lambda share: report('fitting the base', share)))
+        run.model, again, inputs.held_out, stage(progress, 'fitting the base')))
 
 
 def _plot(first: Adoption, last: Adoption) -> Figure:
-    from pprs_dynamics.app.report.plots import plot_errors
+    from pprs_dynamics.app.report.pictures import plot_errors
 
-    before, after = first.residuals_before, last.residuals_after
-    rows: Mapping[str, Mapping[str, float]] = {
-        'before': rms_by_drive(before),
-        'after': rms_by_drive(after), 'noise': last.noise_floors}
-    return plot_errors(rows, last.unit)
+    return plot_errors({'before': rms_by_drive(first.residuals_before),
+                        'after': rms_by_drive(last.residuals_after),
+                        'noise': last.noise_floors}, last.unit)

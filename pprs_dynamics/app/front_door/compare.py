@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
@@ -27,10 +27,7 @@ from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -79,13 +76,13 @@ class ComparisonResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.tables import comparison_view
+        from pprs_dynamics.app.report.comparison_report import comparison_view
 
         return comparison_view(self.comparison, self._next, details, self.beside)
 
     def page(self) -> Page:
         """Return the page of `pprs compare --report`."""
-        from pprs_dynamics.app.report.comparison_page import comparison_page
+        from pprs_dynamics.app.report.comparison_report import comparison_page
 
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
                                self.comparison, self.notes, self._next, self.beside)
@@ -112,10 +109,10 @@ class ComparisonResult(Result):
         """
         from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
 
-        report, bag = progress or (lambda what, share: None), Path(path)
+        bag = Path(path)
         write_comparison(bag, self.inputs.model, self.inputs.fitted,
                          [self.verdict, *(statement.text for statement in self.where)],
-                         lambda share: report('bag', share))
+                         stage(progress, 'bag'))
         written = [bag]
         for suffix, layout in (('.plotjuggler.xml', plotjuggler_layout),
                                ('.foxglove.json', foxglove_layout)):
@@ -123,7 +120,7 @@ class ComparisonResult(Result):
             write_text(written[-1], layout(self.residuals.drives))
         return written
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
         drives = self.comparison.drives
         return data_frame([{'rms': one.rms, 'relative': one.relative, 'bias': one.bias,
@@ -132,7 +129,7 @@ class ComparisonResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive beside its noise, and the worst over time."""
-        from pprs_dynamics.app.report.plots import plot_errors, plot_series
+        from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 
         drives = self.comparison.drives
         figure = plot_errors(
@@ -184,11 +181,11 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     >>> print(compare('config/paper.yaml', 'run.mcap'))  # doctest: +SKIP
     """
     inputs = Inputs.of(model, recordings, (), topic, progress).require_recordings()
-    report = progress or (lambda what, share: None)
+    measuring = stage(progress, 'motion and model')
     residuals, notes = measure_residuals(
         inputs.model, inputs.fitted,
-        lambda done, total: report('motion and model', done / total if total else 0.0))
-    where = localise(residuals, progress=lambda share: report('where it fails', share))
+        lambda done, total: measuring(done / total if total else 0.0))
+    where = localise(residuals, progress=stage(progress, 'where it fails'))
     return ComparisonResult(
         inputs, residuals, compare_residuals(residuals, where), tuple(notes),
         None if beside is None else _beside(inputs, Path(beside), topic))

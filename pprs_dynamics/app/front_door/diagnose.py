@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
@@ -22,10 +22,7 @@ from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -64,20 +61,20 @@ class DiagnosisResult(Result):
 
     def view(self, details: bool = False, next_step: bool = True) -> Any:
         """Return what the terminal shows, with the command to go on with, or without."""
-        from pprs_dynamics.app.report.diagnosis_tables import diagnosis_view
+        from pprs_dynamics.app.report.diagnosis_report import diagnosis_view
 
         return diagnosis_view(self.diagnosis, self._words, details, next_step)
 
     def page(self) -> Page:
         """Return the page of `pprs diagnose --report`."""
-        from pprs_dynamics.app.report.diagnosis_page import diagnosis_page
+        from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
             self.diagnosis, self._words, after, [one.name for one in self.inputs.fitted],
             [one.name for one in self.inputs.held_out], self._rivals, what_if(self.diagnosis))
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
         return data_frame([
             {'effect': found.name, 'parameter': key, 'value': one.value, 'std': one.std,
@@ -86,7 +83,7 @@ class DiagnosisResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""
-        from pprs_dynamics.app.report.plots import plot_errors
+        from pprs_dynamics.app.report.pictures import plot_errors
 
         residuals = self.diagnosis.residuals
         after = replace(residuals, model=residuals.measured - self.diagnosis.remaining)
@@ -127,6 +124,5 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
-    report = progress or (lambda what, share: None)
     return DiagnosisResult(inputs, diagnose_recordings(
-        inputs.model, inputs.fitted, inputs.held_out, lambda share: report('diagnosing', share)))
+        inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing')))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
@@ -17,10 +17,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -59,24 +56,24 @@ class FitResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.fit_tables import fit_view
+        from pprs_dynamics.app.report.fit_report import fit_view
 
         return fit_view(self.inputs.model, self.fit, details)
 
     def page(self) -> Page:
         """Return the page of `pprs fit --report`."""
-        from pprs_dynamics.app.report.fit_page import fit_page
+        from pprs_dynamics.app.report.fit_report import fit_page
 
         return fit_page(self.inputs.model, self.fit, [one.name for one in self.inputs.fitted],
                         [one.name for one in self.inputs.held_out])
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per fitted number: before, after, std, unit."""
         return data_frame([one.to_dict() for one in self.fit.numbers])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""
-        from pprs_dynamics.app.report.plots import plot_errors
+        from pprs_dynamics.app.report.pictures import plot_errors
 
         return plot_errors({'before': self.fit.before, 'after': self.fit.after,
                             'held out': self.fit.held_out},
@@ -104,6 +101,5 @@ def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
-    report = progress or (lambda what, share: None)
     return FitResult(inputs, fit_base(inputs.model, inputs.fitted, inputs.held_out,
-                                      lambda share: report('fitting', share)))
+                                      stage(progress, 'fitting')))

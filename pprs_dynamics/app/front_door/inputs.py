@@ -34,6 +34,11 @@ ONCE = 'every recording may be given once'
 OTHER = 'what is held out must be another recording'
 
 
+def stage(progress: Progress | None, what: str) -> Callable[[float], None]:
+    """Return what is to be called with the share of a stage that is done."""
+    return lambda share: progress(what, share) if progress else None
+
+
 class InputError(PprsError, ValueError):
     """Recordings that are not there."""
 
@@ -197,9 +202,9 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
 
 def _read(model: ForceModel, path: File, topic: str | None, progress: Progress | None,
           ) -> Recording:
-    report, stage = progress or (lambda what, share: None), f'reading {displayed(path)}'
+    report = stage(progress, f'reading {displayed(path)}')
     return read_recording(path, model.recorded, topic,
-                          lambda done, total: report(stage, done / total if total else 0.0))
+                          lambda done, total: report(done / total if total else 0.0))
 
 
 class _Read(NamedTuple):

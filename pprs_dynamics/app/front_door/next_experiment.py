@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.front_door.inputs import InputError, Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.front_door.inputs import (
+    InputError,
+    Inputs,
+    Model,
+    Progress,
+    Recordings,
+    stage,
+)
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
@@ -25,10 +32,7 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 RATE = 100.0  # [Hz], the default of play_trajectory
 
@@ -76,7 +80,7 @@ class ExperimentResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.experiment_tables import excitation_view, experiment_view
+        from pprs_dynamics.app.report.experiment_report import excitation_view, experiment_view
 
         if isinstance(self.design, ArmExcitation):
             return excitation_view(self.design)
@@ -84,13 +88,13 @@ class ExperimentResult(Result):
 
     def page(self, command: str = '') -> Page:
         """Return the page of `pprs next-experiment --report`, with the command that plays it."""
-        from pprs_dynamics.app.report.experiment_page import excitation_page, experiment_page
+        from pprs_dynamics.app.report.experiment_report import excitation_page, experiment_page
 
         if isinstance(self.design, ArmExcitation):
             return excitation_page(self.design)
         return experiment_page(self.design, self.motion, command)
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per pair of effects: what a diagnosis would say if the first were true."""
         if isinstance(self.design, ArmExcitation):
             return data_frame([{'limit': name, 'use': share}
@@ -99,7 +103,7 @@ class ExperimentResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""
-        from pprs_dynamics.app.report.plots import plot_over_time
+        from pprs_dynamics.app.report.pictures import plot_over_time
 
         motion = self.motion
         assert motion.time is not None
@@ -155,10 +159,7 @@ def next_experiment(
     inputs = Inputs.of(model, recordings, (), topic, progress)
     check_purpose(purpose, inputs.fitted)
     found = inputs.model
-    report = progress or (lambda what, share: None)
-
-    def share_done(share: float) -> None:
-        report('designing', share)
+    share_done = stage(progress, 'designing')
     designed: Experiment | ArmExcitation
     kind = ArmLimits if isinstance(found, ArmModel) else MotionLimits
     if limits is not None and not isinstance(limits, kind):

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.errors import MissingLibraryError
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
+    # What results return, named for all of them.
+    from matplotlib.figure import Figure as Figure
+    from pandas import DataFrame as DataFrame
 
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.report.page import Page as Page
 
 WIDTH = 100  # characters of a line of text
 
@@ -53,7 +54,7 @@ class Result(ABC):
         """
 
     @abstractmethod
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return the numbers as a table of pandas.
 
         Raises
@@ -94,7 +95,7 @@ class Result(ABC):
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]], index: Sequence[str] | None = None,
-               name: str | None = None) -> pd.DataFrame:
+               name: str | None = None) -> DataFrame:
     """Return rows as a table of pandas, or raise MissingLibraryError."""
     try:
         import pandas as pd

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.front_door.inputs import Model, Progress
+from pprs_dynamics.app.front_door.inputs import Model, Progress, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
@@ -27,10 +27,7 @@ from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.page import Page
+    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
 
 RATE = 500.0  # [Hz], of the 3-PPRS
 NOISE = 0.08  # [N], of its efforts
@@ -95,7 +92,7 @@ class SimulationResult(Result):
         assert isinstance(self.model, (DriveModel, ArmModel))
         return robot_page(self.model, self.motion, 'The simulated motion')
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""
         drives = describe(self.recording).drives
         return data_frame([{'lowest_position': one.position[0],
@@ -106,7 +103,7 @@ class SimulationResult(Result):
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""
-        from pprs_dynamics.app.report.plots import plot_over_time
+        from pprs_dynamics.app.report.pictures import plot_over_time
 
         names = self.recording.drives
         return plot_over_time(self.recording.time, {
@@ -156,56 +153,39 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     """
     found = model if isinstance(model, ForceModel) else load_model(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
-    report = progress or (lambda what, share: None)
-
-    def share_done(share: float) -> None:
-        report('simulating', share)
+    share_done = stage(progress, 'simulating')
     if isinstance(found, ArmModel):
-        return _simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done)
+        from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
+        from pprs_dynamics.simulation.arm_run import simulate_arm
+
+        arm = simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done)
+        assert arm.motion.time is not None
+        recording = Recording.from_arrays('simulated', arm.motion.time, arm.position, None,
+                                          arm.effort, found.drives)
+        return SimulationResult(found, recording, arm.effects, (), arm.motion, ARM_RATE, seed)
     if not isinstance(found, DriveModel):
         raise MotionError('model', f'it is of {found.title}', 'be of a 3-PPRS or an arm', 'shape')
     if feedforward not in FEEDFORWARDS:
         raise MotionError('feedforward', repr(feedforward),
                           f'be one of {", ".join(FEEDFORWARDS)}', 'shape')
-    return _simulate_platform(found, names, seed, scale, motion or _excitation(
-        duration, path_seed), NOISE if noise is None else noise, feedforward, share_done)
-
-
-def _excitation(duration: float, seed: int) -> PlatformMotion:
-    path = Excitation(duration=duration, seed=seed)
-    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
-
-
-def _simulate_platform(model: DriveModel, names: Sequence[str], seed: int, scale: float,
-                       motion: PlatformMotion, noise: float, feedforward: str,
-                       progress: Any) -> SimulationResult:
     from pprs_dynamics.simulation.hidden_effects import draw_effects
     from pprs_dynamics.simulation.sensors import SensorSettings
     from pprs_dynamics.simulation.simulated_run import DriveReference
     from pprs_dynamics.simulation.simulated_run import simulate as simulate_robot
 
-    forces = model.drive_forces(motion)
-    model.limits.check_strokes(forces.mechanism.position)
+    if motion is None:
+        path = Excitation(duration=duration, seed=path_seed)
+        motion = path.motion(np.arange(0.0, path.duration, 1 / RATE))
+    forces = found.drive_forces(motion)
+    found.limits.check_strokes(forces.mechanism.position)
     effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
     run = simulate_robot(
-        model, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
+        found, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
                               effort[feedforward]),
-        draw_effects(list(names), np.random.default_rng(seed), scale), seed=seed, rate=RATE,
+        draw_effects(names, np.random.default_rng(seed), scale), seed=seed, rate=RATE,
         truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
-        sensors=SensorSettings.with_effort_noise(noise), progress=progress)
+        sensors=SensorSettings.with_effort_noise(NOISE if noise is None else noise),
+        progress=share_done)
     recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort)
-    return SimulationResult(model, recording, tuple(run.effects), tuple(run.notes), motion, RATE,
+    return SimulationResult(found, recording, tuple(run.effects), tuple(run.notes), motion, RATE,
                             seed)
-
-
-def _simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float,
-                  noise: float | None, duration: float, path_seed: int,
-                  progress: Any) -> SimulationResult:
-    from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
-    from pprs_dynamics.simulation.arm_run import simulate_arm
-
-    run = simulate_arm(model, names, seed, scale, noise, duration, path_seed, progress)
-    assert run.motion.time is not None
-    recording = Recording.from_arrays('simulated', run.motion.time, run.position, None, run.effort,
-                                      model.drives)
-    return SimulationResult(model, recording, run.effects, (), run.motion, ARM_RATE, seed)

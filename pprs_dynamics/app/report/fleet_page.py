@@ -17,8 +17,9 @@ import numpy as np
 
 from pprs_dynamics.app.fleet.trend import FleetTrends, Quantity, Trend
 from pprs_dynamics.app.fleet.words import change_text, reach_text, sentences
-from pprs_dynamics.app.report.figures import BLUE, GREY, RED
-from pprs_dynamics.app.report.page import Page, one_script, plotly_objects
+from pprs_dynamics.app.report.charts import plotly_objects
+from pprs_dynamics.app.report.page import Page, one_script
+from pprs_dynamics.app.report.pictures import BLUE, GREY, RED
 from pprs_dynamics.arrays import Array
 
 # Numbers of trends that a page holds: beyond, the quietest are not drawn but stay in the map.

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from itertools import count
 from typing import Any
 from xml.etree import ElementTree
 
@@ -48,16 +47,14 @@ def plotjuggler_layout(drives: Sequence[str]) -> str:
 
 def foxglove_layout(drives: Sequence[str]) -> str:
     """Return a layout with a plot of measured, model and residual for each drive."""
-    panels: dict[str, Any] = {}
-    names = (f'Plot!pprs{number}' for number in count())
-    for index, drive in enumerate(drives):
-        panels[next(names)] = {
-            'foxglovePanelTitle': drive, 'showLegend': True, 'legendDisplay': 'floating',
-            'isSynced': True, 'xAxisVal': 'timestamp', 'showXAxisLabels': True,
-            'showYAxisLabels': True,
-            'paths': [{'value': f'{topic}.effort[{index}]', 'enabled': True,
-                       'timestampMethod': 'headerStamp', 'label': topic.strip('/'),
-                       'color': colour} for topic, colour in COLOURS.items()]}
+    panels = {f'Plot!pprs{index}': {
+        'foxglovePanelTitle': drive, 'showLegend': True, 'legendDisplay': 'floating',
+        'isSynced': True, 'xAxisVal': 'timestamp', 'showXAxisLabels': True,
+        'showYAxisLabels': True,
+        'paths': [{'value': f'{topic}.effort[{index}]', 'enabled': True,
+                   'timestampMethod': 'headerStamp', 'label': topic.strip('/'),
+                   'color': colour} for topic, colour in COLOURS.items()]}
+        for index, drive in enumerate(drives)}
     return json.dumps({
         'configById': panels, 'globalVariables': {}, 'userNodes': {},
         'playbackConfig': {'speed': 1}, 'layout': _stacked(list(panels))}, indent=1) + '\n'

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.report.page import Page, plotly_objects
+from pprs_dynamics.app.report.charts import plotly_objects
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.skeleton import Skeleton

@@ -10,7 +10,7 @@ import gzip
 import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -19,7 +19,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import PLAIN
 
@@ -54,15 +53,6 @@ class ErrorRow:
     noise: float | None = None
 
 
-def plotly_objects() -> Any:
-    """Return plotly.graph_objects, or raise MissingLibraryError."""
-    try:
-        from plotly import graph_objects
-    except ImportError:
-        raise MissingLibraryError('plotly', 'the report', 'report') from None
-    return graph_objects
-
-
 class Page:
     """Collects sections from top to bottom. Text from files is escaped here, and only here.
 
@@ -85,30 +75,34 @@ class Page:
         """Start a section."""
         self._body.append(f'<h2>{escape(text)}</h2>')
 
-    @contextmanager
-    def fold(self, title: str, is_open: bool = False) -> Iterator[None]:
+    def fold(self, title: str, is_open: bool = False) -> AbstractContextManager[None]:
         """Put what is added within the block behind a title that opens it."""
-        self._body.append(f'<details{" open" * is_open}><summary>{escape(title)}</summary>')
-        yield
-        self._body.append('</details>')
+        return self._around(f'<details{" open" * is_open}><summary>{escape(title)}</summary>',
+                            '</details>')
 
-    @contextmanager
-    def columns(self) -> Iterator[None]:
+    def columns(self) -> AbstractContextManager[None]:
         """Put what is added within the block side by side, where the screen is wide enough."""
-        self._body.append('<div class="columns">')
-        yield
-        self._body.append('</div>')
+        return self._around('<div class="columns">', '</div>')
+
+    def block(self) -> AbstractContextManager[None]:
+        """Keep what is added within the block together, in one column."""
+        return self._around('<div>', '</div>')
 
     @contextmanager
-    def block(self) -> Iterator[None]:
-        """Keep what is added within the block together, in one column."""
-        self._body.append('<div>')
+    def _around(self, start: str, end: str) -> Iterator[None]:
+        self._body.append(start)
         yield
-        self._body.append('</div>')
+        self._body.append(end)
 
     def text(self, text: str, kind: str = '') -> None:
         """Add a paragraph; `kind` is '', 'lead' or 'note'."""
         self._body.append(f'<p class="{kind}">{escape(text)}</p>')
+
+    def sources(self, model: str, recordings: Iterable[str], held_out: Sequence[str] = ()) -> None:
+        """Say which model and which recordings it is about."""
+        held = f' Held out: {", ".join(held_out)}.' if held_out else ''
+        self.text(f'Model: {Path(model).name or "built in memory"}. Recordings: '
+                  f'{", ".join(recordings)}.{held}', 'note')
 
     def command(self, text: str, command: str) -> None:
         """Add what to do next, with a command that can be copied."""
@@ -123,12 +117,17 @@ class Page:
         items = ''.join(f'<li>{escape(line)}</li>' for line in lines)
         self._body.append(f'<{tag}>{items}</{tag}>')
 
+    def folded_list(self, title: str, lines: Sequence[str], is_open: bool = False) -> None:
+        """Add a list behind a title that opens it, if there is anything in it."""
+        if lines:
+            with self.fold(title, is_open):
+                self.bullets(lines)
+
     def table(
         self, headings: Sequence[str], rows: Iterable[Sequence[str]],
         grades: Sequence[str] = (), caption: str = '',
     ) -> None:
         """Add a table; `grades` colour the rows' first cells, the last column is text."""
-        head = ''.join(f'<th scope="col">{escape(heading)}</th>' for heading in headings)
         body = []
         for number, row in enumerate(rows):
             grade = escape(grades[number]) if grades else ''
@@ -136,8 +135,14 @@ class Page:
                      *(f'<td>{escape(cell)}</td>' for cell in row[1:-1]),
                      f'<td class="text">{escape(row[-1])}</td>']
             body.append(f'<tr>{"".join(cells)}</tr>')
-        self._body.append(f'<div class="scroll"><table>{_caption(caption)}<thead><tr>{head}</tr>'
-                          f'</thead><tbody>{"".join(body)}</tbody></table></div>')
+        self._table('', caption, headings, body)
+
+    def _table(self, kind: str, caption: str, headings: Iterable[str], rows: Iterable[str],
+               ) -> None:
+        head = ''.join(f'<th scope="col">{escape(heading)}</th>' for heading in headings)
+        title = f'<caption><span>{escape(caption)}</span></caption>' if caption else ''
+        self._body.append(f'<div class="scroll"><table{kind}>{title}<thead><tr>{head}</tr></thead>'
+                          f'<tbody>{"".join(rows)}</tbody></table></div>')
 
     def errors(self, rows: Sequence[ErrorRow], caption: str,
                headings: tuple[str, str] = ('before', 'after')) -> None:
@@ -146,8 +151,6 @@ class Page:
                        if value is not None and value == value), default=0.0) or 1.0
         names = ['error'] if all(row.after is None for row in rows) else [*headings]
         noisy = any(row.noise is not None for row in rows)
-        head = ''.join(f'<th scope="col">{name}</th>' for name in (
-            '', *names, *['noise'] * noisy, ''))
         body = []
         for row in rows:
             values = [row.before, *([row.after] if len(names) > 1 else []),
@@ -158,9 +161,7 @@ class Page:
                           if value is not None and value == value)
             body.append(f'<tr><th scope="row">{escape(row.label)}</th>{cells}'
                         f'<td><span class="bar" aria-hidden="true">{bar}</span></td></tr>')
-        self._body.append(
-            f'<div class="scroll"><table class="errors">{_caption(caption)}<thead><tr>{head}</tr>'
-            f'</thead><tbody>{"".join(body)}</tbody></table></div>')
+        self._table(' class="errors"', caption, ('', *names, *['noise'] * noisy, ''), body)
 
     def menu(self, label: str, names: Sequence[str], chosen: str) -> None:
         """Add a choice of the drive that figures show; all menus of a page go together.
@@ -203,10 +204,7 @@ class Page:
             It shows what the workbench does, with uPlot after `await library('uplot')`.
         """
         self._has_board |= with_board
-        # Within a script an end tag would end it, wherever it stands.
-        safe = data.replace('<', '\\u003c')
-        self._body.append(f'{elements}<script type="application/json" id="{name}">{safe}</script>'
-                          f'<script>{script}</script>')
+        self._body.append(f'{elements}{_data(name, data)}<script>{script}</script>')
 
     def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:
         from plotly.utils import PlotlyJSONEncoder
@@ -223,13 +221,11 @@ class Page:
         data = json.dumps({'data': content['data'], 'layout': layout,
                            'frames': content.get('frames', [])}, cls=PlotlyJSONEncoder,
                           separators=(',', ':'))
-        # Within a script an end tag would end it, wherever it stands.
-        data = data.replace('<', '\\u003c')
         return (f'<figure><div class="plot" id="{name}" role="img" tabindex="0" '
                 f'aria-label="{escape(label or "Figure", quote=True)}" '
                 f'style="height:{height}px"{" data-time" * over_time}></div>'
                 + (f'<figcaption>{escape(caption)}</figcaption>' if caption else '')
-                + f'<script type="application/json" id="{name}-data">{data}</script></figure>')
+                + f'{_data(f"{name}-data", data)}</figure>')
 
     def html(self) -> str:
         """Return the page."""
@@ -263,8 +259,10 @@ class Page:
         return Path(path)
 
 
-def _caption(text: str) -> str:
-    return f'<caption><span>{escape(text)}</span></caption>' if text else ''
+def _data(name: str, content: str) -> str:
+    """Return JSON for scripts; within it an end tag would end it, wherever it stands."""
+    safe = content.replace('<', '\\u003c')
+    return f'<script type="application/json" id="{name}">{safe}</script>'
 
 
 def _bar(kind: str, share: float) -> str:

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.report.page import Page, plotly_objects
+from pprs_dynamics.app.report.charts import plotly_objects
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion

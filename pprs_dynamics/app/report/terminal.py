@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The terminal as rich sees it, in characters that the terminal has."""
+"""The terminal as rich sees it, in characters that the terminal has: text, tables, progress."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
@@ -18,10 +20,8 @@ HTML = '<pre style="line-height:1.2;white-space:pre;overflow-x:auto">{code}</pre
 
 def console(**options: Any) -> Any:
     """Return rich's console, or raise MissingLibraryError."""
-    try:
-        from rich.console import Console
-    except ImportError:
-        raise MissingLibraryError('rich', 'showing tables', 'report') from None
+    _rich('console')  # or says what is missing
+    from rich.console import Console
 
     class PlainConsole(Console):
         """Puts plain characters in place before widths are counted, so that tables stay even."""
@@ -32,6 +32,24 @@ def console(**options: Any) -> Any:
 
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False, **options)
+
+
+def _rich(name: str) -> Any:
+    """Return a module of rich, or raise MissingLibraryError."""
+    try:
+        return import_module(f'rich.{name}')
+    except ImportError:
+        raise MissingLibraryError('rich', 'showing tables', 'report') from None
+
+
+def escape(text: str) -> str:
+    """Return a text in which rich finds no markup."""
+    return str(_rich('markup').escape(text))
+
+
+def stacked(*parts: Any) -> Any:
+    """Return parts of a view, one below the other."""
+    return _rich('console').Group(*parts)
 
 
 def as_text(view: Any, width: int) -> str:
@@ -45,7 +63,7 @@ def as_text(view: Any, width: int) -> str:
 
 def as_html(view: Any, width: int) -> str:
     """Return what the terminal would show as HTML, with its colours."""
-    console()  # says what is missing
+    _rich('console')  # or says what is missing
     from rich.console import Console
 
     # In a notebook rich would show it at once, too.
@@ -55,10 +73,14 @@ def as_html(view: Any, width: int) -> str:
     return screen.export_html(inline_styles=True, code_format=HTML)
 
 
+def verdict_panel(word: str, colour: str, text: str) -> Any:
+    """Return an answer in a frame, its one word above it."""
+    return _rich('panel').Panel(escape(text), title=f'[bold {colour}]{word}[/]',
+                                border_style=colour, title_align='left')
+
+
 def shown(name: object) -> str:
     """Return a name, or other text from data, for a line that may hold rich's markup."""
-    from rich.markup import escape
-
     return escape(displayed(name))
 
 
@@ -81,14 +103,10 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     **options
         Of rich's Table.
     """
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-    from rich.table import Table
-
     frames: dict[str, dict[str, Any]] = {
         'box': {}, 'none': {'box': None, 'padding': (0, 1)},
-        'head': {'box': SIMPLE_HEAD, 'title_justify': 'left', 'title_style': 'bold'}}
-    table = Table(**{**frames[frame], **options})
+        'head': {'box': _rich('box').SIMPLE_HEAD, 'title_justify': 'left', 'title_style': 'bold'}}
+    table = _rich('table').Table(**{**frames[frame], **options})
     numbers = range(1, len(headings)) if right is None else right
     for number, heading in enumerate(headings):
         table.add_column(escape(heading), justify='right' if number in numbers else 'left',
@@ -96,3 +114,69 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *,
     for row in rows:
         table.add_row(*row)
     return table
+
+
+PlainTable = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Headings and rows of plain text, for the terminal and for a page."""
+
+
+def plain_rows(table: PlainTable) -> PlainTable:
+    """Return a table whose rows no longer hold what rich would take for markup."""
+    headings, rows = table
+    return headings, [tuple(map(escape, row)) for row in rows]
+
+
+def titled_table(title: str, table: PlainTable, right: Collection[int] | None = None,
+                 caption: str | None = None) -> Any:
+    """Return a table of plain text below its title."""
+    return text_table(*plain_rows(table), right=right, frame='head', title=escape(title),
+                      caption=caption and escape(caption), caption_justify='left')
+
+
+@contextmanager
+def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
+    """Show a bar while the block lasts; call the given function with (stage, share done).
+
+    Each stage has a bar of its own in place of the one before; none goes back.
+    """
+    from rich import progress
+
+    with _bar(console, progress.TextColumn('{task.percentage:3.0f} %'),
+              progress.TimeElapsedColumn()) as bar:
+        task, stage, furthest = None, '', 0.0
+
+        def advance(what: str, share: float) -> None:
+            nonlocal task, stage, furthest
+            if task is None or what != stage:
+                if task is not None:
+                    bar.remove_task(task)
+                task, stage, furthest = bar.add_task(what, total=1.0), what, 0.0
+            furthest = max(furthest, share)
+            bar.update(task, completed=furthest)
+
+        yield advance
+
+
+@contextmanager
+def counting_bar(console: Any, what: str, total: int) -> Iterator[Callable[[], None]]:
+    """Show a bar with count, rate and remaining time; call the given function for each done."""
+    from rich import progress
+    from rich.text import Text
+
+    class Rate(progress.ProgressColumn):
+        def render(self, task: progress.Task) -> Text:
+            return Text(f'{60 * task.speed:.0f}/min' if task.speed else '')
+
+    with _bar(console, progress.MofNCompleteColumn(), Rate(),
+              progress.TimeRemainingColumn()) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.update(task, advance=1)
+
+
+def _bar(console: Any, *columns: Any) -> Any:
+    """Return rich's progress with a bar, and further columns beside it."""
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    # In a file or a pipe it would leave an empty line.
+    return Progress(TextColumn('{task.description}', markup=False), BarColumn(), *columns,
+                    console=console, transient=True, disable=not console.is_terminal)

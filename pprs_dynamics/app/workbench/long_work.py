@@ -11,9 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment
 from pprs_dynamics.measurement.files.recording import Recording
@@ -45,13 +42,6 @@ class DesignedMotion:
 def diagnosed(model: ForceModel, recordings: Sequence[Recording], progress: Progress) -> Diagnosis:
     """Return a diagnosis without its searches, which are large."""
     return replace(diagnose(model, recordings, (), progress), selection=None, chosen=None)
-
-
-def judged(model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
-           validation: Sequence[Recording], force: bool, diagnosis: Diagnosis | None,
-           progress: Progress) -> Adoption:
-    """Return the answer of `pprs adopt`."""
-    return adopt(model, request, recordings, validation, force, progress, diagnosis)
 
 
 def designed(model: DriveModel | ArmModel, recordings: Sequence[Recording], duration: float,

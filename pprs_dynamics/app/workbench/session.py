@@ -8,32 +8,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from threading import Lock, RLock
 from typing import Any
 
 from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.workbench import views
+from pprs_dynamics.app.workbench.background import Cancelled, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.jobs import Cancelled, Job
-from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed, judged
+from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
 from pprs_dynamics.app.workbench.tick_fits import Tick, TickFits
-from pprs_dynamics.app.workbench.view_stages import following, linear, without_ticks
-from pprs_dynamics.app.workbench.view_state import (
-    DriveError,
-    Share,
-    ViewState,
-    effect_to_dict,
-    errors_of,
-    names_of,
-    recordings_to_dict,
-    units_to_dict,
-)
-from pprs_dynamics.app.workbench.worker_process import run_in_process
+from pprs_dynamics.app.workbench.views import DriveError, Share, ViewState
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
@@ -142,10 +133,10 @@ class Session:
             self.fits = fits
             self.noise_floors: dict[str, float] | None = None
             self.revision += 1
-            self.view_state = without_ticks(fits, self.revision)
+            self.view_state = views.without_ticks(fits, self.revision)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):  # what cannot act under this model is ticked no more
-                    self.tick(name, names_of(tick.best, fits.drives))
+                    self.tick(name, views.names_of(tick.best, fits.drives))
             self.notify()
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
@@ -249,7 +240,7 @@ class Session:
 
     def errors(self) -> dict[str, DriveError]:
         """Return the error of every drive that was measured: before, now, and of the noise."""
-        return errors_of(self.before, self.now, self.noise, self.drives)
+        return views.errors_of(self.before, self.now, self.noise, self.drives)
 
     def overall(self) -> DriveError:
         """Return the error over all samples and drives."""
@@ -341,7 +332,7 @@ class Session:
             with self._lock:
                 fits, view = self.fits, self.view_state
             if not view.is_settled:
-                for one in following(fits, view):
+                for one in views.following(fits, view):
                     if not self._show(one):
                         break
             return self.view_state
@@ -373,7 +364,7 @@ class Session:
 
     def _linear(self, ticks: dict[str, Tick]) -> ViewState:
         self.revision += 1
-        self.view_state = linear(self.fits, self.view_state, ticks, self.revision)
+        self.view_state = views.linear(self.fits, self.view_state, ticks, self.revision)
         self.notify()
         return self.view_state
 
@@ -433,7 +424,7 @@ class Session:
         """
         with self._changing(revision):
             tick = self.view_state.ticks.get(effect)
-            on = drives or (names_of(tick.best, self.drives) if tick else None)
+            on = drives or (views.names_of(tick.best, self.drives) if tick else None)
             request = EffectRequest.named(effect, on or None, self.drives)
             request.require_place(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
@@ -448,8 +439,8 @@ class Session:
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
         answer: Adoption = run_in_process(
-            judged, fits.model, request, fits.recordings, inputs.held_out,
-            force, self.diagnosis, report=lambda share: report(0.9 * share))
+            partial(adopt, diagnosis=self.diagnosis), fits.model, request, fits.recordings,
+            inputs.held_out, force, report=lambda share: report(0.9 * share))
         if answer.adopted:
             after = TickFits(inputs.ledger.entered(answer), fits.recordings)
             report(0.95)
@@ -560,13 +551,14 @@ class Session:
                 'departure': finite(view.departure), 'notice': view.notice,
                 'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
                 'errors': {name: one.to_dict() for name, one in self.errors().items()},
-                'overall': self.overall().to_dict(), **units_to_dict(self.model),
-                'effects': [effect_to_dict(view, effect, self.model, effect.name in called_for)
-                            for effect in self.candidates],
+                'overall': self.overall().to_dict(), **views.units_to_dict(self.model),
+                'effects': [
+                    views.effect_to_dict(view, effect, self.model, effect.name in called_for)
+                    for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'steps': [step.to_dict() for step in self.steps],
                 'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
                 'adoption': for_json(adoption.to_dict()) if adoption else None,
                 'experiment': for_json(self.experiment.promise) if self.experiment else None,
-                'recordings': recordings_to_dict(self.inputs.fitted, self.fits, self.now),
+                'recordings': views.recordings_to_dict(self.inputs.fitted, self.fits, self.now),
                 'held_out': [one.name for one in self.inputs.held_out]}

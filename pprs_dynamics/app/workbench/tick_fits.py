@@ -9,7 +9,7 @@ before. Noise, shapes and the exact forces of the fitted model follow after.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import RLock
 
@@ -65,21 +65,16 @@ class Offer:
     Parameters
     ----------
     candidate : EffectCandidate
-    gain, price : float
-        By which the penalised deviance would fall at the noise as it is, and what it costs.
+    gain, evidence : float
+        By which the penalised deviance would fall at the noise as it is; and less its price.
     residual : (M, D) array
         What would be left [N].
     """
 
     candidate: EffectCandidate
     gain: float
-    price: float
+    evidence: float
     residual: Array = field(repr=False)
-
-    @property
-    def evidence(self) -> float:
-        """Gain less price."""
-        return self.gain - self.price
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +152,7 @@ class TickFits:
         """
         with self._scanning:
             if drives is None or not issubclass(effect, DriveEffect):
-                made = [sets[-1] for sets in self._proposals(found)]
-                return next((c for c in made if isinstance(c, EffectCandidate)
-                             and c.effect is effect), None)
+                return next((c for c in self._proposed(found) if c.effect is effect), None)
             placements = [one for d in drives
                           if (one := self._on_drive(effect, d, found)) is not None]
         if not placements or len(placements) < len(drives):
@@ -178,8 +171,10 @@ class TickFits:
         return max(there, key=lambda one: self.fits.regression.gain(
             found.fit, library.block(one)), default=None)
 
-    def _proposals(self, found: CandidateSet) -> Iterable[tuple[object, ...]]:
-        return self.scan.proposals(found, least=-np.inf)
+    def _proposed(self, found: CandidateSet) -> list[EffectCandidate]:
+        """Return every effect where it pays best beside a set."""
+        added = (sets[-1] for sets in self.scan.proposals(found, least=-np.inf))
+        return [one for one in added if isinstance(one, EffectCandidate)]
 
     def offers(self, found: CandidateSet) -> list[Offer]:
         """Return what every effect that is not in a set would gain beside it, the best first."""
@@ -187,17 +182,14 @@ class TickFits:
         # A fit that was ended before it stood still has the deviance of the noise before.
         found = self.at(found.effects, found)
         with self._scanning:
-            proposed = [sets[-1] for sets in self._proposals(found)]
-            return sorted((self.offer(found, one) for one in proposed
-                           if isinstance(one, EffectCandidate) and one.effect not in there),
-                          key=lambda one: -one.evidence)
+            return sorted((self.offer(found, one) for one in self._proposed(found)
+                           if one.effect not in there), key=lambda one: -one.evidence)
 
     def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
         """Return what one candidate would gain beside a set at its noise."""
         more = self.at((*found.effects, candidate), found)
-        gain = found.fit.deviance - more.fit.deviance
-        evidence = found.total - more.total
-        return Offer(candidate, gain, gain - evidence, self.residual(more).astype(np.float32))
+        return Offer(candidate, found.fit.deviance - more.fit.deviance, found.total - more.total,
+                     self.residual(more).astype(np.float32))
 
     def with_chosen(self, tick: Tick) -> EffectCandidate:
         """Return a tick's candidate in the shapes that somebody chose."""
@@ -253,14 +245,14 @@ class TickFits:
 
     def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
         """Return the parameters of every effect of a set, by drive.parameter."""
-        return {candidate.name: {
-            key: value for placement in candidate.components
-            for key, value in self._of_placement(found, placement).items()}
-            for candidate in found.effects}
-
-    def _of_placement(self, found: CandidateSet, placement: Component) -> dict[str, float]:
-        every = {**placement.values(found.coefficients(placement)), **placement.parameters}
-        return {self.key(placement.drive, name): float(value) for name, value in every.items()}
+        values: dict[str, dict[str, float]] = {}
+        for candidate in found.effects:
+            mine = values[candidate.name] = {}
+            for one in candidate.components:
+                every = {**one.values(found.coefficients(one)), **one.parameters}
+                mine.update({self.key(one.drive, name): float(value)
+                             for name, value in every.items()})
+        return values
 
     def estimates(self, found: CandidateSet) -> dict[str, dict[str, Estimate]]:
         """Return the parameters of every effect of a set with their uncertainty."""

@@ -14,7 +14,6 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from threading import Lock
 from typing import Any
 
@@ -134,7 +133,7 @@ class AccessControl:
             return _refuse(403, 'the request does not say which page it comes from')
         if headers.get('sec-fetch-site', 'none') not in ('same-origin', 'none'):
             return _refuse(403, 'the request comes from another page')
-        cookie = _cookie(headers, self.keys.cookie_name)
+        cookie = request.cookies.get(self.keys.cookie_name)
         known = cookie is not None and self.keys.knows(cookie)
         token = request.query_params.get(TOKEN)
         if request.url.path == '/' and request.method == 'GET' and token is not None:
@@ -177,14 +176,6 @@ def _bounded(receive: Any, most: int) -> Any:
 def _all(headers: Headers, name: str) -> list[str]:
     """Return every value of a header: two of them may mean different things to two readers."""
     return [value.lower() for value in headers.getlist(name)]
-
-
-def _cookie(headers: Headers, name: str) -> str | None:
-    try:
-        morsel = SimpleCookie(headers.get('cookie', '')).get(name)
-    except CookieError:
-        return None
-    return morsel.value if morsel is not None else None
 
 
 def _refuse(status: int, sentence: str) -> Response:

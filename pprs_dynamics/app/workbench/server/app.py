@@ -10,6 +10,7 @@ import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,18 +30,10 @@ from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
-from pprs_dynamics.app.workbench.server.packing import attached, binary
-from pprs_dynamics.app.workbench.server.request_fields import (
-    BadRequestError,
-    body_of,
-    drives_of,
-    index_of,
-    number_of,
-    range_of,
-    revision_of,
-    text_of,
-)
-from pprs_dynamics.app.workbench.view_state import units_to_dict
+from pprs_dynamics.app.workbench.server.offered import index_of
+from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
+from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.views import units_to_dict
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
 
@@ -50,6 +43,17 @@ MOST_POINTS = 20_000  # of a scatter
 HEARTBEAT = 15.0  # [s] between signs of life
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
+
+# What the session is asked to do by POST, with a JSON object; all are answered by the screen.
+CHANGES: dict[str, Callable[[Session, Fields], object]] = {
+    'choose': lambda session, body: session.choose(
+        body.text('effect'), body.text('key'), body.number('value'), body.revision()),
+    'release': lambda session, body: session.release(body.text('effect'), body.revision()),
+    'adopt': lambda session, body: session.adopt(body.text('effect'), revision=body.revision()),
+    'cancel': lambda session, body: session.cancel(body.text('kind')),
+    'undo': lambda session, body: session.undo(body.revision()),
+    'experiment': lambda session, body: session.next_experiment(body.number('duration')),
+}
 
 
 def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -> Any:
@@ -84,12 +88,12 @@ def in_thread(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[
     return endpoint
 
 
-def with_body(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[Response]]:
+def with_body(work: Callable[[Fields], Response]) -> Callable[[Request], Awaitable[Response]]:
     """Return an endpoint that takes a JSON object."""
     async def endpoint(request: Request) -> Response:
         if request.headers.get('content-type') != 'application/json':
             raise BadRequestError('the body must be application/json')
-        return await run_in_threadpool(work, body_of(await request.body()))
+        return await run_in_threadpool(work, Fields.of(await request.body()))
     return endpoint
 
 
@@ -126,12 +130,16 @@ class Api:
                 'experiment.csv': self.experiment_file, **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
-    def changes(self) -> dict[str, Callable[[Any], Response]]:
+    def changes(self) -> dict[str, Callable[[Fields], Response]]:
         """Return what is asked for by POST, with a JSON object."""
         return {'live/set': self.live_set, 'live/take': self.live_take,
                 **{work.__name__: work for work in (
-                    self.tick, self.choose, self.release, self.shares, self.adopt, self.cancel,
-                    self.undo, self.open, self.experiment, self.invite)}}
+                    self.tick, self.shares, self.open, self.invite)},
+                **{name: partial(self._change, change) for name, change in CHANGES.items()}}
+
+    def _change(self, change: Callable[[Session, Fields], object], body: Fields) -> Response:
+        change(self.hub.the_session, body)
+        return self.screen(body)
 
     def screen(self, query: Any) -> Response:
         """Answer what of the screen changed since a version, the errors now where they did."""
@@ -140,7 +148,7 @@ class Api:
             session, count = hub.session, hub.count
             state = {'generation': hub.generation, 'failure': hub.failure,
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
-                     'has_folders': bool(hub.folders.roots or hub.surveys.recordings),
+                     'has_folders': bool(hub.offered.folders or hub.offered.surveyed),
                      'is_empty': session is None,
                      **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
             state['drawn'] = [state.get(key) for key in ('generation', 'revision', 'stage')]
@@ -163,58 +171,27 @@ class Api:
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
                  'before': session.before.T, 'measured': data.measured.T})
 
-    def tick(self, body: Any) -> Response:
+    def tick(self, body: Fields) -> Response:
         """Tick or untick an effect."""
-        effect, revision = text_of(body, 'effect'), revision_of(body)
+        effect, revision = body.text('effect'), body.revision()
         if body.get('is_ticked', True):
-            self.hub.the_session.tick(effect, drives_of(body), revision)
+            self.hub.the_session.tick(effect, body.drives(), revision)
         else:
             self.hub.the_session.untick(effect, revision)
         return self.screen(body)
 
-    def choose(self, body: Any) -> Response:
-        """Set a parameter."""
-        self.hub.the_session.choose(text_of(body, 'effect'), text_of(body, 'key'),
-                                    number_of(body, 'value'), revision_of(body))
-        return self.screen(body)
-
-    def release(self, body: Any) -> Response:
-        """Let the fit decide again."""
-        self.hub.the_session.release(text_of(body, 'effect'), revision_of(body))
-        return self.screen(body)
-
-    def shares(self, body: Any) -> Response:
+    def shares(self, body: Fields) -> Response:
         """Say what unticked effects explain in a brush, and when that was."""
         session = self.hub.the_session
         if 'x' in body:
-            mask = session.region(text_of(body, 'x'), text_of(body, 'y'), range_of(body, 'x_range'),
-                                  range_of(body, 'y_range'), text_of(body, 'drive'))
+            mask = session.region(body.text('x'), body.text('y'), body.range('x_range'),
+                                  body.range('y_range'), body.text('drive'))
         else:
             drive = body.get('drive')
-            mask = session.span(*range_of(body, 'time'), None if drive is None else [str(drive)])
+            mask = session.span(*body.range('time'), None if drive is None else [str(drive)])
         return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
-
-    def adopt(self, body: Any) -> Response:
-        """Begin the held-out check."""
-        self.hub.the_session.adopt(text_of(body, 'effect'), revision=revision_of(body))
-        return self.screen(body)
-
-    def cancel(self, body: Any) -> Response:
-        """Call work off."""
-        self.hub.the_session.cancel(text_of(body, 'kind'))
-        return self.screen(body)
-
-    def undo(self, body: Any) -> Response:
-        """Take the last step back."""
-        self.hub.the_session.undo(revision_of(body))
-        return self.screen(body)
-
-    def experiment(self, body: Any) -> Response:
-        """Begin to design the next experiment."""
-        self.hub.the_session.next_experiment(number_of(body, 'duration'))
-        return self.screen(body)
 
     def experiment_file(self, query: Any) -> Response:
         """Answer the poses, or the joints' positions, of the designed motion."""
@@ -266,12 +243,12 @@ class Api:
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
-        return JSONResponse({'files': self.hub.folders.listed(),
-                             'surveyed': self.hub.surveys.listed()})
+        return JSONResponse({'files': self.hub.offered.in_folders(),
+                             'surveyed': self.hub.offered.in_surveys()})
 
-    def open(self, body: Any) -> Response:
+    def open(self, body: Fields) -> Response:
         """Open a recording of the folders and surveys that were given."""
-        self.hub.open(self.hub.offered(text_of(body, 'name')), body.get('is_held_out') is True)
+        self.hub.open(self.hub.offered.path(body.text('name')), body.get('is_held_out') is True)
         return self.screen(body)
 
     async def upload(self, request: Request) -> Response:
@@ -284,7 +261,7 @@ class Api:
             await run_in_threadpool(self.hub.open, path, held_out)
         return await run_in_threadpool(self.screen, request.query_params)
 
-    def invite(self, body: Any) -> Response:
+    def invite(self, body: Fields) -> Response:
         """Answer an address for one more browser."""
         return JSONResponse({'address': self.keys.address})
 
@@ -292,11 +269,11 @@ class Api:
         """Answer how live data stand."""
         return JSONResponse(self._live.to_dict())
 
-    def live_set(self, body: Any) -> Response:
+    def live_set(self, body: Fields) -> Response:
         """Set the model with the ticked effects on the running nodes."""
         return JSONResponse({'nodes': self._live.set_model(self.hub.the_session.ticked_model())})
 
-    def live_take(self, body: Any) -> Response:
+    def live_take(self, body: Fields) -> Response:
         """Make what came in last a recording of the session."""
         with self.hub.upload('live.csv') as path:
             self._live.take(path)

@@ -20,8 +20,7 @@ from typing import Any, Protocol
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.change_log import ChangeLog
-from pprs_dynamics.app.workbench.server.folders import ENDINGS, Folders
-from pprs_dynamics.app.workbench.server.surveys import PREFIX, Surveys
+from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -56,17 +55,13 @@ class Hub:
     ----------
     inputs : Inputs
         Of the command line; a session begins with its recordings, or with the first that is opened.
-    folders : Folders
-        In which browsers may choose recordings.
-    surveys : Surveys
-        In which it may choose, too.
+    offered : Offered
+        What browsers may choose from.
     live : LiveSource, optional
     """
 
-    def __init__(self, inputs: Inputs, folders: Folders, surveys: Surveys,
-                 live: LiveSource | None = None) -> None:
-        self.inputs, self.live = inputs, live
-        self.folders, self.surveys = folders, surveys
+    def __init__(self, inputs: Inputs, offered: Offered, live: LiveSource | None = None) -> None:
+        self.inputs, self.offered, self.live = inputs, offered, live
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
@@ -163,17 +158,6 @@ class Hub:
             else:
                 self.session.add(path, is_held_out)
         self._changed()
-
-    def offered(self, name: str) -> Path:
-        """Return the path of a recording that is offered to browsers, by its name there.
-
-        Raises
-        ------
-        NotOfferedError
-            For any other.
-        """
-        chosen = self.surveys if name.startswith(f'{PREFIX}/') else self.folders
-        return chosen.path(name)
 
     @contextmanager
     def upload(self, name: str) -> Iterator[Path]:

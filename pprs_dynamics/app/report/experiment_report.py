@@ -1,22 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The page of a designed experiment: the motion, its use of the limits, and what it promises."""
+"""A designed experiment: the motion, its use of the limits, and what it promises."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.app.report.comparison_figures import LEGEND, LINES, SECONDS, thinned
-from pprs_dynamics.app.report.experiment_tables import (
-    ACCURACY_HEADINGS,
-    CONTEST_HEADINGS,
-    accuracy_rows,
-    contest_rows,
-    limit_rows,
-)
-from pprs_dynamics.app.report.page import Page, plotly_objects
+from pprs_dynamics.app.report import charts
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.robot_view import animate_robot
+from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
 from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
@@ -27,6 +21,54 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Motion = PlatformMotion | JointMotion
 POINTS = 500  # pairs of extremes shown of a curve
+MOST_SHOWN = 12
+HIGH = 0.5  # use of a limit, from which on it is shown
+
+
+def contests_table(experiment: Experiment) -> PlainTable:
+    """Return pairs of effects with their evidence, now and expected."""
+    return ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance'), [
+        (one.truth, one.rival, f'{one.now:.0f}', f'{one.expected:.0f}', f'{one.probability:.0%}')
+        for one in experiment.contests]
+
+
+def accuracies_table(experiment: Experiment) -> PlainTable:
+    """Return numbers with their standard deviations, before and after."""
+    return ('number', 'before', 'after', 'matters from', 'unit'), [
+        (one.label, _number(one.before), _number(one.after), f'{one.scale:.3g}', one.unit)
+        for one in experiment.accuracies]
+
+
+def limit_rows(experiment: Experiment) -> list[tuple[str, str]]:
+    """Return every limit with its use, the fullest first."""
+    ranked = sorted(experiment.limits.items(), key=lambda item: -item[1])
+    return [(name, f'{100 * use:.0f} %') for name, use in ranked]
+
+
+def _number(value: float) -> str:
+    return 'unknown' if value == float('inf') else f'{value:.3g}'
+
+
+def experiment_view(experiment: Experiment) -> Any:
+    """Return what a motion is for, what it promises, and which limits it uses."""
+    parts: list[Any] = [f'[bold]{escape(experiment.text)}[/]']
+    if experiment.contests:
+        parts.append(titled_table('What it would tell', contests_table(experiment), right=()))
+    if experiment.accuracies:
+        headings, rows = accuracies_table(experiment)
+        parts.append(titled_table('Standard deviations', (headings, rows[:MOST_SHOWN]), right=()))
+        if len(rows) > MOST_SHOWN:
+            parts.append(f'… and {len(rows) - MOST_SHOWN} more, in --json and --report')
+    used = [row for row in limit_rows(experiment) if float(row[1].rstrip(' %')) >= 100 * HIGH]
+    parts.append('limits, of what their margin leaves: ' + ', '.join(
+        f'{name} {share}' for name, share in used[:6]) + '; all others less')
+    return stacked(*parts)
+
+
+def excitation_view(excitation: ArmExcitation) -> Any:
+    """Return what an arm's first motion is for, and which limits it uses."""
+    return stacked(escape(excitation.text), 'limits, of what their margin leaves: ' + ', '.join(
+        f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 
 def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Page:
@@ -43,7 +85,7 @@ def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Pag
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
     if experiment.contests:
-        page.table(CONTEST_HEADINGS, contest_rows(experiment),
+        page.table(*contests_table(experiment),
                    caption='What it would tell. Evidence is by how much the rival costs more in a '
                    'diagnosis of all recordings; the chance is that of the rival falling so far '
                    'behind that it is told as a rival no more.')
@@ -64,7 +106,7 @@ def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Pag
                     'checked at 500 Hz. Dashed: all of it.')
     if experiment.accuracies:
         with page.fold('How well numbers would be known'):
-            page.table(ACCURACY_HEADINGS, accuracy_rows(experiment), caption='Standard '
+            page.table(*accuracies_table(experiment), caption='Standard '
                        'deviations; effects that may or may not be there each beside the model '
                        'alone. A number of an effect matters from the size in the fourth column; '
                        'for a number of the model that is what its tolerance says.')
@@ -101,35 +143,27 @@ def _drives(experiment: Experiment, motion: Motion) -> Any:
 
 def _stacked(motion: Motion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...]], ...],
              ) -> Any:
-    go = plotly_objects()
-    from plotly.subplots import make_subplots
-
     assert motion.time is not None
-    figure = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    figure = charts.rows_over_time(len(rows), 170 * len(rows) + 80,
+                                   margin={'l': 70, 'r': 15, 't': 40, 'b': 45})
     colours: dict[str, str] = {}
     for row, (label, curves) in enumerate(rows, start=1):
         for name, values in curves:
-            time, shown = thinned(motion.time, values, points=POINTS)
+            time, shown = charts.thinned(motion.time, values, points=POINTS)
             is_new = name not in colours
-            colour = colours.setdefault(name, LINES[len(colours) % len(LINES)])
-            figure.add_trace(go.Scatter(
-                x=time, y=shown, name=name, mode='lines', legendgroup=name, showlegend=is_new,
-                line={'color': colour, 'width': 1.3}), row=row, col=1)
+            colour = colours.setdefault(name, charts.LINES[len(colours) % len(charts.LINES)])
+            figure.add_trace(charts.trace(time, shown, name, colour, legendgroup=name,
+                                          showlegend=is_new), row=row, col=1)
         figure.update_yaxes(title_text=label, row=row, col=1)
-    figure.update_xaxes(title_text='time [s]', row=len(rows), col=1, **SECONDS)
-    figure.update_layout(height=170 * len(rows) + 80, legend=LEGEND,
-                         margin={'l': 70, 'r': 15, 't': 40, 'b': 45})
     return figure
 
 
 def _limits(experiment: Experiment) -> Any:
-    go = plotly_objects()
     rows = limit_rows(experiment)[::-1]
-    uses = [100 * experiment.limits[name] for name, _ in rows]
-    figure = go.Figure(go.Bar(x=uses, y=[name for name, _ in rows], orientation='h',
-                              marker_color=LINES[0], hovertemplate='%{y}: %{x:.0f} %'))
-    figure.add_vline(x=100, line={'color': LINES[1], 'dash': 'dash'})
-    figure.update_layout(height=70 + 20 * len(rows), xaxis_title='use [%]',
-                         yaxis={'automargin': True, 'dtick': 1},
-                         margin={'l': 10, 'r': 20, 't': 20, 'b': 45})
+    figure = charts.figure([charts.plotly_objects().Bar(
+        x=[100 * experiment.limits[name] for name, _ in rows], y=[name for name, _ in rows],
+        orientation='h', marker_color=charts.LINES[0], hovertemplate='%{y}: %{x:.0f} %')],
+        70 + 20 * len(rows), xaxis_title='use [%]', yaxis={'automargin': True, 'dtick': 1},
+        margin={'l': 10, 'r': 20, 't': 20, 'b': 45})
+    figure.add_vline(x=100, line={'color': charts.LINES[1], 'dash': 'dash'})
     return figure

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Files that commands write: whole or not at all."""
+"""What commands read, print and write; files are written whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,15 +12,35 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.report.progress import staged_bar
-from pprs_dynamics.app.report.terminal import shown
+from pprs_dynamics.app.report.terminal import shown, staged_bar
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import for_json
 
 if TYPE_CHECKING:
+    from pprs_dynamics.app.front_door.inputs import Inputs
     from pprs_dynamics.app.front_door.result import Result
     from pprs_dynamics.app.report.page import Page
+
+
+def read_inputs(options: argparse.Namespace, screen: Any) -> Inputs:
+    """Read model and recordings of the arguments, and print what is wrong with the latter.
+
+    Raises
+    ------
+    PprsError
+        As `Inputs.of`.
+    """
+    # Here, as what only writes needs no statistics.
+    from pprs_dynamics.app.front_door.inputs import Inputs
+
+    with staged_bar(screen) as progress:
+        inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
+                           options.topic, progress)
+    for recording in (*inputs.fitted, *inputs.held_out):
+        for finding in recording.findings:
+            screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
+    return inputs
 
 
 def make_folder(path: str | PathLike[str]) -> Path:
@@ -40,11 +60,16 @@ def write_json(path: str | PathLike[str], content: Any) -> None:
 
 
 def tell(result: Result, options: argparse.Namespace, screen: Any,
-         page: Callable[[], Page] | None = None, view: Any = None) -> None:
-    """Print a result, and write what --json and --report ask for: its view and page by default."""
-    screen.print(result.view(options.details) if view is None else view)
+         page: Callable[[], Page] | None = None, view: Any = None, **beside: str) -> None:
+    """Print a result, and write what --json and --report ask for: its view and page by default.
+
+    What else is given stands in the JSON, too.
+    """
+    if view is None:
+        view = result.view(details=getattr(options, 'details', False))
+    screen.print(view)
     if options.json:
-        write_json(options.json, result.to_dict())
+        write_json(options.json, {**result.to_dict(), **beside})
     if options.report:
         with staged_bar(screen) as progress:
             progress('page', 0.0)

@@ -1,23 +1,93 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The page that shows where the model fails."""
+"""Where the model fails, in the terminal and as a page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from itertools import accumulate
+from typing import Any
 
 from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.tables import comparison_headings, comparison_rows
+from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
-from pprs_dynamics.inference.diagnosis.quantities import sentence
+from pprs_dynamics.inference.diagnosis.quantities import percent, plain, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 FIRST = 3  # statements on the first screen
+# Lines that places take without --details, and characters of a line of 80 columns, which words
+# seldom fill.
+MOST_LINES, LINE = 9, 70
+EFFORTS = ('rms', 'bias', 'peak', 'noise')
+
+
+def drives_table(comparison: Comparison) -> PlainTable:
+    """Return the numbers of every drive; the page shows all of them, the terminal the first."""
+    headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')
+    return ('drive', *(f'{name} [{comparison.unit}]' if name in EFFORTS else name
+                       for name in headings)), [
+        (name, f'{drive.rms:.3f}', percent(drive.relative), f'{drive.bias:+.3f}',
+         f'{drive.peak:.3f}', percent(drive.explained_variance), f'{drive.noise_floor:.3f}',
+         f'{drive.effective_samples:.0f} of {drive.samples}')
+        for name, drive in comparison.drives.items()]
+
+
+def comparison_view(comparison: Comparison, command: str, details: bool = False,
+                    beside: Beside | None = None) -> Any:
+    """Return how wrong the model is, where, and what to do next.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    command : str
+        That finds out why.
+    details : bool
+        Everything, instead of at most 25 lines of 80 columns.
+    beside : Beside, optional
+    """
+    lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
+    taken = accumulate(-(-len(line) // LINE) for line in lines)
+    told = [line for line, total in zip(lines, taken, strict=True)
+            if details or total <= MOST_LINES]
+    parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, told)]
+    if not lines:
+        parts.append('Nowhere in particular: nothing stands out against noise.')
+    if len(lines) > len(told):
+        parts.append(f'… and {len(lines) - len(told)} more, with --details, --json or --report')
+    if details:
+        parts += [escape(drive.verdict) for drive in comparison.drives.values()]
+    if comparison.is_beyond_noise:
+        parts += ['[bold]Next[/] Find out which physical effect is missing:',
+                  f'  [bold cyan]{escape(command)}[/]']
+    if beside is not None:
+        parts.append(_beside_table(comparison, beside))
+    return stacked(*parts)
+
+
+def _beside_table(comparison: Comparison, beside: Beside) -> Any:
+    rows = [*((name, one.rms, beside.drives.get(name)) for name, one in comparison.drives.items()),
+            ('all', comparison.rms, beside.rms)]
+    return text_table(
+        ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'),
+        [(escape(name), plain(before), 'none' if after is None else plain(after),
+          '' if not after or not before else f'{100 * (after / before - 1):+.0f}%')
+         for name, before, after in rows], frame='none')
+
+
+def _drives_table(comparison: Comparison) -> Any:
+    colours = {'noise': 'green', 'good': 'green', 'fair': 'yellow', 'poor': 'red'}
+    headings, rows = drives_table(comparison)
+    # One unit for all: names of joints need the room.
+    short = len(comparison.unit) > 1
+    return text_table(
+        [heading.partition(' [')[0] if short and not heading.startswith('rms') else heading
+         for heading in headings[:7]],
+        [(f'[{colours[drive.grade]}]{escape(row[0])}[/]', *row[1:7])
+         for row, drive in zip(rows, comparison.drives.values(), strict=True)], frame='none')
 
 
 def comparison_page(
@@ -43,8 +113,7 @@ def comparison_page(
     """
     page = Page('Model against measurement')
     page.text(sentence(comparison.verdict), 'lead')
-    page.text(f'Model: {Path(model.source).name or "built in memory"}. Recordings: '
-              f'{", ".join(recording.name for recording in recordings)}.', 'note')
+    page.sources(model.source, [recording.name for recording in recordings])
     statements = comparison.where
     with page.columns():
         with page.block():
@@ -65,11 +134,10 @@ def comparison_page(
                             'standard deviations under the noise.')
     if command and comparison.is_beyond_noise:
         page.command('Find out which physical effect is missing', command)
-    if len(statements) > FIRST:
-        with page.fold(f'{len(statements) - FIRST} more places'):
-            page.bullets([one.text for one in statements[FIRST:]])
+    page.folded_list(f'{len(statements) - FIRST} more places',
+                     [one.text for one in statements[FIRST:]])
     with page.fold('Drive by drive'):
-        page.table(comparison_headings(comparison), comparison_rows(comparison),
+        page.table(*drives_table(comparison),
                    [drive.grade for drive in comparison.drives.values()])
         page.bullets([drive.verdict for drive in comparison.drives.values()])
     with page.fold('Over time'):
@@ -81,13 +149,10 @@ def comparison_page(
                     residuals, drive)), f'{name}: effort, model and their difference.',
                     over_time=True)
     _by_drive(page, residuals, comparison)
-    with page.fold('How it was computed'):
-        page.bullets(notes)
+    page.folded_list('How it was computed', notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
-    if findings:
-        with page.fold('What is wrong with the recordings'):
-            page.bullets(findings)
+    page.folded_list('What is wrong with the recordings', findings)
     return page
 
 

@@ -1,0 +1,352 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is missing, why we think so, and what it does to the error; in the terminal and as a page.
+
+The terminal is readable from 80 columns on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from typing import Any
+
+from pprs_dynamics.app.report import diagnosis_figures as figures
+from pprs_dynamics.app.report.page import ErrorRow, Page
+from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
+from pprs_dynamics.app.report.what_if_part import add_what_if
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.error_steps import ErrorStep, error_steps
+from pprs_dynamics.inference.diagnosis.quantities import (
+    in_unit,
+    listed,
+    name_drives,
+    plain,
+    with_drives,
+)
+from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
+from pprs_dynamics.inference.diagnosis.sentences import (
+    Finding,
+    FittedValue,
+    Sentences,
+    fitted_values,
+    unexplained_groups,
+)
+from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
+from pprs_dynamics.inference.diagnosis.what_if import WhatIf
+from pprs_dynamics.inference.residuals.residuals import Residuals
+
+COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
+MOST_LISTED = 2  # places of effects whose parameters the sentences give; names in one line
+WIDTH = 80
+LONGEST = 160  # characters of values that are shown without --details: two lines
+MOST_EFFECTS = 4  # that are shown without --details
+EVERYWHERE = 'structure'  # where effects sit that are not on drives
+ELSEWHERE = '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
+METHOD = (
+    'Model and measured effort get the same treatment; every effect of the catalogue, in every '
+    'shape tried and on every drive, is a column of one regression beside the model\'s own numbers '
+    'as far as these are free.',
+    'Sets of effects and of patterns of no catalogue are compared by one cost: the penalised '
+    'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
+    'and prices for effects, drives, shapes and patterns that were tried. Evidence of an effect '
+    'is by how much the cost rises without it.')
+
+
+def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
+                   next_step: bool = True) -> Any:
+    """Return what the terminal shows, most important first.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    words : Sentences
+        The diagnosis in words.
+    details : bool
+        Whether all is shown that there is.
+    next_step : bool
+        Whether the command to go on with is told; not where it runs already.
+    """
+    return stacked(*(_parts if details else _brief)(diagnosis, words),
+                 *(_following(words) if next_step else ()),
+                 *(() if details else (ELSEWHERE,)))
+
+
+def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
+    yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
+    if diagnosis.effects:
+        yield text_table(_headings(diagnosis), _effect_rows(diagnosis)[:MOST_EFFECTS],
+                         right=(2, 3, 4), whole=(0, 2, 3, 4), frame='none')
+        lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
+                 for effect, drive, text in _joined(fitted_values(diagnosis))]
+        taken = accumulate(-(-len(line) // WIDTH) * WIDTH for line in lines)
+        shown = [line for line, total in zip(lines, taken, strict=True) if total <= LONGEST]
+        yield from map(escape, shown)
+        if len(lines) > len(shown):
+            yield f'  … values of {len(lines) - len(shown)} more: --details'
+    if second := runner_up(diagnosis):
+        yield f'[bold]Runner-up[/] {escape(second)}'
+    if words.within_model_error:
+        yield f'Within the model error of what was found: {escape(_within_model_error(diagnosis))}'
+    if words.warnings:
+        yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
+
+
+def _within_model_error(diagnosis: Diagnosis) -> str:
+    """Return the names of what was fitted as the model error of other effects, the first ones."""
+    every = diagnosis.residuals.drives
+    names = [with_drives(one.name, one.drives, every) for one in diagnosis.within_model_error]
+    more = len(names) - MOST_LISTED
+    return listed([*names[:MOST_LISTED], f'{more} more'] if more > 0 else names)
+
+
+def _following(words: Sentences) -> Iterator[Any]:
+    """Yield what to do next, and the command for it."""
+    yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
+    if words.command:
+        yield f'  [bold cyan]{escape(words.command)}[/]'
+
+
+def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
+    yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
+    if diagnosis.effects:
+        held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
+                else 'blocks of the same recordings')
+        yield _table(f'Those that lower the error most first; held out: {held}',
+                     _headings(diagnosis),
+                     _effect_rows(diagnosis), right=(2, 3, 4))
+    for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
+        yield _finding(number, finding)
+    values = fitted_values(diagnosis)
+    if len({(one.effect, one.drive) for one in values}) > MOST_LISTED:
+        yield _table('Values, ± two standard deviations', ('effect', 'drive', 'values'),
+                     [tuple(map(escape, row)) for row in _joined(values)])
+    if diagnosis.sets:
+        yield _table('The best sets of effects, and their costs above the best', ('cost', 'set'),
+                     [(cost, escape(text)) for text, cost in set_rows(diagnosis)])
+    if diagnosis.candidates:
+        yield _table('Each effect alone', (
+            'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'), [
+            (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
+             f'{one.error_after:.3f}') for one in diagnosis.candidates], right=(2, 3))
+    yield from _list('Within their tolerance', words.calibrated, 'blue')
+    yield from _list('Suspects', words.suspects, 'yellow')
+    yield from _list('Within model error', words.within_model_error, 'blue')
+    yield from _list('Warnings', words.warnings, 'yellow')
+
+
+def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    unit = diagnosis.residuals.unit
+    return ('effect', 'on', f'error [{unit}]', f'held out [{unit}]', 'evidence')
+
+
+def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    return [(one.name, sites(one.drives, diagnosis, one.places),
+             _fall(one.error_before, one.error_after),
+             _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
+            for one in diagnosis.effects]
+
+
+def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
+    """Return one row per effect and drive."""
+    rows: dict[tuple[str, str], list[str]] = {}
+    for one in values:
+        rows.setdefault((one.effect, one.drive), []).append(f'{one.parameter.symbol} {one.text}')
+    return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
+
+
+def _finding(number: int, finding: Finding) -> Any:
+    from rich.padding import Padding
+    from rich.table import Table
+
+    grid = Table.grid(padding=(0, 1))
+    grid.add_column(style='bold', width=8)
+    grid.add_column(ratio=1)
+    for label, text in finding_lines(finding):
+        grid.add_row(label, escape(text))
+    title = f'[bold]{number}. {escape(finding.title)}[/]'
+    return Padding(stacked(title, Padding(grid, (0, 0, 0, 3))), (0, 0, 1, 0))
+
+
+def finding_lines(finding: Finding) -> list[tuple[str, str]]:
+    """Return what a finding says, line by line, with labels."""
+    return [('missing', finding.what), ('why', finding.why), ('cause', finding.cause),
+            ('confirm', finding.confirm), *(('note', remark) for remark in finding.remarks)]
+
+
+def sites(drives: tuple[str, ...] | None, diagnosis: Diagnosis,
+          places: Sequence[Sequence[str]] = ()) -> str:
+    """Return where an effect sits, for a table."""
+    if places:
+        return listed([listed(names, 'or') for names in places])
+    return EVERYWHERE if drives is None else name_drives(drives, diagnosis.residuals.drives)
+
+
+def _fall(before: float, after: float) -> str:
+    colour = 'green' if after < before else 'red'
+    return f'{plain(before)} → [{colour}]{plain(after)}[/]'
+
+
+def _list(title: str, lines: Sequence[str], colour: str) -> Iterator[Any]:
+    from rich.table import Table
+
+    if lines:
+        yield f'[bold {colour}]{title}[/]'
+        for line in lines:
+            grid = Table.grid(padding=(0, 1))
+            grid.add_row('-', escape(line))
+            yield grid
+        yield ''
+
+
+def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
+           right: Sequence[int] = ()) -> Any:
+    return text_table(headings, rows, right=right, whole=(0, *right), frame='head', title=title)
+
+
+def diagnosis_page(
+    diagnosis: Diagnosis, words: Sentences, after: Residuals, recordings: Sequence[str],
+    validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
+    system: WhatIf | None = None,
+) -> Page:
+    """Return the page: an answer that fits one screen, the rest to be unfolded.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    words : Sentences
+        Of it.
+    after : Residuals
+        Of `diagnosis.adopted` on the same recordings.
+    recordings, validation : sequence of str
+        Names of those fitted, and of those held out.
+    rivals : sequence of RivalEffect
+        As they were given to `word_diagnosis`.
+    system : WhatIf, optional
+        Of it; without it nothing can be ticked.
+    """
+    page = Page(f'Diagnosis: {diagnosis.verdict}')
+    page.text(words.headline, 'lead')
+    page.sources(diagnosis.model.source, recordings, validation)
+    steps = error_steps(diagnosis, after)
+    with page.columns():
+        _errors(page, diagnosis, steps)
+        _first_picture(page, diagnosis)
+    page.command(words.following, words.command)
+    page.folded_list('Warnings', words.warnings, is_open=True)
+    if system is not None:
+        add_what_if(page, system, diagnosis.residuals)
+    _findings(page, diagnosis, words, rivals)
+    _sets(page, diagnosis)
+    _contributions(page, diagnosis, steps)
+    _parameters(page, diagnosis, words)
+    figures.add_every_drive(page, diagnosis.residuals, after, diagnosis.noise_floors,
+                            'with the model as given and with what was found')
+    with page.fold('How it was found'):
+        page.text(' '.join(METHOD))
+        if diagnosis.notes:
+            page.bullets(diagnosis.notes)
+    return page
+
+
+def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
+    first, last, floors = steps[0], steps[-1], diagnosis.noise_floors
+    fell = len(steps) > 1
+    rows = [ErrorRow('all drives', first.overall, last.overall if fell else None,
+                     diagnosis.noise_floor)]
+    rows += [ErrorRow(name, first.drives[d], last.drives[d] if fell else None, floors[name])
+             for d, name in enumerate(diagnosis.residuals.drives) if name in floors]
+    unit = diagnosis.residuals.unit
+    page.errors(rows, f'Error, rms [{unit}], before (grey) and with what was found (blue); dotted: '
+                'the noise.' if fell else f'Error, rms [{unit}]; dotted: the noise.')
+
+
+def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
+    """Add the one picture that shows what was found."""
+    if diagnosis.depends_on:
+        statement = max(diagnosis.depends_on, key=lambda one: one.mean_square)
+        picture = figures.unknown_picture(diagnosis, statement)
+        if picture is not None:
+            page.figure(picture, f'What no effect explains, on {statement.drive}.')
+            return
+    if diagnosis.effects:
+        page.figure(*figures.effect_pictures(diagnosis, diagnosis.effects[0])[0])
+
+
+def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
+              rivals: Sequence[RivalEffect]) -> None:
+    kind = diagnosis.model.kind
+    if words.effects:
+        with page.fold('What was found, why, and how to confirm it'):
+            for finding, one in zip(words.effects, diagnosis.effects, strict=True):
+                page.card(finding.title, _lines(finding, one.effect.card_in(kind).equation),
+                          figures.effect_pictures(diagnosis, one))
+                for said, rival in zip(words.rivals, rivals, strict=True):
+                    if rival.of == one.name:
+                        page.card(said.title,
+                                  _lines(said, rival.effect.card_in(kind).equation),
+                                  figures.effect_pictures(diagnosis, rival))
+    if words.unexplained:
+        with page.fold('What no effect of the catalogue explains'):
+            for finding, group in zip(words.unexplained, unexplained_groups(diagnosis),
+                                      strict=True):
+                pictures = [(figures.unknown_picture(diagnosis, one), f'{one.drive}.')
+                            for one in group]
+                page.card(finding.title, finding_lines(finding),
+                          [(figure, text) for figure, text in pictures if figure is not None])
+    page.folded_list('Suspects: effects that slow noise would explain as well', words.suspects)
+    page.folded_list('Within the model error of what was found', words.within_model_error)
+
+
+def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
+    lines = finding_lines(finding)
+    return [lines[0], ('equation', equation), ('looks like', finding.mark), *lines[1:]]
+
+
+def _sets(page: Page, diagnosis: Diagnosis) -> None:
+    if not diagnosis.sets:
+        return
+    with page.fold('The best sets of effects, and their costs'):
+        page.text('Cost above that of the best set. 10 stands for odds of 150 to 1: a set that '
+                  'comes nearer is told as a rival.', 'note')
+        page.table(('cost', 'set'), [(cost, text) for text, cost in set_rows(diagnosis)])
+        if diagnosis.candidates:
+            page.figure(figures.evidence_bars(diagnosis),
+                        'Evidence of each effect alone; 0 is the threshold. Blue: found. Yellow: '
+                        'a rival. Grey: explains less, or nothing beside what was found.')
+
+
+def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
+    if not diagnosis.effects:
+        return
+    unit = diagnosis.residuals.unit
+    where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
+             else 'blocks of the same recordings, the weaker evidence')
+    with page.fold('What each effect does to the error'):
+        if len(steps) > 2:
+            page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
+                         for k, step in enumerate(steps)],
+                        f'Error over all drives, rms [{unit}], as one after the other is added; '
+                        f'both ends are what a comparison says, the noise is '
+                        f'{in_unit(diagnosis.noise_floor, unit)}.')
+        page.table(('effect', 'evidence', f'error before [{unit}]', f'after [{unit}]',
+                    f'held out before [{unit}]', f'after [{unit}]', 'on'), [
+            (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
+             f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
+             sites(one.drives, diagnosis, one.places)) for one in diagnosis.effects],
+            caption='Those without which the error would be largest first, parameters fitted anew '
+            f'at every step. Held out: {where}.')
+        figures.add_contributions(page, diagnosis.residuals, {
+            one.name: one.force for one in diagnosis.effects}, 'What each effect contributes.')
+
+
+def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
+    values = fitted_values(diagnosis)
+    if values:
+        with page.fold('Values'):
+            page.table(('effect', 'drive', 'symbol', '± two standard deviations', 'parameter'),
+                       [(one.effect, one.drive, one.parameter.symbol, one.text,
+                         one.parameter.description) for one in values])
+    page.folded_list('Numbers of the model that moved within their tolerance', words.calibrated)

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A fitted base model, in the terminal and as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.app.report.page import ErrorRow, Page
+from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
+from pprs_dynamics.inference.diagnosis.quantities import plain, sentence
+from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
+            HALVES: 'each half of the recording predicted from the other',
+            VALIDATION: 'the validation recordings'}
+
+
+def errors_table(model: ForceModel, fit: BaseFit) -> PlainTable:
+    """Return drives, units, errors before, after and held out."""
+    return ('drive', 'unit', 'before', 'after', 'held out'), [
+        (drive, unit.effort, plain(fit.before[drive]), plain(fit.after[drive]),
+         plain(fit.held_out[drive]) if drive in fit.held_out else '')
+        for drive, unit in zip(model.drives, model.units, strict=True) if drive in fit.after]
+
+
+def numbers_table(fit: BaseFit) -> PlainTable:
+    """Return the fitted numbers."""
+    return ('number', 'drive', 'before', 'after', '± two std', 'unit'), [
+        (one.key, one.drive, plain(one.before), plain(one.after),
+         plain(2 * one.std) if isfinite(one.std) else '', one.unit) for one in fit.numbers]
+
+
+def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
+    """Return what the terminal shows: errors and notes; with `details` every number."""
+    errors = text_table(*plain_rows(errors_table(model, fit)), right=(2, 3, 4),
+                        title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
+    numbers = [text_table(*plain_rows(numbers_table(fit)), right=(2, 3, 4))] if details else []
+    return stacked(errors, *map(escape, fit.told), *numbers)
+
+
+def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
+             validate: Sequence[str]) -> Page:
+    """Return the page of one fit.
+
+    Parameters
+    ----------
+    model : ForceModel
+        As it was.
+    fit : BaseFit
+    recordings, validate : sequence of str
+        Names.
+    """
+    page = Page('Base model')
+    held_out = f'; {", ".join(validate)} held out' if validate else ''
+    page.text(f'Model: {Path(model.source).name or "built in memory"}. Fitted to '
+              f'{", ".join(recordings)}{held_out}.', 'note')
+    page.errors([ErrorRow(name, fit.before[name], after, None)
+                 for name, after in fit.after.items()],
+                'Error, rms, before (grey) and with the fitted numbers (blue).')
+    page.table(*errors_table(model, fit))
+    page.text(f'Held out: {HELD_OUT[fit.held_out_on]}.', 'note')
+    page.bullets([sentence(one) for one in fit.told])
+    with page.fold('Every number'):
+        page.table(*numbers_table(fit))
+    return page
