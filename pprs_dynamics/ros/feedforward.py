@@ -22,12 +22,10 @@ from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
 from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
-from pprs_dynamics.ros.messages.conversions import NANOSECONDS
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.request_reader import RequestReader, readers_for
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
-from pprs_dynamics.ros.messages.status_codes import REJECTIONS
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
+from pprs_dynamics.ros.messages.trajectory_request import RequestReader, readers_for
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import declare_own, drive_count

@@ -17,7 +17,7 @@ from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelSta
 from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.ros.feedforward_settings import CLAMP
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
-from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import SPLINE, Motion, TrajectoryRequest
 from pprs_dynamics.ros.node.model_parameters import NodeModel
 

@@ -34,10 +34,10 @@ from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
 from pprs_dynamics.system.numbers import finite
 

@@ -27,10 +27,9 @@ from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.feedforward_settings import FRAME
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.ros.messages.status_codes import REJECTIONS
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters

@@ -23,7 +23,7 @@ from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import Motion
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.parameters import (

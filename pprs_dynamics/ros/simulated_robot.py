@@ -19,8 +19,8 @@ from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.hidden_parameters import Hidden, HiddenParameters, in_words
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.cdr_validation import message_in
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals
 from pprs_dynamics.ros.node.parameters import (

@@ -28,13 +28,15 @@ from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.feedforward_settings import parameters_for
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.command_cdr import CommandBytes
-from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.request_reader import reader_for
-from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.ros.messages.status_codes import Code
-from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.serialisation import CommandBytes
+from pprs_dynamics.ros.messages.status_codes import Code, Rejection
+from pprs_dynamics.ros.messages.trajectory_request import (
+    SPLINE,
+    TrajectoryRequest,
+    read_joint_trajectory,
+    reader_for,
+)
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count

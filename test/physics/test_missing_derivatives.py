@@ -16,7 +16,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import spline_derivatives
-from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 
 TIMES = np.arange(0.0, 1.0, 0.01)

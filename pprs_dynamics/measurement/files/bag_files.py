@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.joint_state_cdr import serialised
-from pprs_dynamics.measurement.files.merged_states import (
-    CONTROLLER,
-    DYNAMIC,
+from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
-    read_merged,
+    JointStateBlocks,
+    message_types,
+    serialised,
 )
-from pprs_dynamics.measurement.files.message_blocks import JointStateBlocks
+from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, read_merged
 from pprs_dynamics.measurement.files.samples import (
     Defect,
     Indices,
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.rosbag2 import Reader
 
-MESSAGE_TYPE = JOINT_STATE
 LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
 CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
@@ -74,7 +72,7 @@ def read_bag(
     with _opened(path, storage) as reader:
         connections = _chosen(path, reader, topic)
         name = connections[0].topic
-        if connections[0].msgtype != MESSAGE_TYPE:
+        if connections[0].msgtype != JOINT_STATE:
             return _merged(path, reader, connections, drives, findings)
         blocks = JointStateBlocks(drives)
         total = sum(connection.msgcount for connection in connections)
@@ -95,7 +93,7 @@ def read_bag(
     if topic is None and np.all(np.isnan(effort)):
         with _opened(path, storage) as reader:
             if others := [one for one in reader.connections
-                          if one.msgtype == MESSAGE_TYPE and one.topic != name]:
+                          if one.msgtype == JOINT_STATE and one.topic != name]:
                 merged = _merged(path, reader, [*_chosen(path, reader, topic), *others], drives,
                                  findings)
                 if np.any(np.isfinite(merged.effort)):
@@ -169,9 +167,8 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
                      suffix: str) -> None:
     _require_rosbags('writing rosbag2 files')
     from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    typestore = get_typestore(Stores.ROS2_KILTED)
+    typestore = message_types()
     starts = [int(_stamps(samples).min()) for samples in topics.values() if len(samples.time)]
     with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
         for topic, sentences in texts.items():
@@ -187,8 +184,7 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
             stamps = _stamps(samples)
             # A bag is read in the order of recording: it must not follow a clock that is set back.
             recorded = np.maximum.accumulate(stamps)
-            connection = writer.add_connection(
-                topic, MESSAGE_TYPE, typestore=typestore)
+            connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
             for start in range(0, len(stamps), BLOCK):
                 part = slice(start, start + BLOCK)
                 velocity = None if samples.velocity is None else samples.velocity[part]
@@ -278,7 +274,7 @@ def _damaged(error: Exception) -> str:
 
 def _chosen(path: Path, reader: Reader, topic: str | None) -> list[Connection]:
     """Return the connections of the one topic to be read."""
-    states = [item for item in reader.connections if item.msgtype == MESSAGE_TYPE]
+    states = [item for item in reader.connections if item.msgtype == JOINT_STATE]
     controllers = [item for item in reader.connections
                    if item.msgtype in CONTROLLER_TYPES and item.msgcount]
     if topic is not None:

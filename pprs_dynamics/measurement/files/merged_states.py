@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE, message_types
 from pprs_dynamics.measurement.files.samples import Defect, Indices
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.rosbag2 import Reader
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
 DYNAMIC = 'control_msgs/msg/DynamicJointState'
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
 TYPES = (JOINT_STATE, DYNAMIC, CONTROLLER)
@@ -81,9 +81,9 @@ def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str
 
 def _typestore(connections: list[Connection]) -> Any:
     """Return types with those that the bag defines beside ROS 2's own."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys import get_types_from_msg
 
-    typestore = get_typestore(Stores.ROS2_KILTED)
+    typestore = message_types()
     for connection in connections:
         if connection.msgtype not in typestore.types and connection.msgdef.data:
             found = get_types_from_msg(connection.msgdef.data, connection.msgtype)

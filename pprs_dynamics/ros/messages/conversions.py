@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS 2 messages to motions and back: shapes and names, no mathematics."""
+"""ROS 2 messages to motions and back: names and shapes, no mathematics."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -23,14 +24,42 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import BASE, RobotNames
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.ros.messages.status_codes import Rejection
 
+BASE = 'base'
 PLATFORM = 'platform'
-PAPER = RobotNames(DRIVES, BASE)
 NANOSECONDS = 1_000_000_000
 LARGEST = 1e9  # [m, N, ...]: no drive's, and squares of what is far larger overflow
 LATEST_SECOND = 2 ** 31 - 1
+
+
+class RobotNames(NamedTuple):
+    """Joints in the order of the model's drives, and the frame.
+
+    Parameters
+    ----------
+    joints : tuple of D str
+        By `joint_map` and `joint_prefix` of the model.
+    frame : str
+        Of `header.frame_id`, in what comes and in what goes out; an empty one always means it.
+    """
+
+    joints: tuple[str, ...]
+    frame: str
+
+    @classmethod
+    def of(cls, model: ForceModel, frame: str = '') -> RobotNames:
+        """Return the names of a model's drives; `frame` '' for that of its kind."""
+        return cls(model.recorded.joints, frame or frame_of(model.drives))
+
+
+def frame_of(drives: Sequence[str]) -> str:
+    """Return the frame of what drives say: a platform's `base`; that of joints means nothing."""
+    return BASE if tuple(drives) == DRIVES else ''
+
+
+PAPER = RobotNames(DRIVES, BASE)
 
 
 def write_trajectory(
