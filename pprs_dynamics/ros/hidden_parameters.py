@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.ros.node.model_parameters import are_of_topics
-from pprs_dynamics.ros.node.parameters import NodeParameter, current_values, with_hint
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.ros.node.model_parameters import Followed
+from pprs_dynamics.ros.node.parameters import NodeParameter, current_values
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effects
 
@@ -56,7 +55,7 @@ def in_words(truths: Iterable[Mapping[str, Any]]) -> str:
     return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
 
 
-class HiddenParameters:
+class HiddenParameters(Followed[tuple[dict[str, Any], Hidden | None]]):
     """Follows the parameters of what is hidden; all others stay as they were at the start.
 
     Parameters
@@ -64,46 +63,32 @@ class HiddenParameters:
     node : Node
     declared : iterable of NodeParameter
         The node's own.
-    own : mapping
-        Their values now.
     hidden : Hidden or None
         What is hidden now; None of a robot in which that stays, too.
     use : callable
         Called with what is hidden from now on.
     """
 
-    def __init__(self, node: Node, declared: Iterable[NodeParameter], own: Mapping[str, Any],
-                 hidden: Hidden | None, use: Callable[[Hidden], None]) -> None:
-        self._node, self._use = node, use
-        self._declared = {one.name: one for one in declared
-                          if hidden is not None and one.name in CHANGEABLE}
-        self._own = {name: own[name] for name in self._declared}
-        self._hidden = hidden
-        self._checked = self._own, hidden
-        node.add_on_set_parameters_callback(self.check)
-        node.add_post_set_parameters_callback(self._apply)
+    def __init__(self, node: Node, declared: Iterable[NodeParameter], hidden: Hidden | None,
+                 use: Callable[[Hidden], None]) -> None:
+        self._hidden, self._use = hidden, use
+        super().__init__(node, (one for one in declared
+                                if hidden is not None and one.name in CHANGEABLE))
+        self._own, _ = self._checked
 
-    def check(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return whether the robot can be so from now on, and why not."""
-        if are_of_topics(changes):
-            return SetParametersResult(successful=True)
+    def _validated(self, changes: Iterable[Parameter]) -> tuple[dict[str, Any], Hidden | None]:
         before, after = current_values(self._node), current_values(self._node, changes)
-        try:
-            for name in (change.name for change in changes):
-                if name not in (*self._declared, *OF_ROS) and before.get(name) != after.get(name):
-                    raise ModelError(name, after.get(name), 'stay as it was at the start: of a '
-                                     'running robot only '
-                                     f'{", ".join(self._declared) or "the clock"} change')
-            own = {name: one.check(after.get(name)) for name, one in self._declared.items()}
-            if self._hidden is not None:
-                self._checked = own, Hidden.of(own, self._hidden)
-        except PprsError as error:
-            return SetParametersResult(successful=False, reason=with_hint(error))
-        return SetParametersResult(successful=True)
+        changeable = [one.name for one in self._declared]
+        for name in (change.name for change in changes):
+            if name not in (*changeable, *OF_ROS) and before.get(name) != after.get(name):
+                raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
+                                 f'robot only {", ".join(changeable) or "the clock"} change')
+        own = {one.name: one.check(after.get(one.name)) for one in self._declared}
+        return own, None if self._hidden is None else Hidden.of(own, self._hidden)
 
-    def _apply(self, changes: list[Parameter]) -> None:
-        # What was checked, and nothing else, comes into force.
-        if self._own != self._checked[0] and not are_of_topics(changes):
-            self._own, self._hidden = self._checked
-            if self._hidden is not None:
-                self._use(self._hidden)
+    def _apply(self, checked: tuple[dict[str, Any], Hidden | None],
+               changes: Iterable[Parameter]) -> None:
+        before, (self._own, hidden) = self._own, checked
+        if hidden is not None and self._own != before:
+            self._hidden = hidden
+            self._use(hidden)

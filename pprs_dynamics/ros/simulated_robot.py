@@ -117,7 +117,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
         steady_timer(self, 1.0, self._judge_timing)
-        self._settings = HiddenParameters(self, PARAMETERS, own, hidden, self._hide)
+        self._settings = HiddenParameters(self, PARAMETERS, hidden, self._hide)
 
     def _hide(self, hidden: Hidden) -> None:
         self._robot.use_effects(hidden.effects)

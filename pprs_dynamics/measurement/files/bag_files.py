@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
@@ -103,11 +104,18 @@ def read_bag(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
         stamps = received
     findings += _ignored(name, done, drives, blocks)
+    return _samples(drives, stamps, (position, velocity, effort), name, findings)
+
+
+def _samples(drives: tuple[str, ...], stamps: Indices, arrays: tuple[Array, Array, Array],
+             topics: str, findings: list[Defect]) -> Samples:
+    """Return positions, velocities and efforts at stamps [ns] as samples."""
     epoch = whole_epoch(stamps / 1e9)
+    position, velocity, effort = arrays
     return Samples(
         drives, (stamps - epoch * 10**9) / 1e9, position,
         None if np.all(np.isnan(velocity)) else velocity, effort, epoch,
-        f'rosbag2, {name}', tuple(findings))
+        f'rosbag2, {topics}', tuple(findings))
 
 
 def _merged(path: Path, reader: Reader, connections: list[Connection], drives: tuple[str, ...],
@@ -121,11 +129,8 @@ def _merged(path: Path, reader: Reader, connections: list[Connection], drives: t
     if merged is None or not len(merged.stamps):
         raise UnreadableFileError(path, f'{topics} holds no positions of all of '
                                   f'{", ".join(drives)} at the same times')
-    epoch = whole_epoch(merged.stamps / 1e9)
-    return Samples(
-        drives, (merged.stamps - epoch * 10**9) / 1e9, merged.position,
-        None if np.all(np.isnan(merged.velocity)) else merged.velocity, merged.effort, epoch,
-        f'rosbag2, {topics}', (*findings, *merged.findings))
+    return _samples(drives, merged.stamps, (merged.position, merged.velocity, merged.effort),
+                    topics, [*findings, *merged.findings])
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],

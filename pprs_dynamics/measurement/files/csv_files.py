@@ -26,10 +26,11 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import RecordedColumns
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.samples import (
+    CURRENT,
+    QUANTITIES,
     Defect,
     Progress,
     Samples,
-    whole_epoch,
 )
 from pprs_dynamics.system.csv_tables import (
     LONGEST_LINE,
@@ -41,8 +42,6 @@ from pprs_dynamics.system.csv_tables import (
 from pprs_dynamics.system.numbers import parse_number
 from pprs_dynamics.system.plain_text import counted
 
-QUANTITIES = ('position', 'velocity', 'effort')
-CURRENT = 'current'
 # The second is what PlotJuggler writes.
 TIME_COLUMNS = ('time', '__time')
 SEPARATORS = (',', ';', '\t')
@@ -50,11 +49,21 @@ SEPARATORS = (',', ';', '\t')
 
 @dataclass(frozen=True)
 class _Table:
-    """Header of a table: separator, all columns, and those that are used."""
+    """Header of a table: separator, all columns, and which are used.
+
+    Those of drives and quantities had a prefix where there is one.
+    """
 
     separator: str
     header: list[str]
-    used: list[int]
+    time: int
+    columns: dict[tuple[str, str], int]
+    prefix: str = ''
+
+    @property
+    def used(self) -> list[int]:
+        """Numbers of the columns that are read: of time, and of drives and quantities."""
+        return [self.time, *self.columns.values()]
 
 
 def read_csv(
@@ -84,9 +93,8 @@ def read_csv(
             if not first:
                 raise UnreadableFileError(path, 'the file is empty')
             check_length(path, 1, first)
-            table, prefix, columns = (
-                _columns(path, first, drives, topic) if names is None
-                else _named_columns(path, first, drives, names))
+            table = (_columns(path, first, drives, topic) if names is None
+                     else _named_columns(path, first, drives, names))
             blocks = []
             for block in _blocks(path, file, table):
                 blocks.append(block)
@@ -103,7 +111,7 @@ def read_csv(
             path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8') from None
     if not blocks:
         raise UnreadableFileError(path, 'no samples below the header')
-    return _samples(drives, table, prefix, columns, blocks)
+    return _samples(drives, table, blocks)
 
 
 def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:
@@ -124,8 +132,8 @@ def write_csv(path: Path, samples: Samples) -> None:
 
 def _columns(
     path: Path, first: str, drives: tuple[str, ...], topic: str | None,
-) -> tuple[_Table, str, dict[tuple[str, str], int]]:
-    """Return the table, the prefix, and the column of each (drive, quantity)."""
+) -> _Table:
+    """Return what the header says, by the names of our own format."""
     headers = _headers(path, first, SEPARATORS)
     separator = max(SEPARATORS, key=lambda s: len(headers[s]))
     header = headers[separator]
@@ -150,21 +158,26 @@ def _columns(
     for drive in drives:
         if (drive, 'effort') in columns:
             columns.pop((drive, CURRENT), None)
-    return _Table(separator, header, [header.index(time), *columns.values()]), prefix, columns
+    return _Table(separator, header, header.index(time), columns, prefix)
 
 
 def _named_columns(
     path: Path, first: str, drives: tuple[str, ...], names: RecordedColumns,
-) -> tuple[_Table, str, dict[tuple[str, str], int]]:
-    """Return what `_columns` does, of columns with names of their own."""
+) -> _Table:
+    """Return what the header says, of columns with names of their own."""
     headers = _headers(path, first, (*SEPARATORS, ' ', '|'))
     separator = next((each for each, cells in headers.items() if names.time in cells), ',')
     header = headers[separator]
-    wanted = {(drive, quantity): name for drive in drives
-              for quantity, name in names.drives[drive].names.items()}
+    wanted = named_columns(names, drives)
     require_columns(path, [names.time, *wanted.values()], header)
-    columns = {key: header.index(name) for key, name in wanted.items()}
-    return _Table(separator, header, [header.index(names.time), *columns.values()]), '', columns
+    return _Table(separator, header, header.index(names.time),
+                  {key: header.index(name) for key, name in wanted.items()})
+
+
+def named_columns(names: RecordedColumns, drives: Sequence[str]) -> dict[tuple[str, str], str]:
+    """Return the names of columns by drive and quantity."""
+    return {(drive, quantity): name for drive in drives
+            for quantity, name in names.drives[drive].names.items()}
 
 
 def require_columns(path: Path, wanted: Sequence[str], known: Sequence[str]) -> None:
@@ -281,32 +294,14 @@ def _number(
             f'{cell[:40]!r}{comma}') from None
 
 
-def _samples(
-    drives: tuple[str, ...], table: _Table, prefix: str,
-    columns: dict[tuple[str, str], int], blocks: list[Array],
-) -> Samples:
-    def joined(column: int | None) -> Array:
-        if column is None:
-            return np.full(sum(map(len, blocks)), np.nan)
-        place = table.used.index(column)
-        return np.concatenate([block[:, place] for block in blocks])
-
-    def quantity(name: str) -> Array:
-        return np.column_stack([joined(columns.get((drive, name))) for drive in drives])
-
-    time = joined(table.used[0])
-    epoch = whole_epoch(time)
-    has_velocity = any(name == 'velocity' for _, name in columns)
+def _samples(drives: tuple[str, ...], table: _Table, blocks: list[Array]) -> Samples:
+    time, *values = (np.concatenate([block[:, place] for block in blocks])
+                     for place in range(len(table.used)))
     others = [name or '(no name)' for index, name in enumerate(table.header)
               if index not in table.used]
     findings = (Defect(
         'ignored_columns', len(others),
         f'the file also holds {counted(len(others), "column")}: '
         + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),) if others else ()
-    in_amperes = tuple((drive, CURRENT) in columns for drive in drives)
-    effort = np.where(in_amperes, quantity(CURRENT), quantity('effort'))
-    velocity = quantity('velocity') if has_velocity else None
-    if velocity is not None and np.all(np.isnan(velocity)):
-        velocity = None
-    return Samples(drives, time - epoch, quantity('position'), velocity, effort,
-                   epoch, f'CSV, {prefix}' if prefix else 'CSV', findings, in_amperes)
+    return Samples.of_columns(drives, time, dict(zip(table.columns, values, strict=True)),
+                              f'CSV, {table.prefix}' if table.prefix else 'CSV', findings)

@@ -18,7 +18,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE, message_types
-from pprs_dynamics.measurement.files.samples import Defect, Indices
+from pprs_dynamics.measurement.files.samples import QUANTITIES, Defect, Indices
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 DYNAMIC = 'control_msgs/msg/DynamicJointState'
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
 TYPES = (JOINT_STATE, DYNAMIC, CONTROLLER)
-QUANTITIES = ('position', 'velocity', 'effort')
 LONGEST_STEP = 1.6  # median steps between two samples, over which nothing is interpolated
 
 

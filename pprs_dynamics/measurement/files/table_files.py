@@ -15,7 +15,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import RecordedColumns
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.csv_files import read_csv, require_columns
+from pprs_dynamics.measurement.files.csv_files import named_columns, read_csv, require_columns
 from pprs_dynamics.measurement.files.samples import Progress, Samples
 
 PARQUET, MAT = ('.parquet', '.pq'), ('.mat',)
@@ -53,8 +53,8 @@ def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns,
 
 
 def _of_arrays(path: Path, drives: tuple[str, ...], columns: RecordedColumns) -> Samples:
-    wanted = [columns.time, *(name for drive in drives
-                              for name in columns.drives[drive].names.values())]
+    names = named_columns(columns, drives)
+    wanted = [columns.time, *names.values()]
     table = (_parquet if path.suffix in PARQUET else _mat)(path, wanted)
     require_columns(path, wanted, list(table))
     arrays = {name: _numbers(path, name, table[name]) for name in wanted}
@@ -63,16 +63,8 @@ def _of_arrays(path: Path, drives: tuple[str, ...], columns: RecordedColumns) ->
         short = min(arrays, key=lambda name: len(arrays[name]))
         raise UnreadableFileError(path, f'column {short!r} has {len(arrays[short])} rows, '
                                   f'must have {max(lengths)}, as others')
-    time = arrays[columns.time]
-    none = np.full(len(time), np.nan)
-
-    def of(quantity: str) -> Array:
-        return np.stack([arrays.get(columns.drives[drive].names.get(quantity, ''), none)
-                         for drive in drives], axis=1)
-
-    has_velocity = any('velocity' in columns.drives[drive].names for drive in drives)
-    return Samples(drives, time, of('position'), of('velocity') if has_velocity else None,
-                   of('effort'))
+    return Samples.of_columns(drives, arrays[columns.time],
+                              {key: arrays[name] for key, name in names.items()}, '')
 
 
 def _numbers(path: Path, name: str, values: Any) -> Array:

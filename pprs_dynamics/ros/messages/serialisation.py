@@ -57,7 +57,8 @@ class CommandBytes:
             *((name, [('count', '<u4', 2), ('values', '<f8', count)])
               for name in ('positions', 'velocities', 'accelerations', 'effort')),
             ('sec', '<i4'), ('nanosec', '<u4')])
-        self._commands = _Template(objects.commands(zeros))
+        template = _Template(objects.commands(zeros))
+        self._commands = bytes(template.data[:template.places[0]])  # all but its numbers
         self._effort = _Template(objects.joint_state(0, zeros))
         self._state = _Template(objects.joint_state(0, zeros, zeros, zeros))
         still: Any = SimpleNamespace(drive_motion=(zeros[None],) * 3)
@@ -66,7 +67,7 @@ class CommandBytes:
 
     def commands(self, effort: Array) -> bytes:
         """Return a std_msgs/Float64MultiArray that holds the drives' efforts."""
-        return self._filled(self._commands, effort)
+        return self._commands + self._values.pack(*effort.tolist())
 
     def joint_state(self, stamp: int, effort: Array, position: Array | None = None,
                     velocity: Array | None = None) -> bytes:
