@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,13 +178,6 @@ class Samples:
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""
         return self.units[drive].of(unit) if self.units else unit
-
-    def take(self, index: Indices | Mask) -> Samples:
-        """Return the samples of an index or mask."""
-        return replace(
-            self, time=self.time[index], position=self.position[index],
-            velocity=None if self.velocity is None else self.velocity[index],
-            effort=self.effort[index])
 
 
 def whole_epoch(seconds: Array) -> int:
