@@ -20,21 +20,25 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
-from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
-from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
+from pprs_dynamics.ros.force_command import (
+    HOLD_GRAVITY,
+    SILENT,
+    Feedforward,
+    ForceCommand,
+    parameters_for,
+)
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import RequestReader, readers_for
+from pprs_dynamics.ros.node.clocks import CommandWatchdog
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import declare_own, drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import UNANSWERED, publisher, subscription
-from pprs_dynamics.ros.node.status import StatusReporter
-from pprs_dynamics.ros.node.timing import Durations
-from pprs_dynamics.ros.node.watchdog import CommandWatchdog
+from pprs_dynamics.ros.node.status import Durations, StatusReporter
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01

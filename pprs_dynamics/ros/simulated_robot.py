@@ -24,12 +24,12 @@ from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals
 from pprs_dynamics.ros.node.parameters import (
-    NodeParameter,
     current_values,
     declare_arm,
     declare_model,
     declare_own,
     overrides,
+    own_parameter,
 )
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
@@ -42,32 +42,32 @@ from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 PARAMETERS = (
-    NodeParameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
-    NodeParameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
-    NodeParameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
-    NodeParameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
+    own_parameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
+    own_parameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
+    own_parameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
+    own_parameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
                   'false: it is ignored, and the PD loop compensates gravity by itself'),
-    NodeParameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
+    own_parameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
                   '0: never', lower=0, upper=3600),
-    NodeParameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
-    NodeParameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
-    NodeParameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
+    own_parameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
+    own_parameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
+    own_parameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
                   lower=0),
-    NodeParameter('hidden_effects', [], 'names of effects that the model does not know of, '
+    own_parameter('hidden_effects', (), 'names of effects that the model does not know of, '
                   'or random for one drawn at random; drives may follow: '
                   'coulomb_friction:lift_1,lift_2'),
-    NodeParameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
-    NodeParameter('seed', 0, 'of noise and hidden effects', lower=0),
+    own_parameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
+    own_parameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
 # Of an arm or a robot with loops, whose drives are in several units and sizes.
 OF_JOINTS = (
-    NodeParameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
-    NodeParameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
+    own_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
+    own_parameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
                   upper=50),
-    NodeParameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
+    own_parameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
     *(one for one in PARAMETERS[3:] if one.name not in ('encoder_resolution', 'effort_noise')),
-    NodeParameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
-    NodeParameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
+    own_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
+    own_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
 )
 # A node that was stopped for longer than this [s] goes on from now instead of catching up.

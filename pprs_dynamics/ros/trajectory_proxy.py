@@ -25,8 +25,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.ros.feedforward_settings import parameters_for
-from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.serialisation import CommandBytes
@@ -39,15 +38,15 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 )
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
+from pprs_dynamics.ros.node.parameters import declare_own, drive_count, own_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
-ACTION = NodeParameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
+ACTION = own_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
                        'of the controller that the goals are passed on to', stays=True)
-TIMEOUT = NodeParameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
+TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
