@@ -33,7 +33,7 @@ from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides, own_parameter
+from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED, publisher, subscription
@@ -66,8 +66,8 @@ class MonitorNode(ExplainsRefusals):
         if is_mechanism(overrides(self)):
             parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
                                for one in PARAMETERS)
-        own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use)
+        own = self._settings.own
         prepare_beside(self, self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])

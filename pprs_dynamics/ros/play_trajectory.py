@@ -28,7 +28,7 @@ from pprs_dynamics.ros.messages.trajectory_request import Motion
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.parameters import (
     current_values,
-    declare_arm,
+    declare_model,
     declare_own,
     overrides,
     own_parameter,
@@ -165,7 +165,7 @@ class Beats:
 
 def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[..., Any]]:
     """Return an excitation of the drives of the node's model, and what writes its messages."""
-    declare_arm(node)
+    declare_model(node)
     given = current_values(node)
     model = ArmModel.from_parameters({name: given[name] for name in given.keys() - values.keys()})
     drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])

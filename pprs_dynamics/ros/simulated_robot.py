@@ -5,10 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from rclpy.node import Node
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -17,15 +20,14 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.ros.hidden_parameters import Hidden, HiddenParameters, in_words
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals
+from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, Followed
 from pprs_dynamics.ros.node.parameters import (
+    NodeParameter,
     current_values,
-    declare_arm,
     declare_model,
     declare_own,
     overrides,
@@ -37,6 +39,7 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.linkage_plant import LinkagePlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
@@ -70,6 +73,9 @@ OF_JOINTS = (
     own_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
 )
+# What of a running robot changes: what is hidden in it, and parameters of ROS 2 itself.
+CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')
+OF_ROS = ('use_sim_time', 'start_type_description_service')
 # A node that was stopped for longer than this [s] goes on from now instead of catching up.
 LONGEST_CATCH_UP = 0.5
 # Between them the executor takes one command: with more, commands at 200 Hz would pile up.
@@ -88,7 +94,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         of_joints = is_mechanism(overrides(self))
         own = declare_own(self, OF_JOINTS if of_joints else PARAMETERS)
-        (declare_arm if of_joints else declare_model)(self)
+        declare_model(self)
         values = {name: value for name, value in current_values(self).items() if name not in own}
         self._model = build_model(values)
         self._names = RobotNames.of(self._model)
@@ -230,3 +236,74 @@ def _behaviour(own: dict[str, Any]) -> dict[str, Any]:
     return {'gravity_compensation': not own['use_effort'],
             'command_timeout': own['command_timeout'] or np.inf,
             'actuation_delay': own['actuation_delay']}
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Hidden effects, and the words, scale and seed that they were drawn from."""
+
+    words: tuple[str, ...]
+    drawn_with: tuple[float, int]
+    effects: tuple[HiddenEffect, ...]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], running: Hidden | None = None) -> Hidden:
+        """Return those that parameters say; what acts already stays what it is.
+
+        Raises
+        ------
+        HiddenEffectError
+            For words that name no effect.
+        """
+        words = tuple(values['hidden_effects'])
+        drawn_with = values['hidden_scale'], values['seed']
+        effects = draw_effects(words, np.random.default_rng(values['seed']),
+                               values['hidden_scale'])
+        kept = (dict(zip(running.words, running.effects, strict=True))
+                if running is not None and running.drawn_with == drawn_with else {})
+        return cls(words, drawn_with, tuple(
+            kept.pop(word, effect) for word, effect in zip(words, effects, strict=True)))
+
+
+def in_words(truths: Iterable[Mapping[str, Any]]) -> str:
+    """Return what is hidden, for the log."""
+    return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
+
+
+class HiddenParameters(Followed[tuple[dict[str, Any], Hidden | None]]):
+    """Follows the parameters of what is hidden; all others stay as they were at the start.
+
+    Parameters
+    ----------
+    node : Node
+    declared : iterable of NodeParameter
+        The node's own.
+    hidden : Hidden or None
+        What is hidden now; None of a robot in which that stays, too.
+    use : callable
+        Called with what is hidden from now on.
+    """
+
+    def __init__(self, node: Node, declared: Iterable[NodeParameter], hidden: Hidden | None,
+                 use: Callable[[Hidden], None]) -> None:
+        self._hidden, self._use = hidden, use
+        super().__init__(node, (one for one in declared
+                                if hidden is not None and one.name in CHANGEABLE))
+        self._own, _ = self._checked
+
+    def _validated(self, changes: Iterable[Parameter]) -> tuple[dict[str, Any], Hidden | None]:
+        before, after = current_values(self._node), current_values(self._node, changes)
+        changeable = [one.name for one in self._declared]
+        for name in (change.name for change in changes):
+            if name not in (*changeable, *OF_ROS) and before.get(name) != after.get(name):
+                raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
+                                 f'robot only {", ".join(changeable) or "the clock"} change')
+        own = {one.name: one.check(after.get(one.name)) for one in self._declared}
+        return own, None if self._hidden is None else Hidden.of(own, self._hidden)
+
+    def _apply(self, checked: tuple[dict[str, Any], Hidden | None],
+               changes: Iterable[Parameter]) -> None:
+        before, (self._own, hidden) = self._own, checked
+        if hidden is not None and self._own != before:
+            self._hidden = hidden
+            self._use(hidden)

@@ -38,7 +38,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 )
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import declare_own, drive_count, own_parameter
+from pprs_dynamics.ros.node.parameters import drive_count, own_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.status import StatusReporter
 
@@ -61,8 +61,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         parameters = (ACTION, TIMEOUT, *(
             replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
             for one in parameters_for(drive_count(self)) if one.name in SHARED))
-        own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, lambda: None)
+        own = self._settings.own
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': own['action']}, self._counters,

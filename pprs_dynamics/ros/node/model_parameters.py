@@ -28,8 +28,8 @@ from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     added_descriptor,
     current_values,
-    declare_arm,
     declare_model,
+    declare_own,
     in_declared_type,
     overrides,
     with_hint,
@@ -101,13 +101,13 @@ class Followed(Generic[Checked]):
 
 
 class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
-    """Declares a model's parameters on a node, and follows their changes.
+    """Declares a node's own parameters and those of a model, and follows their changes.
 
     Parameters
     ----------
     node : Node
-    own : sequence of NodeParameter
-        The node's own parameters, declared already.
+    own : iterable of NodeParameter
+        The node's own parameters, which are declared before the model's.
     changed : callable
         Called after every change that was accepted.
 
@@ -130,12 +130,10 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
         self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
     ) -> None:
         self._changed = changed
+        own = tuple(own)
+        declare_own(node, own)
         self._kind: type[NodeModel] = ArmModel if is_mechanism(overrides(node)) else DriveModel
-        taken_from_paper = []
-        if self._kind is ArmModel:
-            declare_arm(node)
-        else:
-            taken_from_paper = declare_model(node)
+        taken_from_paper = declare_model(node)
         self._stays: dict[str, Any] = {}
         super().__init__(node, own)
         self.model, self.own = self._checked

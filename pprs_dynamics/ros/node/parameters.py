@@ -136,8 +136,15 @@ def drive_count(node: Node) -> int:
     return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 
-def declare_arm(node: Node) -> None:
-    """Declare every key of an arm's model; a relative path of its URDF becomes an absolute one.
+def declare_model(node: Node) -> list[str]:
+    """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
+
+    A relative path of a mechanism's URDF becomes an absolute one.
+
+    Returns
+    -------
+    list of str
+        Keys of a 3-PPRS that were given neither in a file nor on the command line.
 
     Raises
     ------
@@ -145,28 +152,15 @@ def declare_arm(node: Node) -> None:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
+    if is_axis(given):
+        DriveModel.from_parameters(given)  # refuses it
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
             given[key] = str(folder_of(key) / given[key])
-    _declare_keys(node, keys_of(given), given, {})
-
-
-def declare_model(node: Node) -> list[str]:
-    """Declare every key of a 3-PPRS's model, with the paper's robot where nothing is given.
-
-    Returns
-    -------
-    list of str
-        Keys that were given neither in a file nor on the command line.
-    """
-    defaults = default_parameters()
-    given = overrides(node)
-    if is_axis(given) or is_mechanism(given):
-        DriveModel.from_parameters(given)  # refuses it
-    if any(name.startswith('geometry.') for name in given):
-        # Somebody's own robot: what is missing must not become the paper's in silence.
-        defaults = {}
-    _declare_keys(node, KEYS, given, defaults)
+    # Of somebody's own robot what is missing must not become the paper's in silence.
+    is_own = is_mechanism(given) or any(name.startswith('geometry.') for name in given)
+    defaults = {} if is_own else default_parameters()
+    _declare_keys(node, keys_of(given), given, defaults)
     return [name for name in KEYS if name not in given and name in defaults]
 
 
