@@ -52,11 +52,12 @@ SEPARATORS = (',', ';', '\t')
 
 @dataclass(frozen=True)
 class _Table:
-    """Header of a table: separator, all columns, and which are used.
+    """A CSV file by its header: separator, all columns, and which are used.
 
     Those of drives and quantities had a prefix where there is one.
     """
 
+    path: Path
     separator: str
     header: list[str]
     time: int
@@ -67,6 +68,61 @@ class _Table:
     def used(self) -> list[int]:
         """Numbers of the columns that are read: of time, and of drives and quantities."""
         return [self.time, *self.columns.values()]
+
+    def blocks(self, file: TextIO) -> Iterator[Array]:
+        """Yield the used columns of the rows below the header, (n, columns used)."""
+        for start, lines in read_lines(self.path, file, start=2):
+            numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
+            for number, line in numbered:
+                if line.count(self.separator) != len(self.header) - 1:
+                    self._cells(number, line)
+            if numbered:
+                yield self._numbers(numbered)
+
+    def _numbers(self, numbered: list[tuple[int, str]]) -> Array:
+        text = _with_empty_cells_named(
+            '\n' + '\n'.join([line for _, line in numbered]), self.separator)
+        try:
+            rows = np.loadtxt(text[1:].split('\n'), delimiter=self.separator, usecols=self.used,
+                              comments=None, ndmin=2, quotechar='"')
+            if len(rows) == len(numbered):
+                return rows
+        except ValueError:
+            pass
+        # Slow, and seldom: to name the row or the cell, or to read cells of blanks.
+        return np.array([[self._number(number, cells, column) for column in self.used]
+                         for number, line in numbered for cells in [self._cells(number, line)]])
+
+    def _cells(self, number: int, line: str) -> list[str]:
+        cells = cells_of(self.path, number, line, self.separator)
+        if len(cells) == len(self.header):
+            return cells
+        raise UnreadableFileError(
+            self.path, f'row {number} holds {counted(len(cells), "cell")}, but the header '
+            f'{len(self.header)}: it is truncated or not a table')
+
+    def _number(self, line: int, cells: Sequence[str], column: int) -> float:
+        cell = cells[column].strip()
+        try:
+            return parse_number(cell) if cell else float('nan')
+        except ValueError:
+            comma = ' (a decimal comma is not read)' if re.fullmatch(r'[-+\d]+,\d+', cell) else ''
+            raise UnreadableFileError(
+                self.path, f'row {line}, column {self.header[column]} must hold a number, but '
+                f'holds {cell[:40]!r}{comma}') from None
+
+    def samples(self, drives: tuple[str, ...], blocks: list[Array]) -> Samples:
+        """Return what the blocks of the rows hold, and which columns were not read."""
+        time, *values = (np.concatenate([block[:, place] for block in blocks])
+                         for place in range(len(self.used)))
+        others = [name or '(no name)' for index, name in enumerate(self.header)
+                  if index not in self.used]
+        findings = (Defect(
+            'ignored_columns', len(others),
+            f'the file also holds {counted(len(others), "column")}: '
+            + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),) if others else ()
+        return Samples.of_columns(drives, time, dict(zip(self.columns, values, strict=True)),
+                                  f'CSV, {self.prefix}' if self.prefix else 'CSV', findings)
 
 
 def read_csv(
@@ -99,7 +155,7 @@ def read_csv(
             table = (_columns(path, first, drives, topic) if names is None
                      else _named_columns(path, first, drives, names))
             blocks = []
-            for block in _blocks(path, file, table):
+            for block in table.blocks(file):
                 blocks.append(block)
                 if progress is not None:
                     progress(min(raw.tell(), size), size)
@@ -114,7 +170,7 @@ def read_csv(
             path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8') from None
     if not blocks:
         raise UnreadableFileError(path, 'no samples below the header')
-    return _samples(drives, table, blocks)
+    return table.samples(drives, blocks)
 
 
 def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:
@@ -161,7 +217,7 @@ def _columns(
     for drive in drives:
         if (drive, 'effort') in columns:
             columns.pop((drive, CURRENT), None)
-    return _Table(separator, header, header.index(time), columns, prefix)
+    return _Table(path, separator, header, header.index(time), columns, prefix)
 
 
 def _named_columns(
@@ -173,7 +229,7 @@ def _named_columns(
     header = headers[separator]
     wanted = _names_of_columns(names, drives)
     _require_columns(path, [names.time, *wanted.values()], header)
-    return _Table(separator, header, header.index(names.time),
+    return _Table(path, separator, header, header.index(names.time),
                   {key: header.index(name) for key, name in wanted.items()})
 
 
@@ -228,48 +284,6 @@ def _prefix(
     return complete[0]
 
 
-def _blocks(path: Path, file: TextIO, table: _Table) -> Iterator[Array]:
-    """Yield the used columns of the rows below the header, (n, columns used)."""
-    for start, lines in read_lines(path, file, start=2):
-        numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
-        if numbered:
-            _check_widths(path, numbered, table)
-            yield _numbers(path, numbered, table)
-
-
-def _check_widths(path: Path, numbered: list[tuple[int, str]], table: _Table) -> None:
-    width, separator = len(table.header), table.separator
-    for number, line in numbered:
-        if line.count(separator) != width - 1:
-            _checked_cells(path, number, line, table)
-
-
-def _numbers(path: Path, numbered: list[tuple[int, str]], table: _Table) -> Array:
-    separator = table.separator
-    text = _with_empty_cells_named('\n' + '\n'.join([line for _, line in numbered]), separator)
-    try:
-        rows = np.loadtxt(text[1:].split('\n'), delimiter=separator, usecols=table.used,
-                          comments=None, ndmin=2, quotechar='"')
-        if len(rows) == len(numbered):
-            return rows
-    except ValueError:
-        pass
-    # Slow, and seldom: to name the row or the cell, or to read cells of blanks.
-    return np.array([
-        [_number(path, number, cells, column, table) for column in table.used]
-        for number, line in numbered
-        for cells in [_checked_cells(path, number, line, table)]])
-
-
-def _checked_cells(path: Path, number: int, line: str, table: _Table) -> list[str]:
-    cells = cells_of(path, number, line, table.separator)
-    if len(cells) == len(table.header):
-        return cells
-    raise UnreadableFileError(
-        path, f'row {number} holds {counted(len(cells), "cell")}, but the header '
-        f'{len(table.header)}: it is truncated or not a table')
-
-
 def _with_empty_cells_named(text: str, separator: str) -> str:
     """Return lines, after a first newline, with nan in cells of no character."""
     # Plain searches: a regular expression for the same takes as long as reading the numbers.
@@ -282,32 +296,6 @@ def _with_empty_cells_named(text: str, separator: str) -> str:
         for _ in range(2):
             text = text.replace(separator * 2, separator + 'nan' + separator)
     return text
-
-
-def _number(
-    path: Path, line: int, cells: Sequence[str], column: int, table: _Table,
-) -> float:
-    cell = cells[column].strip()
-    try:
-        return parse_number(cell) if cell else float('nan')
-    except ValueError:
-        comma = ' (a decimal comma is not read)' if re.fullmatch(r'[-+\d]+,\d+', cell) else ''
-        raise UnreadableFileError(
-            path, f'row {line}, column {table.header[column]} must hold a number, but holds '
-            f'{cell[:40]!r}{comma}') from None
-
-
-def _samples(drives: tuple[str, ...], table: _Table, blocks: list[Array]) -> Samples:
-    time, *values = (np.concatenate([block[:, place] for block in blocks])
-                     for place in range(len(table.used)))
-    others = [name or '(no name)' for index, name in enumerate(table.header)
-              if index not in table.used]
-    findings = (Defect(
-        'ignored_columns', len(others),
-        f'the file also holds {counted(len(others), "column")}: '
-        + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),) if others else ()
-    return Samples.of_columns(drives, time, dict(zip(table.columns, values, strict=True)),
-                              f'CSV, {table.prefix}' if table.prefix else 'CSV', findings)
 
 
 def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns,
