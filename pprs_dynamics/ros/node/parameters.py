@@ -67,7 +67,9 @@ class NodeParameter(Key):
             return f'be true or false ({self.description})'
         if isinstance(self.default, int):
             return super().rule.replace('a number', 'a whole number', 1)
-        if self.size is not None and self.may_be_empty:
+        if self.is_text:
+            return super().rule.replace('name', 'word', 1)
+        if self.size is not None:
             return f'be empty, or {super().rule}'
         return super().rule
 
