@@ -18,7 +18,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -33,6 +32,7 @@ from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.ros.diagnosis_worker import StreamWindow
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
@@ -153,12 +153,7 @@ class LiveJointStates(Node):
             samples = list(self._ring)
         if not samples:
             raise UnreadableFileError('joint_states', 'nothing has come in yet')
-        first = samples[0][0]
-        stamps = [(stamp - first) / conversions.NANOSECONDS for stamp, _, _ in samples]
-        return Recording.from_arrays('live', np.array(stamps),
-                                     np.stack([position for _, position, _ in samples]),
-                                     effort=np.stack([effort for _, _, effort in samples]),
-                                     drives=self.model.drives)
+        return StreamWindow.of(samples).recording('live', self.model.drives)
 
     def to_dict(self) -> dict[str, Any]:
         """Return how it stands, and what was left of late [N]."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,9 +111,9 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._status = StatusReporter(
             self, {}, self._counters, f'simulated {hardware_of(self._model)}')
         self._states = publisher(self, JointState, 'joint_states')
-        for kind, topic, callback in ((JointState, '~/joint_command', self._on_setpoint),
-                                      (Float64MultiArray, '~/commands', self._on_efforts)):
-            subscription(self, kind, topic, callback, raw=True)
+        for kind, topic, take in ((JointState, '~/joint_command', self._take_setpoint),
+                                  (Float64MultiArray, '~/commands', self._take_efforts)):
+            subscription(self, kind, topic, partial(self._on_command, take), raw=True)
         self.get_logger().info(
             f'{self._model.title}, {own["rate"]:g} Hz, {_loop_in_words(own)}, '
             f'hidden effects: {in_words(self._robot.hidden)}; holding at home')
@@ -161,38 +162,32 @@ class SimulatedRobotNode(ExplainsRefusals):
             self.get_logger().warning(f'{note.code}: {note.message}', throttle_duration_sec=1.0)
         robot.notes.clear()
 
-    def _on_setpoint(self, data: bytes) -> None:
+    def _on_command(self, take: Callable[[bytes], None], data: bytes) -> None:
         self._counters['commands'] += 1
         try:
-            message = message_in(data, JointState)
-            fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
-            setpoint = Setpoint(*(conversions.read_drives(message, field, drives=self._names.joints)
-                                  for field in fields))
+            take(data)
         except PprsError as error:
-            self._refuse(str(error))
-            return
+            self._counters['refused'] += 1
+            reason = f'a command was refused: {error}'
+            self._status.report('ERROR', 'REFUSED', reason)
+            self.get_logger().warning(reason, throttle_duration_sec=1.0)
+
+    def _take_setpoint(self, data: bytes) -> None:
+        message = message_in(data, JointState)
+        fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
+        setpoint = Setpoint(*(conversions.read_drives(message, field, drives=self._names.joints)
+                              for field in fields))
         stamp = conversions.nanoseconds(message.header.stamp)
         time = (stamp - self._start) / conversions.NANOSECONDS if stamp else self._now()
         self._queue.add(time, setpoint)
 
-    def _on_efforts(self, data: bytes) -> None:
-        self._counters['commands'] += 1
-        try:
-            message = message_in(data, Float64MultiArray)
-        except PprsError as error:
-            self._refuse(str(error))
-            return
-        efforts, count = np.array(message.data), len(self._names.joints)
+    def _take_efforts(self, data: bytes) -> None:
+        efforts = np.array(message_in(data, Float64MultiArray).data)
+        count = len(self._names.joints)
         if efforts.shape != (count,) or not np.all(np.isfinite(efforts)):
-            self._refuse(f'data holds {len(efforts)} values, must be {count} finite efforts')
-            return
+            raise PprsError(f'data holds {len(efforts)} values, must be {count} finite efforts')
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))
-
-    def _refuse(self, reason: str) -> None:
-        self._counters['refused'] += 1
-        self._status.report('ERROR', 'REFUSED', f'a command was refused: {reason}')
-        self.get_logger().warning(f'a command was refused: {reason}', throttle_duration_sec=1.0)
 
     def _judge_timing(self) -> None:
         late = self._counters['late'] - self._late_before

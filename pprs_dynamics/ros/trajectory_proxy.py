@@ -18,8 +18,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.serialization import deserialize_message, serialize_message
-from trajectory_msgs.msg import JointTrajectory
+from rclpy.serialization import serialize_message
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -28,7 +27,7 @@ from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
-from pprs_dynamics.ros.messages.serialisation import CommandBytes
+from pprs_dynamics.ros.messages.serialisation import CommandObjects
 from pprs_dynamics.ros.messages.status_codes import Code, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     SPLINE,
@@ -118,8 +117,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         model, own = self._settings.model, self._settings.own
         feedforward = Feedforward(model, own)
         answer = feedforward.answer(self._request(model, goal))
-        trajectory = deserialize_message(CommandBytes(RobotNames.of(model)).joint_trajectory(
-            0, answer.request.offsets, answer.forces, answer.effort), JointTrajectory)
+        trajectory = CommandObjects(RobotNames.of(model)).joint_trajectory(
+            0, answer.request.offsets, answer.forces, answer.effort)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives
         return Goal(

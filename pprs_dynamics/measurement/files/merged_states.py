@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 DYNAMIC = 'control_msgs/msg/DynamicJointState'
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
-TYPES = (JOINT_STATE, DYNAMIC, CONTROLLER)
 LONGEST_STEP = 1.6  # median steps between two samples, over which nothing is interpolated
 
 

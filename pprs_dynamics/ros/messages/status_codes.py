@@ -39,6 +39,9 @@ CODES: tuple[str, ...] = (*REJECTIONS, *get_args(Condition))
 
 _KINDS: dict[str, RejectionCode] = {
     'shape': 'SIZE', 'finite': 'NON_FINITE', 'unit_length': 'QUATERNION', 'time': 'TIME'}
+_CODES: dict[type[PprsError], RejectionCode] = {
+    SingularityError: 'SINGULAR', WorkspaceError: 'WORKSPACE', ConvergenceError: 'WORKSPACE',
+    LimitError: 'LIMIT', EffectError: 'EFFECT'}
 
 
 class Rejection(PprsError):
@@ -62,12 +65,7 @@ class Rejection(PprsError):
             return error
         if isinstance(error, MotionError):
             return cls(_KINDS[error.kind], str(error))
-        if isinstance(error, SingularityError):
-            return cls('SINGULAR', str(error))
-        if isinstance(error, (WorkspaceError, ConvergenceError)):
-            return cls('WORKSPACE', str(error))
-        if isinstance(error, LimitError):
-            return cls('LIMIT', str(error))
-        if isinstance(error, EffectError):
-            return cls('EFFECT', str(error))
+        for kind, code in _CODES.items():
+            if isinstance(error, kind):
+                return cls(code, str(error))
         raise error
