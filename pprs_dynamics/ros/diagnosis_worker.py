@@ -17,12 +17,14 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context, resource_tracker
 from threading import Thread
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.recording import Recording
+
+if TYPE_CHECKING:
+    from pprs_dynamics.measurement.files.recording import Recording
 
 # A tenth of a node's share of a busy processor: at 19 a machine under load never answered.
 LOW_PRIORITY = 10
@@ -44,6 +46,9 @@ class StreamWindow(NamedTuple):
 
     def recording(self, name: str, drives: tuple[str, ...]) -> Recording:
         """Return the recording that these are, counted from the first; or raise PprsError."""
+        # Here and not above: a node that diagnoses nothing starts without it.
+        from pprs_dynamics.measurement.files.recording import Recording
+
         return Recording.from_arrays(name, (self.stamp - self.stamp[0]) / 1e9, self.position,
                                      effort=self.effort, drives=drives)
 

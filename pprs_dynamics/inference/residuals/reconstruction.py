@@ -13,14 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.residuals.followed_motion import CHUNK, Motion, kinematics_of
-from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
@@ -28,6 +27,9 @@ from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import Geometry
+
+if TYPE_CHECKING:
+    from pprs_dynamics.measurement.files.recording import Recording
 
 
 @dataclass(frozen=True)

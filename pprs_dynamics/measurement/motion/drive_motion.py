@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
@@ -28,6 +28,10 @@ from pprs_dynamics.measurement.motion.treatment import (
     block_length,
     motion_bandwidth,
 )
+
+# Readers of files take a while to import, and a live node reads none.
+if TYPE_CHECKING:
+    from pprs_dynamics.measurement.files.recording import Recording
 
 # Where fewer blocks than this share of the measured samples' have an effort in every sample,
 # efforts come less often than positions, and blocks are single samples.
