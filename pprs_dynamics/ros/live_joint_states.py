@@ -32,7 +32,6 @@ from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.ros.diagnosis_worker import StreamWindow
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
@@ -153,6 +152,9 @@ class LiveJointStates(Node):
             samples = list(self._ring)
         if not samples:
             raise UnreadableFileError('joint_states', 'nothing has come in yet')
+        # Here and not above: it brings multiprocessing, which this node does without.
+        from pprs_dynamics.ros.diagnosis_worker import StreamWindow
+
         return StreamWindow.of(samples).recording('live', self.model.drives)
 
     def to_dict(self) -> dict[str, Any]:
