@@ -83,22 +83,19 @@ def read_bag(
             done += len(block)
             if progress is not None:
                 progress(done, max(total, done))
-    if not done:
-        raise UnreadableFileError(path, f'{name} holds no messages')
-    if not blocks.samples:
-        if set(drives) <= blocks.names:  # spread over several messages
-            with _opened(path, storage) as reader:
-                return _merged(path, reader, _chosen(path, reader, topic), drives, findings)
-        _tell_missing(path, name, drives, blocks)
-    stamps, received, position, velocity, effort = blocks.arrays()
-    if topic is None and np.all(np.isnan(effort)):
-        with _opened(path, storage) as reader:
-            if others := [one for one in reader.connections
-                          if one.msgtype == JOINT_STATE and one.topic != name]:
-                merged = _merged(path, reader, [*_chosen(path, reader, topic), *others], drives,
-                                 findings)
-                if np.any(np.isfinite(merged.effort)):
-                    return merged
+        if not done:
+            raise UnreadableFileError(path, f'{name} holds no messages')
+        if not blocks.samples:
+            if set(drives) <= blocks.names:  # spread over several messages
+                return _merged(path, reader, connections, drives, findings)
+            _tell_missing(path, name, drives, blocks)
+        stamps, received, position, velocity, effort = blocks.arrays()
+        others = [one for one in reader.connections
+                  if one.msgtype == JOINT_STATE and one.topic != name]
+        if topic is None and others and np.all(np.isnan(effort)):
+            merged = _merged(path, reader, [*connections, *others], drives, findings)
+            if np.any(np.isfinite(merged.effort)):
+                return merged
     if not np.any(stamps):
         findings.append(Defect(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
