@@ -172,7 +172,7 @@ def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[.
     # One step beyond the end, which is where it began, at rest.
     motion = JointMotion(*(np.concatenate((each, each[:1])) for each in (
         drawn.position, drawn.velocity, drawn.acceleration)))
-    return motion, partial(conversions.write_joint_trajectory, joints=RobotNames.of(model).joints)
+    return motion, partial(conversions.write_joint_trajectory, names=RobotNames.of(model))
 
 
 def _path(values: dict[str, Any]) -> PlatformMotion:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,12 +51,8 @@ class RobotNames(NamedTuple):
     @classmethod
     def of(cls, model: ForceModel, frame: str = '') -> RobotNames:
         """Return the names of a model's drives; `frame` '' for that of its kind."""
-        return cls(model.recorded.joints, frame or frame_of(model.drives))
-
-
-def frame_of(drives: Sequence[str]) -> str:
-    """Return the frame of what drives say: a platform's `base`; that of joints means nothing."""
-    return BASE if tuple(drives) == DRIVES else ''
+        # A platform's is `base`; that of joints means nothing.
+        return cls(model.recorded.joints, frame or (BASE if model.drives == DRIVES else ''))
 
 
 PAPER = RobotNames(DRIVES, BASE)
@@ -91,15 +87,18 @@ def write_trajectory(
 
 
 def write_joint_trajectory(
-    motion: JointMotion, stamp: Time, offsets: Sequence[int], joints: Sequence[str],
+    motion: JointMotion, stamp: Time, offsets: Iterable[int], names: RobotNames,
+    effort: Array | None = None,
 ) -> JointTrajectory:
-    """Return the message that asks for a motion of joints; see `write_trajectory`."""
-    message = JointTrajectory(joint_names=list(joints), points=[
-        JointTrajectoryPoint(positions=doubles(q), velocities=doubles(v), accelerations=doubles(a),
-                             time_from_start=duration(offset))
-        for q, v, a, offset in zip(motion.position, motion.velocity, motion.acceleration, offsets,
-                                   strict=True)])
-    message.header.stamp = stamp
+    """Return the message with a motion of joints, and efforts (N, D); see `write_trajectory`."""
+    message = JointTrajectory(joint_names=list(names.joints))
+    message.header.stamp, message.header.frame_id = stamp, names.frame
+    for sample, offset in enumerate(offsets):
+        message.points.append(JointTrajectoryPoint(
+            positions=doubles(motion.position[sample]), velocities=doubles(motion.velocity[sample]),
+            accelerations=doubles(motion.acceleration[sample]),
+            effort=[] if effort is None else doubles(effort[sample]),
+            time_from_start=duration(int(offset))))
     return message
 
 

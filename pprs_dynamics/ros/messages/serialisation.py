@@ -17,10 +17,11 @@ import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.force_model import Forces
 from pprs_dynamics.ros.messages.conversions import (
@@ -28,10 +29,10 @@ from pprs_dynamics.ros.messages.conversions import (
     NANOSECONDS,
     RobotNames,
     doubles,
-    duration,
     joint_state,
     seconds_and_rest,
     time,
+    write_joint_trajectory,
     write_trajectory,
 )
 from pprs_dynamics.ros.messages.incoming_bytes import read_points, walked
@@ -153,14 +154,8 @@ class CommandObjects:
         self, start: int, offsets: Indices, forces: Forces, effort: Array,
     ) -> JointTrajectory:
         """Return all samples; see `CommandBytes.joint_trajectory`."""
-        message = JointTrajectory(joint_names=list(self._names.joints), points=[
-            JointTrajectoryPoint(positions=doubles(position), velocities=doubles(velocity),
-                                 accelerations=doubles(acceleration), effort=doubles(efforts),
-                                 time_from_start=duration(int(offset)))
-            for position, velocity, acceleration, efforts, offset in zip(
-                *forces.drive_motion, effort, offsets, strict=True)])
-        message.header.stamp, message.header.frame_id = time(start), self._names.frame
-        return message
+        return write_joint_trajectory(
+            JointMotion(*forces.drive_motion), time(start), offsets, self._names, effort)
 
 
 def command_writer(names: RobotNames) -> CommandBytes | CommandObjects:

@@ -77,7 +77,7 @@ def read_serialised(
     points = read_points(data) if frame == BASE else None
     if points is not None:
         stamp, numbers, offsets = points
-        return request_of(start_of(stamp, now, max_age), offsets, _motion_of(numbers))
+        return _request_of(_start_of(stamp, now, max_age), offsets, _motion_of(numbers))
     return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing, frame)
 
 
@@ -116,21 +116,20 @@ def read_trajectory(
     if message.header.frame_id not in ('', frame):
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
                         f'must be {frame!r} or empty')
-    lacking = check_counts(points, missing)
-    start = start_of(nanoseconds(message.header.stamp), now, max_age)
-    offsets = offsets_of(points)
+    lacking = _check_counts(points, missing)
+    start, offsets = _times_of(message, now, max_age)
     numbers = np.array([_row(point) for point in points])
     if lacking.any():
-        fill_in(numbers, (VELOCITY, ACCELERATION), spline_derivatives(
+        _fill_in(numbers, (VELOCITY, ACCELERATION), spline_derivatives(
             (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7]), lacking)
-    return request_of(start, offsets, _motion_of(numbers))
+    return _request_of(start, offsets, _motion_of(numbers))
 
 
 def _motion_of(numbers: Array) -> Callable[[Array], Motion]:
     return lambda time: PlatformMotion.from_rows(numbers, time)
 
 
-def request_of(
+def _request_of(
     start: int, offsets: Indices, motion_at: Callable[[Array], Motion],
 ) -> TrajectoryRequest:
     """Return the request for a motion that is made with its times [s], from the start on."""
@@ -140,12 +139,14 @@ def request_of(
     return TrajectoryRequest(motion_at(offsets / NANOSECONDS), start, offsets)
 
 
-def offsets_of(points: Sequence[Any]) -> Indices:
-    """Return time_from_start of every point [ns], (N,)."""
-    return np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
+def _times_of(message: Any, now: int, max_age: float) -> tuple[int, Indices]:
+    """Return the start of a trajectory, and time_from_start of its points (N,) [ns]."""
+    start = _start_of(nanoseconds(message.header.stamp), now, max_age)
+    return start, np.array([nanoseconds(point.time_from_start) for point in message.points],
+                           dtype=np.int64)
 
 
-def start_of(stamp: int, now: int, max_age: float) -> int:
+def _start_of(stamp: int, now: int, max_age: float) -> int:
     """Return a header stamp, or the time of arrival where it is 0 [ns]; see `read_trajectory`."""
     start = stamp if stamp else now
     age = (now - start) / NANOSECONDS
@@ -154,7 +155,7 @@ def start_of(stamp: int, now: int, max_age: float) -> int:
     return start
 
 
-def check_counts(
+def _check_counts(
     points: Sequence[Any], missing: str, places: str = 'transforms', wanted: int = 1,
 ) -> Mask:
     """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
@@ -190,8 +191,8 @@ def check_counts(
     return lacking
 
 
-def fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
-            lacking: Mask) -> None:
+def _fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
+             lacking: Mask) -> None:
     """Put the derivatives of a spline into the columns of those points that lack their own."""
     for place, values, rows in zip(places, derivatives, lacking.T, strict=True):
         if not np.isfinite(values).all():
@@ -242,9 +243,8 @@ def read_joint_trajectory(
         raise Rejection('NAMES', f'joint_names is {names!r:.200}, must hold each of '
                         f'{", ".join(joints)} once, and nothing else')
     count = len(joints)
-    lacking = check_counts(points, missing, 'positions', count)
-    start = start_of(nanoseconds(message.header.stamp), now, max_age)
-    offsets = offsets_of(points)
+    lacking = _check_counts(points, missing, 'positions', count)
+    start, offsets = _times_of(message, now, max_age)
     none = np.zeros(count)
     order = [names.index(joint) for joint in joints]
     numbers = np.array([[point.positions, point.velocities or none, point.accelerations or none]
@@ -252,9 +252,9 @@ def read_joint_trajectory(
     position, velocity, acceleration = (
         slice(k * count, (k + 1) * count) for k in range(3))
     if lacking.any():
-        fill_in(numbers, (velocity, acceleration), position_spline_derivatives(
+        _fill_in(numbers, (velocity, acceleration), position_spline_derivatives(
             (offsets - offsets[0]) / NANOSECONDS, numbers[:, position]), lacking)
-    return request_of(start, offsets, lambda time: JointMotion.checked(
+    return _request_of(start, offsets, lambda time: JointMotion.checked(
         numbers[:, position], numbers[:, velocity], numbers[:, acceleration], time, count))
 
 
