@@ -83,7 +83,7 @@ class Judgement:
         """Add a finding about the samples of a mask, whose count begins the clause."""
         count = int(mask.sum())
         self._tell(kind, count, f'{counted(count, noun)} {what}',
-                   _places(mask & np.isfinite(self.samples.time)), drives)
+                   stamps.runs(mask & np.isfinite(self.samples.time)), drives)
 
     def _keep(self, mask: Mask) -> None:
         """Drop samples, and move the starts of stretches with them."""
@@ -171,41 +171,34 @@ class Judgement:
                        f'{1 / before:.4g} Hz to {1 / after:.4g} Hz,',
                        [(first, first) for first, _, _ in changes])
         self._split(np.array([first for first, _, _ in changes], dtype=np.int64))
-        every_gap, every_lost, lost_count = [], [], 0
-        for part in stamps.stretches(self._starts, len(time)):
-            gap, lost, count = stamps.gaps(time, part)
-            every_gap += gap.tolist()
-            every_lost += lost.tolist()
-            lost_count += count
-        missing = sum(time[k] - time[k - 1] for k in every_gap)
-        self._tell('gap', len(every_gap),
-                   f'{counted(len(every_gap), "gap")} of {missing:.4g} s in all',
-                   [(k - 1, k) for k in every_gap])
+        gaps, losses, counts = zip(*(stamps.gaps(time, part) for part in stamps.stretches(
+            self._starts, len(time))), strict=True)
+        gap, lost, lost_count = np.concatenate(gaps), np.concatenate(losses), sum(counts)
+        missing = sum(time[gap] - time[gap - 1])
+        self._tell('gap', len(gap), f'{counted(len(gap), "gap")} of {missing:.4g} s in all',
+                   [(k - 1, k) for k in gap])
         self._tell('lost_samples', lost_count, f'{counted(lost_count, "sample")} lost',
-                   [(k - 1, k) for k in every_lost])
-        self._split(np.array(every_gap, dtype=np.int64))
+                   [(k - 1, k) for k in lost])
+        self._split(gap)
         self._judge_regularity()
 
     def _judge_regularity(self) -> None:
         time = self.samples.time
-        irregular, slow = [], []
-        for part in stamps.stretches(self._starts, len(time)):
-            if part.stop - part.start < SHORTEST_SEGMENT:
-                continue
-            low, step, high = stamps.spread(time, part)
-            if high - low > stamps.IRREGULAR_SPREAD * step:
-                irregular.append((part.start, part.stop - 1, low, high))
-            if step > SLOW_STEP:
-                slow.append((part.start, part.stop - 1, step))
+        spreads = [((part.start, part.stop - 1), *stamps.spread(time, part))
+                   for part in stamps.stretches(self._starts, len(time))
+                   if part.stop - part.start >= SHORTEST_SEGMENT]
+        irregular = [(place, low, high) for place, low, step, high in spreads
+                     if high - low > stamps.IRREGULAR_SPREAD * step]
         if irregular:
-            low, high = min(item[2] for item in irregular), max(item[3] for item in irregular)
+            low, high = min(low for _, low, _ in irregular), max(high for _, _, high in irregular)
             self._tell('irregular_steps', len(irregular),
                        f'steps between stamps vary from {1e3 * low:.3g} to {1e3 * high:.3g} ms',
-                       [item[:2] for item in irregular])
+                       [place for place, _, _ in irregular])
+        slow = [(place, step) for place, _, step, _ in spreads if step > SLOW_STEP]
         if slow:
             self._tell('slow_rate', len(slow),
-                       f'there is only one sample in {max(item[2] for item in slow):.4g} s',
-                       [item[:2] for item in slow])
+                       f'there is only one sample in {max(step for _, step in slow):.4g} s',
+                       [place for place, _ in slow])
 
     def _judge_efforts_and_velocities(self) -> None:
         effort = self.samples.effort
@@ -235,7 +228,7 @@ class Judgement:
                        f'the effort of {name} is at its limit of {limit:.6g} '
                        f'{samples.unit_of(drive, "N")} in {100 * count / len(size):.3g} % of the '
                        'samples',
-                       _places(at_limit), [name])
+                       stamps.runs(at_limit), [name])
             effort[at_limit, drive] = np.nan
 
     def _tell_missing(self, kind: str, values: NDArray[np.float64], quantity: str) -> None:
@@ -245,7 +238,7 @@ class Judgement:
         share = [f'{name} ({_percent(int(count), len(values))})'
                  for name, count in zip(self.samples.drives, counts, strict=True) if count]
         self._tell(kind, int(counts.sum()), f'no {quantity} of {", ".join(share)}',
-                   _places(np.any(missing, axis=1)), drives)
+                   stamps.runs(np.any(missing, axis=1)), drives)
 
     def _judge_constant_values(self) -> None:
         samples = self.samples
@@ -302,12 +295,6 @@ def _taken(samples: Samples, index: Indices | Mask) -> Samples:
         samples, time=samples.time[index], position=samples.position[index],
         velocity=None if samples.velocity is None else samples.velocity[index],
         effort=samples.effort[index])
-
-
-def _places(mask: Mask) -> list[tuple[int, int]]:
-    """Return the runs of a mask as (first, last)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _percent(count: int, total: int) -> str:
