@@ -174,7 +174,7 @@ def command_writer(names: RobotNames) -> CommandBytes | CommandObjects:
         written = CommandBytes(names)
         agree = all(deserialize_message(getattr(written, name)(*arguments), kind)
                     == getattr(objects, name)(*arguments) for kind, name, arguments in samples)
-    except (struct.error, ValueError, RuntimeError):  # the last is the public base of rclpy's own
+    except (struct.error, IndexError, ValueError, RuntimeError):  # the last: base of rclpy's own
         return objects
     return written if agree else objects
 
