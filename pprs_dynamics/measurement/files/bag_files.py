@@ -104,8 +104,8 @@ def read_bag(
     return _samples(drives, stamps, (position, velocity, effort), name, findings)
 
 
-def _samples(drives: tuple[str, ...], stamps: Indices, arrays: tuple[Array, Array, Array],
-             topics: str, findings: list[Defect]) -> Samples:
+def _samples(drives: tuple[str, ...], stamps: Indices, arrays: Sequence[Array], topics: str,
+             findings: list[Defect]) -> Samples:
     """Return positions, velocities and efforts at stamps [ns] as samples."""
     epoch = whole_epoch(stamps / 1e9)
     position, velocity, effort = arrays
@@ -123,11 +123,11 @@ def _merged(path: Path, reader: Reader, connections: list[Connection], drives: t
     except Exception as error:
         raise UnreadableFileError(path, _damaged(error)) from None
     topics = ', '.join(sorted({one.topic for one in connections}))
-    if merged is None or not len(merged.stamps):
+    if merged is None or not len(merged[0]):
         raise UnreadableFileError(path, f'{topics} holds no positions of all of '
                                   f'{", ".join(drives)} at the same times')
-    return _samples(drives, merged.stamps, (merged.position, merged.velocity, merged.effort),
-                    topics, [*findings, *merged.findings])
+    stamps, arrays, told = merged
+    return _samples(drives, stamps, arrays, topics, [*findings, *told])
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],

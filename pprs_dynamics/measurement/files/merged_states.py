@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,21 +29,15 @@ CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
 LONGEST_STEP = 1.6  # median steps between two samples, over which nothing is interpolated
 
 
-class MergedStates(NamedTuple):
-    """Stamps [ns] (N,), three (N, D) arrays with NaN where unknown, and what there is to say."""
-
-    stamps: Indices
-    position: Array
-    velocity: Array
-    effort: Array
-    findings: list[Defect]
-
-
 def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str, ...],
-                ) -> MergedStates | None:
+                ) -> tuple[Indices, list[Array], list[Defect]] | None:
     """Return the states of all drives, at the stamps of the first one's positions.
 
-    None where some drive has no positions in these messages.
+    Returns
+    -------
+    tuple or None
+        Stamps [ns] (N,), positions, velocities and efforts (N, D) with NaN where unknown, and what
+        there is to say; None where some drive has no positions in these messages.
     """
     typestore = _typestore(connections)
     times: dict[tuple[str, str], list[int]] = defaultdict(list)
@@ -63,18 +57,17 @@ def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str
     if any(not times[drive, 'position'] for drive in drives):
         return None
     stamps = np.unique(np.array(times[drives[0], 'position'], dtype=np.int64))
-    arrays = {quantity: np.stack([
+    arrays = [np.stack([
         _at(stamps, times[drive, quantity], values[drive, quantity]) for drive in drives], axis=1)
-        for quantity in QUANTITIES}
-    kept = np.isfinite(arrays['position']).all(axis=1)
+        for quantity in QUANTITIES]
+    kept = np.isfinite(arrays[0]).all(axis=1)
     topics = sorted({connection.topic for connection in connections})
     findings = [Defect('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
     if commanded:
         findings.append(Defect(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
-    position, velocity, effort = (arrays[quantity][kept] for quantity in QUANTITIES)
-    return MergedStates(stamps[kept], position, velocity, effort, findings)
+    return stamps[kept], [array[kept] for array in arrays], findings
 
 
 def _typestore(connections: list[Connection]) -> Any:
