@@ -366,9 +366,7 @@ def _parquet(path: Path, wanted: list[str]) -> Mapping[str, Any]:
     except (ArrowException, OSError) as error:
         raise UnreadableFileError(path, f'no Parquet file ({str(error).splitlines()[0][:120]})'
                                   ) from None
-    return {name: table[name].to_numpy() if name in table.column_names else ()
-            for name in (names if len(table.column_names) < len(set(wanted)) else
-                         table.column_names)}
+    return {name: table[name].to_numpy() if name in table.column_names else () for name in names}
 
 
 def _mat(path: Path, wanted: list[str]) -> Mapping[str, Any]:
