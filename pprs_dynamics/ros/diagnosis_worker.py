@@ -13,15 +13,18 @@ from __future__ import annotations
 import os
 import signal
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context, resource_tracker
 from threading import Thread
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+
+if TYPE_CHECKING:
+    from pprs_dynamics.measurement.files.recording import Recording
 
 # A tenth of a node's share of a busy processor: at 19 a machine under load never answered.
 LOW_PRIORITY = 10
@@ -34,6 +37,20 @@ class StreamWindow(NamedTuple):
     stamp: np.typing.NDArray[np.int64]
     position: Array
     effort: Array
+
+    @classmethod
+    def of(cls, states: Iterable[tuple[int, Array, Array]]) -> StreamWindow:
+        """Return joint states that came in one by one, at least one."""
+        stamp, position, effort = zip(*states, strict=True)
+        return cls(np.array(stamp), np.stack(position), np.stack(effort))
+
+    def recording(self, name: str, drives: tuple[str, ...]) -> Recording:
+        """Return the recording that these are, counted from the first; or raise PprsError."""
+        # Here and not above: a node that diagnoses nothing starts without it.
+        from pprs_dynamics.measurement.files.recording import Recording
+
+        return Recording.from_arrays(name, (self.stamp - self.stamp[0]) / 1e9, self.position,
+                                     effort=self.effort, drives=drives)
 
 
 class StreamWindows:
@@ -75,9 +92,7 @@ class StreamWindows:
             return None
         rows = list(self._ring)
         self._ring.clear()
-        return StreamWindow(np.array([stamp for stamp, _, _ in rows]),
-                            np.stack([position for _, position, _ in rows]),
-                            np.stack([effort for _, _, effort in rows]))
+        return StreamWindow.of(rows)
 
 
 class DiagnosisWorker:
@@ -157,7 +172,6 @@ def _work(pipe: Any) -> None:
         os.nice(LOW_PRIORITY)
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
-    from pprs_dynamics.measurement.files.recording import Recording
     from pprs_dynamics.physics.model.model_file import build_model
 
     known: tuple[dict[str, Any], str] | None = None
@@ -166,14 +180,11 @@ def _work(pipe: Any) -> None:
             values, source, samples = pipe.recv()
         except (EOFError, OSError):
             return
-        start = int(samples.stamp[0])
         try:
             if known != (values, source):
                 live, known = LiveDiagnosis(build_model(values, source)), (values, source)
-            live = live.with_window(
-                Recording.from_arrays(
-                    'the last window', (samples.stamp - start) / 1e9, samples.position,
-                    effort=samples.effort, drives=live.model.drives), start / 1e9)
+            live = live.with_window(samples.recording('the last window', live.model.drives),
+                                    int(samples.stamp[0]) / 1e9)
             answer = live.to_dict()
         except PprsError as error:
             # What is known of this model stands, though this window says nothing.

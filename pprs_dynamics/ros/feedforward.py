@@ -19,23 +19,25 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.margins import Margins, margins
-from pprs_dynamics.ros.feedforward_settings import HOLD_GRAVITY, SILENT, parameters_for
-from pprs_dynamics.ros.force_command import Feedforward, ForceCommand
-from pprs_dynamics.ros.messages.conversions import NANOSECONDS
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.request_reader import RequestReader, readers_for
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.force_command import (
+    HOLD_GRAVITY,
+    SILENT,
+    Feedforward,
+    ForceCommand,
+    parameters_for,
+)
+from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
-from pprs_dynamics.ros.messages.status_codes import REJECTIONS
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Code, Rejection
+from pprs_dynamics.ros.messages.trajectory_request import RequestReader, readers_for
+from pprs_dynamics.ros.node.clocks import CommandWatchdog
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import declare_own, drive_count
+from pprs_dynamics.ros.node.parameters import drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import UNANSWERED, publisher, subscription
-from pprs_dynamics.ros.node.status import StatusReporter
-from pprs_dynamics.ros.node.timing import Durations
-from pprs_dynamics.ros.node.watchdog import CommandWatchdog
+from pprs_dynamics.ros.node.status import Durations, StatusReporter
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
@@ -60,8 +62,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._watchdog: CommandWatchdog | None = None
         self._failure: Exception | None = None
         parameters = parameters_for(drive_count(self))
-        own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use_settings)
+        own = self._settings.own
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         names = RobotNames.of(self._settings.model, own['frame_id'])
@@ -101,12 +103,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._destroy_topics()
             return TransitionCallbackReturn.FAILURE
         self._feedforward = Feedforward(self._settings.model, self._settings.own)
-        self._status.report('OK', 'INACTIVE', 'waiting to be activated')
+        self._enter('inactive', 'INACTIVE', 'waiting to be activated')
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer messages from now on."""
-        self._status.report('OK', 'WAITING', 'waiting for the first message')
+        self._enter('active', 'WAITING', 'waiting for the first message')
         model = self._settings.model
         self.get_logger().info(
             f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
@@ -115,21 +117,25 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer nothing any more, with the timeout's action as the last word."""
         self._last_word()
-        self._status.report('OK', 'INACTIVE', 'waiting to be activated')
+        self._enter('inactive', 'INACTIVE', 'waiting to be activated')
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take the topics away."""
         self._destroy_topics()
-        self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
+        self._enter('unconfigured', 'UNCONFIGURED', 'waiting to be configured')
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End for good; the process goes on telling so until it is stopped."""
         self._last_word()
         self._destroy_topics()
-        self._status.report('OK', 'FINALIZED', 'shut down')
+        self._enter('finalized', 'FINALIZED', 'shut down')
         return super().on_shutdown(state)
+
+    def _enter(self, state: str, code: Code, message: str) -> None:
+        self.state = state
+        self._status.report('OK', code, message)
 
     def finish(self) -> None:
         """Do what must be done before the process ends."""

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,13 +16,48 @@ from pprs_dynamics.errors import LimitError
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.ros.feedforward_settings import CLAMP
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.trajectory_request import SPLINE, Motion, TrajectoryRequest
+from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
 from pprs_dynamics.ros.node.model_parameters import NodeModel
+from pprs_dynamics.ros.node.parameters import NodeParameter, own_parameter
 
 REVERSAL_VELOCITY = 'friction.reversal_velocity'
+CLAMP = 'clamp'
+HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
+
+FRAME = own_parameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform',
+                      stays=True)
+
+_PARAMETERS = (
+    own_parameter('autostart', True, 'true: active at once; false: a supervisor configures and '
+                  'activates the node', stays=True),
+    FRAME,
+    own_parameter('max_age', 0.0, 'oldest header stamp that is accepted [s]; 0: any', lower=0),
+    own_parameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '
+                  'reject the message, or take them from a spline through the points',
+                  choices=(REJECT, SPLINE)),
+    own_parameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
+                  'than 1 while a robot is commissioned', lower=0, upper=1),
+    own_parameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
+                  'N m]; the smaller one of this and the model\'s counts', size=6, positive=True),
+    own_parameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
+                  'the effort to the limit', choices=(REJECT, CLAMP)),
+    own_parameter('command_timeout', 0.1, 'how long after the end of the last accepted '
+                  'trajectory its command goes stale [s]; 0: never', lower=0, upper=3600),
+    own_parameter('timeout_action', HOLD_GRAVITY, 'what goes out once when the command is '
+                  'stale: the efforts that hold the last pose at rest, zeros, or nothing',
+                  choices=(HOLD_GRAVITY, ZERO, SILENT)),
+    own_parameter('warning_margin', 0.1, 'share of the way to a limit of workspace or '
+                  'conditioning that is left when warnings begin [1]', lower=0, upper=1),
+    own_parameter('lag_warning', 0.02, 'time that messages wait for the node, at the median, '
+                  'when warnings begin [s]; 0: never', lower=0, upper=3600),
+)
+
+
+def parameters_for(drives: int) -> tuple[NodeParameter, ...]:
+    """Return the parameters of a node with so many drives."""
+    return tuple(replace(one, size=drives) if one.size else one for one in _PARAMETERS)
 
 
 class ForceCommand(NamedTuple):
@@ -56,7 +92,7 @@ class Feedforward:
     ----------
     model : DriveModel or ArmModel
     own : mapping
-        The node's parameters, see `feedforward_settings`.
+        The node's parameters, see `parameters_for`.
     """
 
     def __init__(self, model: NodeModel, own: Mapping[str, Any]) -> None:

@@ -18,7 +18,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -34,10 +33,10 @@ from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.cdr_validation import message_in
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
 from pprs_dynamics.system.numbers import finite
 
@@ -153,12 +152,10 @@ class LiveJointStates(Node):
             samples = list(self._ring)
         if not samples:
             raise UnreadableFileError('joint_states', 'nothing has come in yet')
-        first = samples[0][0]
-        stamps = [(stamp - first) / conversions.NANOSECONDS for stamp, _, _ in samples]
-        return Recording.from_arrays('live', np.array(stamps),
-                                     np.stack([position for _, position, _ in samples]),
-                                     effort=np.stack([effort for _, _, effort in samples]),
-                                     drives=self.model.drives)
+        # Here and not above: it brings multiprocessing, which this node does without.
+        from pprs_dynamics.ros.diagnosis_worker import StreamWindow
+
+        return StreamWindow.of(samples).recording('live', self.model.drives)
 
     def to_dict(self) -> dict[str, Any]:
         """Return how it stands, and what was left of late [N]."""

@@ -25,16 +25,15 @@ from pprs_dynamics.inference.residuals.live import (
 )
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
-from pprs_dynamics.ros.feedforward_settings import FRAME
+from pprs_dynamics.ros.force_command import FRAME
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.ros.messages.status_codes import REJECTIONS
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, overrides
+from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED, publisher, subscription
@@ -43,15 +42,15 @@ from pprs_dynamics.system.plain_text import for_json
 
 PARAMETERS = (
     FRAME,
-    NodeParameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
+    own_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
                   'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
-    NodeParameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
+    own_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
                   upper=600.0, stays=True),
-    NodeParameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
+    own_parameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
                   lower=1.0, upper=1000.0, stays=True),
-    NodeParameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
+    own_parameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
-    NodeParameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
+    own_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                   upper=3600.0, stays=True),
 )
 
@@ -67,8 +66,8 @@ class MonitorNode(ExplainsRefusals):
         if is_mechanism(overrides(self)):
             parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
                                for one in PARAMETERS)
-        own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, self._use)
+        own = self._settings.own
         prepare_beside(self, self._settings.model)
         self._comparison = LiveComparison(
             self._settings.model, own['window'], own['error_span'])

@@ -23,15 +23,15 @@ from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import Motion
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.parameters import (
-    NodeParameter,
     current_values,
-    declare_arm,
+    declare_model,
     declare_own,
     overrides,
+    own_parameter,
     refuse_unknown,
 )
 from pprs_dynamics.ros.node.qos import publisher
@@ -44,17 +44,17 @@ EXCITATION = 'excitation'
 SOURCES = ('helix', EXCITATION, 'csv')
 
 PARAMETERS = (
-    NodeParameter('source', 'helix', 'what to play', choices=SOURCES),
-    NodeParameter('file', '', 'CSV of poses, for source csv'),
-    NodeParameter('rate', 100.0, 'messages per second [Hz]', lower=0.1, upper=10_000),
-    NodeParameter('points', 1, 'points per message: the present one and those that follow',
+    own_parameter('source', 'helix', 'what to play', choices=SOURCES),
+    own_parameter('file', '', 'CSV of poses, for source csv'),
+    own_parameter('rate', 100.0, 'messages per second [Hz]', lower=0.1, upper=10_000),
+    own_parameter('points', 1, 'points per message: the present one and those that follow',
                   lower=1),
-    NodeParameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
-    NodeParameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
-    NodeParameter('seed', 0, 'of an excitation', lower=0),
-    NodeParameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
+    own_parameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
+    own_parameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
+    own_parameter('seed', 0, 'of an excitation', lower=0),
+    own_parameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
                   '0: start there', lower=0),
-    NodeParameter('ahead', 0.0, 'how far ahead of its moment each message is stamped [s]',
+    own_parameter('ahead', 0.0, 'how far ahead of its moment each message is stamped [s]',
                   lower=0),
 )
 
@@ -165,14 +165,14 @@ class Beats:
 
 def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[..., Any]]:
     """Return an excitation of the drives of the node's model, and what writes its messages."""
-    declare_arm(node)
+    declare_model(node)
     given = current_values(node)
     model = ArmModel.from_parameters({name: given[name] for name in given.keys() - values.keys()})
     drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])
     # One step beyond the end, which is where it began, at rest.
     motion = JointMotion(*(np.concatenate((each, each[:1])) for each in (
         drawn.position, drawn.velocity, drawn.acceleration)))
-    return motion, partial(conversions.write_joint_trajectory, joints=RobotNames.of(model).joints)
+    return motion, partial(conversions.write_joint_trajectory, names=RobotNames.of(model))
 
 
 def _path(values: dict[str, Any]) -> PlatformMotion:

@@ -36,8 +36,7 @@ def run_node(factory: Callable[[], Node],
     int
         Exit status: 0, or 2 for bad parameters.
     """
-    stop = _Stop()
-    StopSignals(stop)
+    signals = StopSignals()
     try:
         check_files(sys.argv)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -49,7 +48,7 @@ def run_node(factory: Callable[[], Node],
     node = None
     # Two threads answered 44 of 5 000 messages at 1 kHz; one answers all.
     executor = executor_type()
-    stop.attach(executor)
+    signals.stop(executor)
     try:
         node = factory()
         executor.add_node(node)
@@ -70,24 +69,6 @@ def run_node(factory: Callable[[], Node],
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
-
-
-class _Stop:
-    """What a stop signal does: nothing but leave a note until there is something to stop."""
-
-    def __init__(self) -> None:
-        self._executor: StoppableExecutor | None = None
-        self._wanted = False
-
-    def __call__(self) -> None:
-        self._wanted = True
-        if self._executor is not None:
-            self._executor.stop()
-
-    def attach(self, executor: StoppableExecutor) -> None:
-        self._executor = executor
-        if self._wanted:
-            executor.stop()
 
 
 def _complain(sentence: str) -> int:

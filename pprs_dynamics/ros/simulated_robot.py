@@ -5,10 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from rclpy.node import Node
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -17,19 +21,18 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.ros.hidden_parameters import Hidden, HiddenParameters, in_words
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.cdr_validation import message_in
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals
+from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, Followed
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,
-    declare_arm,
     declare_model,
     declare_own,
     overrides,
+    own_parameter,
 )
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
@@ -37,39 +40,43 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.linkage_plant import LinkagePlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 PARAMETERS = (
-    NodeParameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
-    NodeParameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
-    NodeParameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
-    NodeParameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
+    own_parameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
+    own_parameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
+    own_parameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
+    own_parameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
                   'false: it is ignored, and the PD loop compensates gravity by itself'),
-    NodeParameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
+    own_parameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
                   '0: never', lower=0, upper=3600),
-    NodeParameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
-    NodeParameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
-    NodeParameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
+    own_parameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
+    own_parameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
+    own_parameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
                   lower=0),
-    NodeParameter('hidden_effects', [], 'names of effects that the model does not know of, '
+    own_parameter('hidden_effects', (), 'names of effects that the model does not know of, '
                   'or random for one drawn at random; drives may follow: '
                   'coulomb_friction:lift_1,lift_2'),
-    NodeParameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
-    NodeParameter('seed', 0, 'of noise and hidden effects', lower=0),
+    own_parameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
+    own_parameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
 # Of an arm or a robot with loops, whose drives are in several units and sizes.
 OF_JOINTS = (
-    NodeParameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
-    NodeParameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
+    own_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
+    own_parameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
                   upper=50),
-    NodeParameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
+    own_parameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
     *(one for one in PARAMETERS[3:] if one.name not in ('encoder_resolution', 'effort_noise')),
-    NodeParameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
-    NodeParameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
+    own_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
+    own_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
 )
+# What of a running robot changes: what is hidden in it, and parameters of ROS 2 itself.
+CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')
+OF_ROS = ('use_sim_time', 'start_type_description_service')
 # A node that was stopped for longer than this [s] goes on from now instead of catching up.
 LONGEST_CATCH_UP = 0.5
 # Between them the executor takes one command: with more, commands at 200 Hz would pile up.
@@ -88,7 +95,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         of_joints = is_mechanism(overrides(self))
         own = declare_own(self, OF_JOINTS if of_joints else PARAMETERS)
-        (declare_arm if of_joints else declare_model)(self)
+        declare_model(self)
         values = {name: value for name, value in current_values(self).items() if name not in own}
         self._model = build_model(values)
         self._names = RobotNames.of(self._model)
@@ -104,9 +111,9 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._status = StatusReporter(
             self, {}, self._counters, f'simulated {hardware_of(self._model)}')
         self._states = publisher(self, JointState, 'joint_states')
-        for kind, topic, callback in ((JointState, '~/joint_command', self._on_setpoint),
-                                      (Float64MultiArray, '~/commands', self._on_efforts)):
-            subscription(self, kind, topic, callback, raw=True)
+        for kind, topic, take in ((JointState, '~/joint_command', self._take_setpoint),
+                                  (Float64MultiArray, '~/commands', self._take_efforts)):
+            subscription(self, kind, topic, partial(self._on_command, take), raw=True)
         self.get_logger().info(
             f'{self._model.title}, {own["rate"]:g} Hz, {_loop_in_words(own)}, '
             f'hidden effects: {in_words(self._robot.hidden)}; holding at home')
@@ -117,7 +124,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
         steady_timer(self, 1.0, self._judge_timing)
-        self._settings = HiddenParameters(self, PARAMETERS, own, hidden, self._hide)
+        self._settings = HiddenParameters(self, PARAMETERS, hidden, self._hide)
 
     def _hide(self, hidden: Hidden) -> None:
         self._robot.use_effects(hidden.effects)
@@ -155,38 +162,32 @@ class SimulatedRobotNode(ExplainsRefusals):
             self.get_logger().warning(f'{note.code}: {note.message}', throttle_duration_sec=1.0)
         robot.notes.clear()
 
-    def _on_setpoint(self, data: bytes) -> None:
+    def _on_command(self, take: Callable[[bytes], None], data: bytes) -> None:
         self._counters['commands'] += 1
         try:
-            message = message_in(data, JointState)
-            fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
-            setpoint = Setpoint(*(conversions.read_drives(message, field, drives=self._names.joints)
-                                  for field in fields))
+            take(data)
         except PprsError as error:
-            self._refuse(str(error))
-            return
+            self._counters['refused'] += 1
+            reason = f'a command was refused: {error}'
+            self._status.report('ERROR', 'REFUSED', reason)
+            self.get_logger().warning(reason, throttle_duration_sec=1.0)
+
+    def _take_setpoint(self, data: bytes) -> None:
+        message = message_in(data, JointState)
+        fields = ('position', 'velocity', 'effort')[:3 if self._use_effort else 2]
+        setpoint = Setpoint(*(conversions.read_drives(message, field, drives=self._names.joints)
+                              for field in fields))
         stamp = conversions.nanoseconds(message.header.stamp)
         time = (stamp - self._start) / conversions.NANOSECONDS if stamp else self._now()
         self._queue.add(time, setpoint)
 
-    def _on_efforts(self, data: bytes) -> None:
-        self._counters['commands'] += 1
-        try:
-            message = message_in(data, Float64MultiArray)
-        except PprsError as error:
-            self._refuse(str(error))
-            return
-        efforts, count = np.array(message.data), len(self._names.joints)
+    def _take_efforts(self, data: bytes) -> None:
+        efforts = np.array(message_in(data, Float64MultiArray).data)
+        count = len(self._names.joints)
         if efforts.shape != (count,) or not np.all(np.isfinite(efforts)):
-            self._refuse(f'data holds {len(efforts)} values, must be {count} finite efforts')
-            return
+            raise PprsError(f'data holds {len(efforts)} values, must be {count} finite efforts')
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))
-
-    def _refuse(self, reason: str) -> None:
-        self._counters['refused'] += 1
-        self._status.report('ERROR', 'REFUSED', f'a command was refused: {reason}')
-        self.get_logger().warning(f'a command was refused: {reason}', throttle_duration_sec=1.0)
 
     def _judge_timing(self) -> None:
         late = self._counters['late'] - self._late_before
@@ -230,3 +231,74 @@ def _behaviour(own: dict[str, Any]) -> dict[str, Any]:
     return {'gravity_compensation': not own['use_effort'],
             'command_timeout': own['command_timeout'] or np.inf,
             'actuation_delay': own['actuation_delay']}
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Hidden effects, and the words, scale and seed that they were drawn from."""
+
+    words: tuple[str, ...]
+    drawn_with: tuple[float, int]
+    effects: tuple[HiddenEffect, ...]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], running: Hidden | None = None) -> Hidden:
+        """Return those that parameters say; what acts already stays what it is.
+
+        Raises
+        ------
+        HiddenEffectError
+            For words that name no effect.
+        """
+        words = tuple(values['hidden_effects'])
+        drawn_with = values['hidden_scale'], values['seed']
+        effects = draw_effects(words, np.random.default_rng(values['seed']),
+                               values['hidden_scale'])
+        kept = (dict(zip(running.words, running.effects, strict=True))
+                if running is not None and running.drawn_with == drawn_with else {})
+        return cls(words, drawn_with, tuple(
+            kept.pop(word, effect) for word, effect in zip(words, effects, strict=True)))
+
+
+def in_words(truths: Iterable[Mapping[str, Any]]) -> str:
+    """Return what is hidden, for the log."""
+    return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
+
+
+class HiddenParameters(Followed[tuple[dict[str, Any], Hidden | None]]):
+    """Follows the parameters of what is hidden; all others stay as they were at the start.
+
+    Parameters
+    ----------
+    node : Node
+    declared : iterable of NodeParameter
+        The node's own.
+    hidden : Hidden or None
+        What is hidden now; None of a robot in which that stays, too.
+    use : callable
+        Called with what is hidden from now on.
+    """
+
+    def __init__(self, node: Node, declared: Iterable[NodeParameter], hidden: Hidden | None,
+                 use: Callable[[Hidden], None]) -> None:
+        self._hidden, self._use = hidden, use
+        super().__init__(node, (one for one in declared
+                                if hidden is not None and one.name in CHANGEABLE))
+        self._own, _ = self._checked
+
+    def _validated(self, changes: Iterable[Parameter]) -> tuple[dict[str, Any], Hidden | None]:
+        before, after = current_values(self._node), current_values(self._node, changes)
+        changeable = [one.name for one in self._declared]
+        for name in (change.name for change in changes):
+            if name not in (*changeable, *OF_ROS) and before.get(name) != after.get(name):
+                raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
+                                 f'robot only {", ".join(changeable) or "the clock"} change')
+        own = {one.name: one.check(after.get(one.name)) for one in self._declared}
+        return own, None if self._hidden is None else Hidden.of(own, self._hidden)
+
+    def _apply(self, checked: tuple[dict[str, Any], Hidden | None],
+               changes: Iterable[Parameter]) -> None:
+        before, (self._own, hidden) = self._own, checked
+        if hidden is not None and self._own != before:
+            self._hidden = hidden
+            self._use(hidden)

@@ -18,34 +18,34 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.serialization import deserialize_message, serialize_message
-from trajectory_msgs.msg import JointTrajectory
+from rclpy.serialization import serialize_message
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.ros.feedforward_settings import parameters_for
-from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.command_cdr import CommandBytes
-from pprs_dynamics.ros.messages.joint_request import read_joint_trajectory
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.request_reader import reader_for
-from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.ros.messages.status_codes import Code
-from pprs_dynamics.ros.messages.trajectory_request import SPLINE, TrajectoryRequest
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.serialisation import CommandObjects
+from pprs_dynamics.ros.messages.status_codes import Code, Rejection
+from pprs_dynamics.ros.messages.trajectory_request import (
+    SPLINE,
+    TrajectoryRequest,
+    read_joint_trajectory,
+    reader_for,
+)
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import NodeParameter, declare_own, drive_count
+from pprs_dynamics.ros.node.parameters import drive_count, own_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
-ACTION = NodeParameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
+ACTION = own_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
                        'of the controller that the goals are passed on to', stays=True)
-TIMEOUT = NodeParameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
+TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
@@ -60,8 +60,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         parameters = (ACTION, TIMEOUT, *(
             replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
             for one in parameters_for(drive_count(self)) if one.name in SHARED))
-        own = declare_own(self, parameters)
         self._settings = ModelParameters(self, parameters, lambda: None)
+        own = self._settings.own
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': own['action']}, self._counters,
@@ -117,8 +117,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         model, own = self._settings.model, self._settings.own
         feedforward = Feedforward(model, own)
         answer = feedforward.answer(self._request(model, goal))
-        trajectory = deserialize_message(CommandBytes(RobotNames.of(model)).joint_trajectory(
-            0, answer.request.offsets, answer.forces, answer.effort), JointTrajectory)
+        trajectory = CommandObjects(RobotNames.of(model)).joint_trajectory(
+            0, answer.request.offsets, answer.forces, answer.effort)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives
         return Goal(

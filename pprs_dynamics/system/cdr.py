@@ -11,7 +11,6 @@ Source: OMG, DDS Interoperability Wire Protocol (RTPS) 2.5, chapter 10; CORBA 3.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 
 # Plain CDR, version 1, little endian, and two bytes of options.
 LITTLE_ENDIAN = b'\x00\x01\x00\x00'
@@ -25,39 +24,13 @@ def aligned(offset: int, size: int) -> int:
     return offset + (HEADER - offset) % size
 
 
-def padded(data: bytes, size: int, before: int = 0) -> bytes:
-    """Return data, which follows `before` other bytes of a message, filled up to a place."""
-    offset = before + len(data)
-    return data + bytes(aligned(offset, size) - offset)
-
-
-def with_text(data: bytes, text: str) -> bytes:
-    """Return the beginning of a message with a text after it."""
-    content = text.encode() + b'\x00'
-    return padded(data, 4) + WORD.pack(len(content)) + content
-
-
-def with_count(data: bytes, count: int, before: int = 0) -> bytes:
-    """Return the beginning of a message up to the numbers of 8 bytes of a sequence."""
-    data = padded(data, 4, before) + WORD.pack(count)
-    return padded(data, 8, before) if count else data
-
-
-def with_names(frame: str, names: Sequence[str]) -> bytes:
-    """Return the beginning of a message: a header, its stamp left open, and the names of joints."""
-    data = padded(with_text(LITTLE_ENDIAN + bytes(STAMP.size), frame), 4) + WORD.pack(len(names))
-    for name in names:
-        data = with_text(data, name)
-    return data
-
-
 class Walk:
     """A place in the bytes of a message, which moves on over what is read.
 
     Parameters
     ----------
     data : bytes
-    is_little_endian : bool
+        Its second byte tells the order of bytes.
 
     Attributes
     ----------
@@ -65,6 +38,8 @@ class Walk:
         The place, which may be beyond the end.
     words : list of int
         Places of all length words until then.
+    arrays : list of (int, int)
+        Place of the first number, and count of elements, of all sequences of numbers until then.
 
     Raises
     ------
@@ -72,9 +47,9 @@ class Walk:
         From every method that reads a length word that is not there, or cannot be one.
     """
 
-    def __init__(self, data: bytes, is_little_endian: bool = True) -> None:
-        self._data, self._word = data, WORD if is_little_endian else _BIG_WORD
-        self.at, self.words = HEADER, list[int]()
+    def __init__(self, data: bytes) -> None:
+        self._data, self._word = data, WORD if data[1] == LITTLE_ENDIAN[1] else _BIG_WORD
+        self.at, self.words, self.arrays = HEADER, list[int](), list[tuple[int, int]]()
 
     def over(self, size: int, alignment: int = 4) -> None:
         """Go over that many bytes of values."""
@@ -101,18 +76,12 @@ class Walk:
         """Go over a sequence of texts, and return where they stand."""
         return [self.text() for _ in range(self.count())]
 
-    def numbers(self, each: int = 1) -> tuple[int, int]:
-        """Go over a sequence of elements that are `each` numbers of 8 bytes.
-
-        Returns
-        -------
-        (int, int)
-            Place of the first, and count of the elements.
-        """
+    def numbers(self, each: int = 1) -> None:
+        """Go over a sequence of elements that are `each` numbers of 8 bytes."""
         count = self.count()
         if count:
             self.over(8 * each * count, 8)
-        return self.at - 8 * each * count, count
+        self.arrays.append((self.at - 8 * each * count, count))
 
     def header(self) -> list[slice]:
         """Go over a header and the names of joints, and return where these stand."""

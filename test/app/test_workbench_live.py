@@ -31,7 +31,7 @@ from workbench_server import Workbench, workbench
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.conversions import RobotNames
 
 pytestmark = [pytest.mark.nodes, needs_browser]
 

@@ -46,8 +46,12 @@ from sensor_msgs.msg import JointState
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError, MotionError, UnreadableFileError
-from pprs_dynamics.measurement.files.joint_state_cdr import Layout, serialised
-from pprs_dynamics.measurement.files.message_blocks import MOST_LAYOUTS, JointStateBlocks
+from pprs_dynamics.measurement.files.joint_state_cdr import (
+    MOST_LAYOUTS,
+    JointStateBlocks,
+    Layout,
+    serialised,
+)
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     describe,

@@ -16,7 +16,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import spline_derivatives
-from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 
 TIMES = np.arange(0.0, 1.0, 0.01)
@@ -126,8 +126,7 @@ def test_splines_are_loaded_before_messages_and_only_where_they_are_asked_for(mi
         'import sys\n'
         'from pprs_dynamics import DriveModel\n'
         'from pprs_dynamics.physics.model.preparation import prepare\n'
-        'from pprs_dynamics.ros.force_command import Feedforward\n'
-        'from pprs_dynamics.ros.feedforward_settings import parameters_for\n'
+        'from pprs_dynamics.ros.force_command import Feedforward, parameters_for\n'
         'model = DriveModel.load()\n'
         'prepare(model)\n'
         'own = {each.name: each.default for each in parameters_for(6)}\n'

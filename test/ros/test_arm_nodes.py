@@ -28,7 +28,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.physics.model.parameter_file import read_parameters
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.cdr_validation import is_whole
+from pprs_dynamics.ros.messages.incoming_bytes import is_whole
 from pprs_dynamics.ros.monitor import MonitorNode
 
 pytestmark = pytest.mark.nodes

@@ -21,11 +21,11 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.command_cdr import CommandBytes
+from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.request_reader import reader_for
-from pprs_dynamics.ros.messages.robot_names import RobotNames
+from pprs_dynamics.ros.messages.serialisation import CommandBytes
+from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.messages.trajectory_request import reader_for
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]

@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.measured_states import PATIENCE, MeasuredState, MeasuredStates
-from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.status_codes import Rejection
 
 JOINTS = ('a', 'b', 'c')
 PERIOD = 2_000_000  # [ns]

@@ -21,11 +21,10 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros import feedforward
 from pprs_dynamics.ros.messages import conversions, serialisation
-from pprs_dynamics.ros.messages.cdr_validation import is_whole, message_in
-from pprs_dynamics.ros.messages.command_cdr import CommandBytes
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import RobotNames
-from pprs_dynamics.ros.messages.trajectory_cdr import read_points
+from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in, read_points
+from pprs_dynamics.ros.messages.serialisation import CommandBytes
+from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import read_serialised, read_trajectory
 
 pytestmark = pytest.mark.nodes

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,11 +22,14 @@ from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.residuals.followed_motion import CHUNK, Motion, kinematics_of
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
-from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, Measured, smooth_drives
+from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import Geometry
+
+if TYPE_CHECKING:
+    from pprs_dynamics.measurement.files.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,7 @@ class Reconstruction:
 
 
 def reconstruct(
-    model: ForceModel | Geometry, recording: Measured, progress: Progress | None = None,
+    model: ForceModel | Geometry, recording: Recording, progress: Progress | None = None,
     window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
@@ -222,13 +225,13 @@ def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Recons
                    near_branch=followed.near_branch, jumps=followed.jumps)
 
 
-def _applied_gain(recording: Measured) -> Array:
+def _applied_gain(recording: Recording) -> Array:
     """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
     gain: Array | None = getattr(recording, 'gain', None)
     return np.full(len(recording.drives), np.nan) if gain is None else gain
 
 
-def _efforts(model: ForceModel | Geometry, recording: Measured) -> Array:
+def _efforts(model: ForceModel | Geometry, recording: Recording) -> Array:
     """Return the efforts of a recording, NaN where a drive stands."""
     effort = recording.effort
     if isinstance(model, ForceModel) and model.rest_speed:

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.joint_state_cdr import serialised
-from pprs_dynamics.measurement.files.merged_states import (
-    CONTROLLER,
-    DYNAMIC,
+from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
-    read_merged,
+    JointStateBlocks,
+    message_types,
+    serialised,
 )
-from pprs_dynamics.measurement.files.message_blocks import JointStateBlocks
+from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, read_merged
 from pprs_dynamics.measurement.files.samples import (
     Defect,
     Indices,
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.rosbag2 import Reader
 
-MESSAGE_TYPE = JOINT_STATE
 LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
 CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
@@ -74,7 +73,7 @@ def read_bag(
     with _opened(path, storage) as reader:
         connections = _chosen(path, reader, topic)
         name = connections[0].topic
-        if connections[0].msgtype != MESSAGE_TYPE:
+        if connections[0].msgtype != JOINT_STATE:
             return _merged(path, reader, connections, drives, findings)
         blocks = JointStateBlocks(drives)
         total = sum(connection.msgcount for connection in connections)
@@ -84,32 +83,36 @@ def read_bag(
             done += len(block)
             if progress is not None:
                 progress(done, max(total, done))
-    if not done:
-        raise UnreadableFileError(path, f'{name} holds no messages')
-    if not blocks.samples:
-        if set(drives) <= blocks.names:  # spread over several messages
-            with _opened(path, storage) as reader:
-                return _merged(path, reader, _chosen(path, reader, topic), drives, findings)
-        _tell_missing(path, name, drives, blocks)
-    stamps, received, position, velocity, effort = blocks.arrays()
-    if topic is None and np.all(np.isnan(effort)):
-        with _opened(path, storage) as reader:
-            if others := [one for one in reader.connections
-                          if one.msgtype == MESSAGE_TYPE and one.topic != name]:
-                merged = _merged(path, reader, [*_chosen(path, reader, topic), *others], drives,
-                                 findings)
-                if np.any(np.isfinite(merged.effort)):
-                    return merged
+        if not done:
+            raise UnreadableFileError(path, f'{name} holds no messages')
+        if not blocks.samples:
+            if set(drives) <= blocks.names:  # spread over several messages
+                return _merged(path, reader, connections, drives, findings)
+            _tell_missing(path, name, drives, blocks)
+        stamps, received, position, velocity, effort = blocks.arrays()
+        others = [one for one in reader.connections
+                  if one.msgtype == JOINT_STATE and one.topic != name]
+        if topic is None and others and np.all(np.isnan(effort)):
+            merged = _merged(path, reader, [*connections, *others], drives, findings)
+            if np.any(np.isfinite(merged.effort)):
+                return merged
     if not np.any(stamps):
         findings.append(Defect(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
         stamps = received
     findings += _ignored(name, done, drives, blocks)
+    return _samples(drives, stamps, (position, velocity, effort), name, findings)
+
+
+def _samples(drives: tuple[str, ...], stamps: Indices, arrays: Sequence[Array], topics: str,
+             findings: list[Defect]) -> Samples:
+    """Return positions, velocities and efforts at stamps [ns] as samples."""
     epoch = whole_epoch(stamps / 1e9)
+    position, velocity, effort = arrays
     return Samples(
         drives, (stamps - epoch * 10**9) / 1e9, position,
         None if np.all(np.isnan(velocity)) else velocity, effort, epoch,
-        f'rosbag2, {name}', tuple(findings))
+        f'rosbag2, {topics}', tuple(findings))
 
 
 def _merged(path: Path, reader: Reader, connections: list[Connection], drives: tuple[str, ...],
@@ -120,14 +123,11 @@ def _merged(path: Path, reader: Reader, connections: list[Connection], drives: t
     except Exception as error:
         raise UnreadableFileError(path, _damaged(error)) from None
     topics = ', '.join(sorted({one.topic for one in connections}))
-    if merged is None or not len(merged.stamps):
+    if merged is None or not len(merged[0]):
         raise UnreadableFileError(path, f'{topics} holds no positions of all of '
                                   f'{", ".join(drives)} at the same times')
-    epoch = whole_epoch(merged.stamps / 1e9)
-    return Samples(
-        drives, (merged.stamps - epoch * 10**9) / 1e9, merged.position,
-        None if np.all(np.isnan(merged.velocity)) else merged.velocity, merged.effort, epoch,
-        f'rosbag2, {topics}', (*findings, *merged.findings))
+    stamps, arrays, told = merged
+    return _samples(drives, stamps, arrays, topics, [*findings, *told])
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],
@@ -169,9 +169,8 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
                      suffix: str) -> None:
     _require_rosbags('writing rosbag2 files')
     from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    typestore = get_typestore(Stores.ROS2_KILTED)
+    typestore = message_types()
     starts = [int(_stamps(samples).min()) for samples in topics.values() if len(samples.time)]
     with Writer(path, version=9, storage_plugin=StoragePlugin[STORAGE[suffix]]) as writer:
         for topic, sentences in texts.items():
@@ -187,8 +186,7 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
             stamps = _stamps(samples)
             # A bag is read in the order of recording: it must not follow a clock that is set back.
             recorded = np.maximum.accumulate(stamps)
-            connection = writer.add_connection(
-                topic, MESSAGE_TYPE, typestore=typestore)
+            connection = writer.add_connection(topic, JOINT_STATE, typestore=typestore)
             for start in range(0, len(stamps), BLOCK):
                 part = slice(start, start + BLOCK)
                 velocity = None if samples.velocity is None else samples.velocity[part]
@@ -278,7 +276,7 @@ def _damaged(error: Exception) -> str:
 
 def _chosen(path: Path, reader: Reader, topic: str | None) -> list[Connection]:
     """Return the connections of the one topic to be read."""
-    states = [item for item in reader.connections if item.msgtype == MESSAGE_TYPE]
+    states = [item for item in reader.connections if item.msgtype == JOINT_STATE]
     controllers = [item for item in reader.connections
                    if item.msgtype in CONTROLLER_TYPES and item.msgcount]
     if topic is not None:

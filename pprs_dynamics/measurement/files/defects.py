@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,12 +78,19 @@ class Judgement:
         self.findings.append(
             Defect(kind, count, what + where, spans[:MOST_SPANS], tuple(drives)))
 
+    def _tell_samples(self, kind: str, mask: Mask, what: str, drives: Iterable[str] = (),
+                      noun: str = 'sample') -> None:
+        """Add a finding about the samples of a mask, whose count begins the clause."""
+        count = int(mask.sum())
+        self._tell(kind, count, f'{counted(count, noun)} {what}',
+                   stamps.runs(mask & np.isfinite(self.samples.time)), drives)
+
     def _keep(self, mask: Mask) -> None:
         """Drop samples, and move the starts of stretches with them."""
         if np.all(mask):
             return
         before = np.concatenate(([0], np.cumsum(mask)))
-        self.samples = self.samples.take(mask)
+        self.samples = _taken(self.samples, mask)
         starts = np.unique(before[self._starts])
         self._starts = starts[starts < max(len(self.samples.time), 1)]
 
@@ -103,26 +111,21 @@ class Judgement:
             largest = float(np.abs(values[bad]).max())
             drives = self._named(np.any(bad, axis=0))
             values[bad] = np.nan
-            rows = np.any(bad, axis=1)
             article = 'an' if quantity == 'effort' else 'a'
             unit = samples.unit_of(int(np.argmax(np.any(bad, axis=0))), unit)
-            self._tell(f'impossible_{quantity}', int(rows.sum()),
-                       f'{counted(int(rows.sum()), "sample")} with {article} {quantity} of '
-                       f'{", ".join(drives)} up to {largest:.3g} {unit}, which none can be,',
-                       _places(rows & np.isfinite(samples.time)), drives)
+            self._tell_samples(f'impossible_{quantity}', np.any(bad, axis=1),
+                               f'with {article} {quantity} of {", ".join(drives)} up to '
+                               f'{largest:.3g} {unit}, which none can be,', drives)
 
     def _drop_non_finite(self) -> None:
         bad_time = ~np.isfinite(self.samples.time)
-        self._tell('non_finite_time', int(bad_time.sum()),
-                   f'{counted(int(bad_time.sum()), "sample")} without a finite time')
+        self._tell_samples('non_finite_time', bad_time, 'without a finite time')
         self._keep(~bad_time)
         bad = ~np.isfinite(self.samples.position)
         rows = np.any(bad, axis=1)
         drives = self._named(np.any(bad, axis=0))
-        count = int(rows.sum())
-        self._tell('non_finite_position', count,
-                   f'{counted(count, "sample")} without a finite position of {", ".join(drives)}',
-                   _places(rows), drives)
+        self._tell_samples('non_finite_position', rows,
+                           f'without a finite position of {", ".join(drives)}', drives)
         self._keep(~rows)
 
     def _order(self) -> None:
@@ -136,14 +139,11 @@ class Judgement:
                        [(int(k), int(k)) for k in resets])
         self._split(resets)
         late = stamps.late_samples(time, self._starts)
-        self._tell('unordered_stamps', int(late.sum()),
-                   f'{counted(int(late.sum()), "stamp")} out of order', _places(late))
+        self._tell_samples('unordered_stamps', late, 'out of order', noun='stamp')
         if np.any(late):
-            self.samples = self.samples.take(stamps.sorted_order(time, self._starts))
+            self.samples = _taken(self.samples, stamps.sorted_order(time, self._starts))
         same = stamps.duplicates(self.samples.time)
-        self._tell('duplicate_stamps', int(same.sum()),
-                   f'{counted(int(same.sum()), "sample")} with the stamp of another',
-                   _places(same))
+        self._tell_samples('duplicate_stamps', same, 'with the stamp of another')
         self._keep(~same)
 
     def _judge_positions(self) -> None:
@@ -157,10 +157,8 @@ class Judgement:
                        [(first, first) for first, _ in jumps], [name])
         self._split(np.array([first for first, _, _ in found.jumps], dtype=np.int64))
         drives = [self.samples.drives[drive] for drive in sorted(found.spike_drives)]
-        count = int(found.spikes.sum())
-        self._tell('position_spike', count,
-                   f'{counted(count, "sample")} with a spike in the position of '
-                   f'{", ".join(drives)}', _places(found.spikes), drives)
+        self._tell_samples('position_spike', found.spikes,
+                           f'with a spike in the position of {", ".join(drives)}', drives)
         self._keep(~found.spikes)
 
     def _judge_spacing(self) -> None:
@@ -173,47 +171,38 @@ class Judgement:
                        f'{1 / before:.4g} Hz to {1 / after:.4g} Hz,',
                        [(first, first) for first, _, _ in changes])
         self._split(np.array([first for first, _, _ in changes], dtype=np.int64))
-        every_gap, every_lost, lost_count = [], [], 0
-        for part in stamps.stretches(self._starts, len(time)):
-            gap, lost, count = stamps.gaps(time, part)
-            every_gap += gap.tolist()
-            every_lost += lost.tolist()
-            lost_count += count
-        missing = sum(time[k] - time[k - 1] for k in every_gap)
-        self._tell('gap', len(every_gap),
-                   f'{counted(len(every_gap), "gap")} of {missing:.4g} s in all',
-                   [(k - 1, k) for k in every_gap])
+        gaps, losses, counts = zip(*(stamps.gaps(time, part) for part in stamps.stretches(
+            self._starts, len(time))), strict=True)
+        gap, lost, lost_count = np.concatenate(gaps), np.concatenate(losses), sum(counts)
+        missing = sum(time[gap] - time[gap - 1])
+        self._tell('gap', len(gap), f'{counted(len(gap), "gap")} of {missing:.4g} s in all',
+                   [(k - 1, k) for k in gap])
         self._tell('lost_samples', lost_count, f'{counted(lost_count, "sample")} lost',
-                   [(k - 1, k) for k in every_lost])
-        self._split(np.array(every_gap, dtype=np.int64))
+                   [(k - 1, k) for k in lost])
+        self._split(gap)
         self._judge_regularity()
 
     def _judge_regularity(self) -> None:
         time = self.samples.time
-        irregular, slow = [], []
-        for part in stamps.stretches(self._starts, len(time)):
-            if part.stop - part.start < SHORTEST_SEGMENT:
-                continue
-            low, step, high = stamps.spread(time, part)
-            if high - low > stamps.IRREGULAR_SPREAD * step:
-                irregular.append((part.start, part.stop - 1, low, high))
-            if step > SLOW_STEP:
-                slow.append((part.start, part.stop - 1, step))
+        spreads = [((part.start, part.stop - 1), *stamps.spread(time, part))
+                   for part in stamps.stretches(self._starts, len(time))
+                   if part.stop - part.start >= SHORTEST_SEGMENT]
+        irregular = [(place, low, high) for place, low, step, high in spreads
+                     if high - low > stamps.IRREGULAR_SPREAD * step]
         if irregular:
-            low, high = min(item[2] for item in irregular), max(item[3] for item in irregular)
+            low, high = min(low for _, low, _ in irregular), max(high for _, _, high in irregular)
             self._tell('irregular_steps', len(irregular),
                        f'steps between stamps vary from {1e3 * low:.3g} to {1e3 * high:.3g} ms',
-                       [item[:2] for item in irregular])
+                       [place for place, _, _ in irregular])
+        slow = [(place, step) for place, _, step, _ in spreads if step > SLOW_STEP]
         if slow:
             self._tell('slow_rate', len(slow),
-                       f'there is only one sample in {max(item[2] for item in slow):.4g} s',
-                       [item[:2] for item in slow])
+                       f'there is only one sample in {max(step for _, step in slow):.4g} s',
+                       [place for place, _ in slow])
 
     def _judge_efforts_and_velocities(self) -> None:
         effort = self.samples.effort
-        infinite = np.isinf(effort)
-        if np.any(infinite):
-            effort[infinite] = np.nan
+        effort[np.isinf(effort)] = np.nan
         if np.isnan(effort).all():
             self._tell('no_effort', len(effort), 'there is no effort of any drive')
         else:
@@ -223,9 +212,7 @@ class Judgement:
         if velocity is None:
             self._tell('missing_velocity', len(effort), 'no velocities are recorded')
             return
-        infinite = np.isinf(velocity)
-        if np.any(infinite):
-            velocity[infinite] = np.nan
+        velocity[np.isinf(velocity)] = np.nan
         self._tell_missing('missing_velocity', velocity, 'velocity')
 
     def _leave_out_saturated(self) -> None:
@@ -241,7 +228,7 @@ class Judgement:
                        f'the effort of {name} is at its limit of {limit:.6g} '
                        f'{samples.unit_of(drive, "N")} in {100 * count / len(size):.3g} % of the '
                        'samples',
-                       _places(at_limit), [name])
+                       stamps.runs(at_limit), [name])
             effort[at_limit, drive] = np.nan
 
     def _tell_missing(self, kind: str, values: NDArray[np.float64], quantity: str) -> None:
@@ -251,7 +238,7 @@ class Judgement:
         share = [f'{name} ({_percent(int(count), len(values))})'
                  for name, count in zip(self.samples.drives, counts, strict=True) if count]
         self._tell(kind, int(counts.sum()), f'no {quantity} of {", ".join(share)}',
-                   _places(np.any(missing, axis=1)), drives)
+                   stamps.runs(np.any(missing, axis=1)), drives)
 
     def _judge_constant_values(self) -> None:
         samples = self.samples
@@ -302,10 +289,12 @@ class Judgement:
         return [name for name, true in zip(self.samples.drives, mask, strict=True) if true]
 
 
-def _places(mask: Mask) -> list[tuple[int, int]]:
-    """Return the runs of a mask as (first, last)."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+def _taken(samples: Samples, index: Indices | Mask) -> Samples:
+    """Return the samples of an index or mask."""
+    return replace(
+        samples, time=samples.time[index], position=samples.position[index],
+        velocity=None if samples.velocity is None else samples.velocity[index],
+        effort=samples.effort[index])
 
 
 def _percent(count: int, total: int) -> str:

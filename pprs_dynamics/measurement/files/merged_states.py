@@ -12,40 +12,32 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.samples import Defect, Indices
+from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE, message_types
+from pprs_dynamics.measurement.files.samples import QUANTITIES, Defect, Indices
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
     from rosbags.rosbag2 import Reader
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
 DYNAMIC = 'control_msgs/msg/DynamicJointState'
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
-TYPES = (JOINT_STATE, DYNAMIC, CONTROLLER)
-QUANTITIES = ('position', 'velocity', 'effort')
 LONGEST_STEP = 1.6  # median steps between two samples, over which nothing is interpolated
 
 
-class MergedStates(NamedTuple):
-    """Stamps [ns] (N,), three (N, D) arrays with NaN where unknown, and what there is to say."""
-
-    stamps: Indices
-    position: Array
-    velocity: Array
-    effort: Array
-    findings: list[Defect]
-
-
 def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str, ...],
-                ) -> MergedStates | None:
+                ) -> tuple[Indices, list[Array], list[Defect]] | None:
     """Return the states of all drives, at the stamps of the first one's positions.
 
-    None where some drive has no positions in these messages.
+    Returns
+    -------
+    tuple or None
+        Stamps [ns] (N,), positions, velocities and efforts (N, D) with NaN where unknown, and what
+        there is to say; None where some drive has no positions in these messages.
     """
     typestore = _typestore(connections)
     times: dict[tuple[str, str], list[int]] = defaultdict(list)
@@ -65,25 +57,24 @@ def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str
     if any(not times[drive, 'position'] for drive in drives):
         return None
     stamps = np.unique(np.array(times[drives[0], 'position'], dtype=np.int64))
-    arrays = {quantity: np.stack([
+    arrays = [np.stack([
         _at(stamps, times[drive, quantity], values[drive, quantity]) for drive in drives], axis=1)
-        for quantity in QUANTITIES}
-    kept = np.isfinite(arrays['position']).all(axis=1)
+        for quantity in QUANTITIES]
+    kept = np.isfinite(arrays[0]).all(axis=1)
     topics = sorted({connection.topic for connection in connections})
     findings = [Defect('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
     if commanded:
         findings.append(Defect(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
-    position, velocity, effort = (arrays[quantity][kept] for quantity in QUANTITIES)
-    return MergedStates(stamps[kept], position, velocity, effort, findings)
+    return stamps[kept], [array[kept] for array in arrays], findings
 
 
 def _typestore(connections: list[Connection]) -> Any:
     """Return types with those that the bag defines beside ROS 2's own."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys import get_types_from_msg
 
-    typestore = get_typestore(Stores.ROS2_KILTED)
+    typestore = message_types()
     for connection in connections:
         if connection.msgtype not in typestore.types and connection.msgdef.data:
             found = get_types_from_msg(connection.msgdef.data, connection.msgtype)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -17,41 +17,30 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
-from pprs_dynamics.measurement.files.csv_files import read_csv, write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.samples import Defect, Progress, Samples
-from pprs_dynamics.measurement.files.table_files import read_table
+from pprs_dynamics.measurement.files.table_files import read_csv, read_table, write_csv
 from pprs_dynamics.system.plain_text import counted, displayed
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Measured motion and effort of D drives.
+@dataclass(frozen=True, kw_only=True)
+class Recording(Samples):
+    """Measured motion and effort of D drives: samples that were judged.
+
+    Times, (N,), strictly increase within each segment, positions are finite, efforts are in N or
+    N m, and `findings` has every defect, and what was done about it.
 
     Parameters
     ----------
     name : str
         For people: the file's name, as `displayed`.
-    drives : tuple of D str
-    time : (N,) array
-        [s], counted from `epoch`; strictly increasing within each segment.
-    position : (N, D) array
-        [m], finite.
-    velocity : (N, D) array or None
-        As recorded [m/s], NaN where it is not; None where there is none at all.
-    effort : (N, D) array
-        What the drives applied [N]; NaN where it was not measured.
-    findings : tuple of Defect
-        Every defect, and what was done about it.
     segments : tuple of slice
         Stretches to be treated each for itself. Samples outside of them are not to be used.
-    epoch : int
-        Whole seconds that `time` counts from: 0 for clocks that start near 0.
-    source : str
-        Format and topic.
     gain : (D,) array or None
         By which recorded currents were multiplied [N m/A, N/A]; NaN for drives whose efforts were
         recorded, None where all were.
+    drives, time, position, velocity, effort, epoch, source, findings, units, effort_limits
+        As of `Samples`.
 
     Raises
     ------
@@ -60,15 +49,7 @@ class Recording:
     """
 
     name: str
-    drives: tuple[str, ...]
-    time: Array
-    position: Array
-    velocity: Array | None
-    effort: Array
-    findings: tuple[Defect, ...] = ()
-    segments: tuple[slice, ...] = field(default=())
-    epoch: int = 0
-    source: str = ''
+    segments: tuple[slice, ...] = ()
     gain: Array | None = None
 
     def __post_init__(self) -> None:
@@ -103,17 +84,11 @@ class Recording:
         efforts = np.full(position.shape, np.nan) if effort is None else np.array(effort, float)
         velocities = None if velocity is None else np.array(velocity, float)
         # Checks the shapes before anything computes with them.
-        cls(name, drives, time, position, velocities, efforts)
+        cls(drives, time, position, velocities, efforts, name=name)
         recording = _judged(name, Samples(drives, time, position, velocities, efforts))
         if not len(recording.time):
             raise MotionError('position', 'no sample is finite', 'be finite', 'finite')
         return recording
-
-    @property
-    def samples(self) -> Samples:
-        """The arrays alone."""
-        return Samples(self.drives, self.time, self.position, self.velocity, self.effort,
-                       self.epoch, self.source)
 
 
 @dataclass(frozen=True)
@@ -273,9 +248,9 @@ def write_recording(
     """
     path = Path(path)
     if path.suffix == '.csv':
-        write_csv(path, recording.samples)
+        write_csv(path, recording)
     else:
-        write_bag(path, {topic: recording.samples})
+        write_bag(path, {topic: recording})
 
 
 def describe(recording: Recording) -> Summary:
@@ -303,9 +278,8 @@ def describe(recording: Recording) -> Summary:
 
 def _judged(name: str, samples: Samples) -> Recording:
     judged = Judgement(samples)
-    kept = judged.samples
-    return Recording(name, kept.drives, kept.time, kept.position, kept.velocity, kept.effort,
-                     tuple(judged.findings), judged.segments, kept.epoch, kept.source)
+    return Recording(**{**vars(judged.samples), 'findings': tuple(judged.findings)}, name=name,
+                     segments=judged.segments)
 
 
 def _range(values: Array) -> tuple[float, float] | None:

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from pprs_dynamics.drives import DriveUnits
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Progress = Callable[[int, int], None]
+
+QUANTITIES = ('position', 'velocity', 'effort')
+CURRENT = 'current'  # that a table may hold instead of an effort
 
 # Stamps beyond this [s] count from an epoch: as floats they would lose more than 0.1 ns.
 EPOCH_STAMP = 1e6
@@ -143,16 +146,38 @@ class Samples:
     units: tuple[DriveUnits, ...] = ()
     effort_limits: tuple[float, ...] = ()
 
+    @classmethod
+    def of_columns(
+        cls, drives: tuple[str, ...], time: Array, columns: Mapping[tuple[str, str], Array],
+        source: str, findings: tuple[Defect, ...] = (),
+    ) -> Samples:
+        """Return the samples of a table.
+
+        Parameters
+        ----------
+        drives : tuple of D str
+        time : (N,) array
+            Stamps [s].
+        columns : dict of (N,) arrays
+            By drive and quantity: one of `QUANTITIES`, or `CURRENT`.
+        source, findings
+            As of the class.
+        """
+        none = np.full(len(time), np.nan)
+
+        def of(quantity: str) -> Array:
+            return np.column_stack([columns.get((drive, quantity), none) for drive in drives])
+
+        epoch, velocity = whole_epoch(time), of('velocity')
+        in_amperes = tuple((drive, CURRENT) in columns for drive in drives)
+        return cls(drives, time - epoch, of('position'),
+                   None if np.all(np.isnan(velocity)) else velocity,
+                   np.where(in_amperes, of(CURRENT), of('effort')), epoch, source, findings,
+                   in_amperes)
+
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""
         return self.units[drive].of(unit) if self.units else unit
-
-    def take(self, index: Indices | Mask) -> Samples:
-        """Return the samples of an index or mask."""
-        return replace(
-            self, time=self.time[index], position=self.position[index],
-            velocity=None if self.velocity is None else self.velocity[index],
-            effort=self.effort[index])
 
 
 def whole_epoch(seconds: Array) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices, Mask, Samples
-from pprs_dynamics.measurement.files.stamps import stretches
+from pprs_dynamics.measurement.files.stamps import runs, stretches
 
 # A step of position this many times faster than 99 % of all, and than its own surroundings, is
 # no motion: real motion gains speed over several samples.
@@ -84,15 +84,15 @@ def frozen_runs(samples: Samples, starts: Indices) -> list[tuple[int, int]]:
     if samples.velocity is not None:
         same &= _repeats(samples.velocity)
     same &= np.any(np.isfinite(samples.effort), axis=1)[1:]
-    return _runs(samples.time, same, starts, FROZEN_TIME, FROZEN_SAMPLES)
+    return _lasting(samples.time, same, starts, FROZEN_TIME, FROZEN_SAMPLES)
 
 
 def stuck_efforts(samples: Samples, starts: Indices, drive: int) -> list[tuple[int, int]]:
     """Return (first, last) samples between which a drive moves and its effort stays the same."""
     effort = samples.effort[:, drive]
     same = effort[1:] == effort[:-1]
-    runs = _runs(samples.time, same, starts, STUCK_TIME, FROZEN_SAMPLES)
-    return [(first, last) for first, last in runs
+    stuck = _lasting(samples.time, same, starts, STUCK_TIME, FROZEN_SAMPLES)
+    return [(first, last) for first, last in stuck
             if len(np.unique(samples.position[first:last + 1, drive])) > STUCK_POSITIONS]
 
 
@@ -131,15 +131,15 @@ def _repeats(values: Array) -> Mask:
     return same
 
 
-def _runs(
+def _lasting(
     time: Array, same: Mask, starts: Indices, least_time: float, least_samples: int,
 ) -> list[tuple[int, int]]:
     """Return (first, last) samples of runs of repeats that last, within stretches."""
-    runs = []
+    found = []
     for part in stretches(starts, len(time)):
-        inner = same[part.start:part.stop - 1].astype(np.int8)
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], inner, [0])).astype(np.int8)))
-        for first, last in zip(edges[::2] + part.start, edges[1::2] + part.start, strict=True):
+        for run in runs(same[part.start:part.stop - 1]):
+            # The sample before the first repeat is the first of those that are the same.
+            first, last = part.start + run[0], part.start + run[1] + 1
             if time[last] - time[first] >= least_time and last - first >= least_samples:
-                runs.append((int(first), int(last)))
-    return runs
+                found.append((first, last))
+    return found

@@ -49,6 +49,12 @@ def stretches(starts: Indices, count: int) -> Iterator[slice]:
         yield slice(int(first), int(end))
 
 
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return the runs of a mask as (first, last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
 def clock_resets(time: Array) -> Indices:
     """Return the first sample after each setting back of the clock; none in shuffled rows."""
     resets: list[int] = []

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.measurement.motion.bandwidth import motion_bandwidth
 from pprs_dynamics.measurement.motion.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
@@ -24,28 +23,19 @@ from pprs_dynamics.measurement.motion.differentiation import (
     representative,
 )
 from pprs_dynamics.measurement.motion.sampling_grid import SamplingGrid, find_grid
-from pprs_dynamics.measurement.motion.treatment import block_duration, block_length
+from pprs_dynamics.measurement.motion.treatment import (
+    block_duration,
+    block_length,
+    motion_bandwidth,
+)
+
+# Readers of files take a while to import, and a live node reads none.
+if TYPE_CHECKING:
+    from pprs_dynamics.measurement.files.recording import Recording
 
 # Where fewer blocks than this share of the measured samples' have an effort in every sample,
 # efforts come less often than positions, and blocks are single samples.
 SPARSE_EFFORTS = 0.5
-
-
-class Measured(Protocol):
-    """What a recording must have; see `Recording`."""
-
-    @property
-    def drives(self) -> tuple[str, ...]: ...
-    @property
-    def time(self) -> Array: ...
-    @property
-    def position(self) -> Array: ...
-    @property
-    def velocity(self) -> Array | None: ...
-    @property
-    def effort(self) -> Array: ...
-    @property
-    def segments(self) -> tuple[slice, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -82,14 +72,13 @@ class DriveMotion:
     notes: tuple[str, ...]
 
 
-def smooth_drives(recording: Measured, window: float | None = None,
+def smooth_drives(recording: Recording, window: float | None = None,
                   blocks_per_period: float = 0.0, unit: str = 'm') -> DriveMotion:
     """Return the motion of a recording's drives, with one window for all of them.
 
     Parameters
     ----------
     recording : Recording
-        Or anything with its arrays and segments.
     window : float, optional
         Duration of the window [s], instead of the choice from the data.
     blocks_per_period : float
@@ -147,7 +136,7 @@ def smooth_drives(recording: Measured, window: float | None = None,
 
 
 def _grids(
-    recording: Measured, segments: Sequence[slice],
+    recording: Recording, segments: Sequence[slice],
 ) -> tuple[list[SamplingGrid], list[str]]:
     grids, sayings = [], []
     for part in segments:
@@ -161,7 +150,7 @@ def _grids(
     return grids, sayings
 
 
-def _stretch(recording: Measured, part: slice, grid: SamplingGrid) -> Stretch:
+def _stretch(recording: Recording, part: slice, grid: SamplingGrid) -> Stretch:
     velocity = None
     if recording.velocity is not None:
         # A drive with a velocity that is missing anywhere is not considered; a spline through
@@ -173,7 +162,7 @@ def _stretch(recording: Measured, part: slice, grid: SamplingGrid) -> Stretch:
     return Stretch(grid.at_steps(recording.position[part]), grid.step, velocity)
 
 
-def _velocity_notes(recording: Measured, recorded: np.ndarray) -> list[str]:
+def _velocity_notes(recording: Recording, recorded: np.ndarray) -> list[str]:
     if recording.velocity is None or np.all(np.isnan(recording.velocity)):
         return []
     notes = []
@@ -187,7 +176,7 @@ def _velocity_notes(recording: Measured, recorded: np.ndarray) -> list[str]:
 
 
 def _block(
-    recording: Measured, segments: Sequence[slice], grids: Sequence[SamplingGrid],
+    recording: Recording, segments: Sequence[slice], grids: Sequence[SamplingGrid],
     duration: float, notes: list[str],
 ) -> int | None:
     """Return 1 where efforts are too sparse for blocks, else None."""
@@ -223,7 +212,7 @@ def _blocks(grid: SamplingGrid, edge: int, block: int) -> tuple[slice, np.ndarra
 
 
 def _drive_motion(
-    recording: Measured, part: slice, grid: SamplingGrid, filter_: LocalPolynomial, kept: slice,
+    recording: Recording, part: slice, grid: SamplingGrid, filter_: LocalPolynomial, kept: slice,
     recorded: np.ndarray,
 ) -> tuple[Array, Array, Array]:
     """Return smoothed position, velocity and acceleration at the kept samples of a segment."""

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS 2 messages to motions and back: shapes and names, no mathematics."""
+"""ROS 2 messages to motions and back: names and shapes, no mathematics."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
@@ -23,14 +24,38 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import BASE, RobotNames
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.ros.messages.status_codes import Rejection
 
+BASE = 'base'
 PLATFORM = 'platform'
-PAPER = RobotNames(DRIVES, BASE)
 NANOSECONDS = 1_000_000_000
 LARGEST = 1e9  # [m, N, ...]: no drive's, and squares of what is far larger overflow
 LATEST_SECOND = 2 ** 31 - 1
+
+
+class RobotNames(NamedTuple):
+    """Joints in the order of the model's drives, and the frame.
+
+    Parameters
+    ----------
+    joints : tuple of D str
+        By `joint_map` and `joint_prefix` of the model.
+    frame : str
+        Of `header.frame_id`, in what comes and in what goes out; an empty one always means it.
+    """
+
+    joints: tuple[str, ...]
+    frame: str
+
+    @classmethod
+    def of(cls, model: ForceModel, frame: str = '') -> RobotNames:
+        """Return the names of a model's drives; `frame` '' for that of its kind."""
+        # A platform's is `base`; that of joints means nothing.
+        return cls(model.recorded.joints, frame or (BASE if model.drives == DRIVES else ''))
+
+
+PAPER = RobotNames(DRIVES, BASE)
 
 
 def write_trajectory(
@@ -62,15 +87,18 @@ def write_trajectory(
 
 
 def write_joint_trajectory(
-    motion: JointMotion, stamp: Time, offsets: Sequence[int], joints: Sequence[str],
+    motion: JointMotion, stamp: Time, offsets: Iterable[int], names: RobotNames,
+    effort: Array | None = None,
 ) -> JointTrajectory:
-    """Return the message that asks for a motion of joints; see `write_trajectory`."""
-    message = JointTrajectory(joint_names=list(joints), points=[
-        JointTrajectoryPoint(positions=doubles(q), velocities=doubles(v), accelerations=doubles(a),
-                             time_from_start=duration(offset))
-        for q, v, a, offset in zip(motion.position, motion.velocity, motion.acceleration, offsets,
-                                   strict=True)])
-    message.header.stamp = stamp
+    """Return the message with a motion of joints, and efforts (N, D); see `write_trajectory`."""
+    message = JointTrajectory(joint_names=list(names.joints))
+    message.header.stamp, message.header.frame_id = stamp, names.frame
+    for sample, offset in enumerate(offsets):
+        message.points.append(JointTrajectoryPoint(
+            positions=doubles(motion.position[sample]), velocities=doubles(motion.velocity[sample]),
+            accelerations=doubles(motion.acceleration[sample]),
+            effort=[] if effort is None else doubles(effort[sample]),
+            time_from_start=duration(int(offset))))
     return message
 
 

@@ -16,9 +16,9 @@ from sensor_msgs.msg import JointState
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.merged_states import LONGEST_STEP
-from pprs_dynamics.ros.messages.cdr_validation import message_in
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, nanoseconds, read_drives
-from pprs_dynamics.ros.messages.rejection import Rejection
+from pprs_dynamics.ros.messages.incoming_bytes import message_in
+from pprs_dynamics.ros.messages.status_codes import Rejection
 
 PATIENCE = 1.0  # [s] for messages with the other drives; so far apart may stamps be, too
 STEPS = 15  # of a drive's stream, whose median is its period

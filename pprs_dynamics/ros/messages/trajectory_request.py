@@ -1,27 +1,41 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A trajectory message as the model needs it, or the rule that it breaks."""
+"""Which messages ask a model for forces, and their motion, or the rule that they break."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from trajectory_msgs.msg import (
+    JointTrajectory,
+    MultiDOFJointTrajectory,
+    MultiDOFJointTrajectoryPoint,
+)
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.measurement.files.samples import Indices, Mask
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
-from pprs_dynamics.ros.messages.cdr_validation import message_in
-from pprs_dynamics.ros.messages.conversions import NANOSECONDS, PLATFORM, nanoseconds
-from pprs_dynamics.ros.messages.rejection import Rejection
-from pprs_dynamics.ros.messages.robot_names import BASE
-from pprs_dynamics.ros.messages.trajectory_cdr import read_points
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.ros.messages.conversions import (
+    BASE,
+    NANOSECONDS,
+    PLATFORM,
+    RobotNames,
+    nanoseconds,
+)
+from pprs_dynamics.ros.messages.incoming_bytes import message_in, read_points
+from pprs_dynamics.ros.messages.serialisation import trajectories_have_known_bytes
+from pprs_dynamics.ros.messages.status_codes import Rejection
 
+TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
 REJECT, SPLINE = 'reject', 'spline'
 VELOCITY, ACCELERATION = slice(7, 13), slice(13, 19)
 Motion = PlatformMotion | JointMotion
@@ -63,7 +77,7 @@ def read_serialised(
     points = read_points(data) if frame == BASE else None
     if points is not None:
         stamp, numbers, offsets = points
-        return request_of(start_of(stamp, now, max_age), offsets, _motion_of(numbers))
+        return _request_of(_start_of(stamp, now, max_age), offsets, _motion_of(numbers))
     return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing, frame)
 
 
@@ -102,20 +116,20 @@ def read_trajectory(
     if message.header.frame_id not in ('', frame):
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
                         f'must be {frame!r} or empty')
-    lacking = check_counts(points, missing)
-    start = start_of(nanoseconds(message.header.stamp), now, max_age)
-    offsets = offsets_of(points)
+    lacking = _check_counts(points, missing)
+    start, offsets = _times_of(message, now, max_age)
     numbers = np.array([_row(point) for point in points])
     if lacking.any():
-        _fill(numbers, offsets, lacking)
-    return request_of(start, offsets, _motion_of(numbers))
+        _fill_in(numbers, (VELOCITY, ACCELERATION), spline_derivatives(
+            (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7]), lacking)
+    return _request_of(start, offsets, _motion_of(numbers))
 
 
 def _motion_of(numbers: Array) -> Callable[[Array], Motion]:
     return lambda time: PlatformMotion.from_rows(numbers, time)
 
 
-def request_of(
+def _request_of(
     start: int, offsets: Indices, motion_at: Callable[[Array], Motion],
 ) -> TrajectoryRequest:
     """Return the request for a motion that is made with its times [s], from the start on."""
@@ -125,12 +139,14 @@ def request_of(
     return TrajectoryRequest(motion_at(offsets / NANOSECONDS), start, offsets)
 
 
-def offsets_of(points: Sequence[Any]) -> Indices:
-    """Return time_from_start of every point [ns], (N,)."""
-    return np.array([nanoseconds(point.time_from_start) for point in points], dtype=np.int64)
+def _times_of(message: Any, now: int, max_age: float) -> tuple[int, Indices]:
+    """Return the start of a trajectory, and time_from_start of its points (N,) [ns]."""
+    start = _start_of(nanoseconds(message.header.stamp), now, max_age)
+    return start, np.array([nanoseconds(point.time_from_start) for point in message.points],
+                           dtype=np.int64)
 
 
-def start_of(stamp: int, now: int, max_age: float) -> int:
+def _start_of(stamp: int, now: int, max_age: float) -> int:
     """Return a header stamp, or the time of arrival where it is 0 [ns]; see `read_trajectory`."""
     start = stamp if stamp else now
     age = (now - start) / NANOSECONDS
@@ -139,7 +155,7 @@ def start_of(stamp: int, now: int, max_age: float) -> int:
     return start
 
 
-def check_counts(
+def _check_counts(
     points: Sequence[Any], missing: str, places: str = 'transforms', wanted: int = 1,
 ) -> Mask:
     """Return which points lack velocities and accelerations, (N, 2), where that is allowed.
@@ -175,15 +191,8 @@ def check_counts(
     return lacking
 
 
-def _fill(numbers: Array, offsets: Indices, lacking: Mask) -> None:
-    """Put the derivatives of a spline through the poses where points lack their own."""
-    derivatives = spline_derivatives(
-        (offsets - offsets[0]) / NANOSECONDS, numbers[:, :3], numbers[:, 3:7])
-    fill_in(numbers, (VELOCITY, ACCELERATION), derivatives, lacking)
-
-
-def fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
-            lacking: Mask) -> None:
+def _fill_in(numbers: Array, places: tuple[slice, slice], derivatives: tuple[Array, Array],
+             lacking: Mask) -> None:
     """Put the derivatives of a spline into the columns of those points that lack their own."""
     for place, values, rows in zip(places, derivatives, lacking.T, strict=True):
         if not np.isfinite(values).all():
@@ -205,3 +214,93 @@ def _twist(twists: Sequence[Any]) -> tuple[float, ...]:
         return (0.0,) * 6
     linear, angular = twists[0].linear, twists[0].angular
     return linear.x, linear.y, linear.z, angular.x, angular.y, angular.z
+
+
+def read_joint_trajectory(
+    message: JointTrajectory, joints: Sequence[str], now: int, max_age: float = 0.0,
+    missing: str = REJECT,
+) -> TrajectoryRequest:
+    """Return the motion that a message asks of an arm.
+
+    Parameters
+    ----------
+    message : trajectory_msgs/JointTrajectory
+        Of all joints, in any order; its efforts are not read, and its frame means nothing.
+    joints : sequence of n str
+        In the model's order.
+    now, max_age, missing
+        See `read_trajectory`; a spline goes through the positions.
+
+    Raises
+    ------
+    Rejection, MotionError
+        For a message that breaks a rule.
+    """
+    points, names = message.points, list(message.joint_names)
+    if not points:
+        raise Rejection('EMPTY', 'points: the trajectory has none, must have at least 1')
+    if sorted(names) != sorted(joints):
+        raise Rejection('NAMES', f'joint_names is {names!r:.200}, must hold each of '
+                        f'{", ".join(joints)} once, and nothing else')
+    count = len(joints)
+    lacking = _check_counts(points, missing, 'positions', count)
+    start, offsets = _times_of(message, now, max_age)
+    none = np.zeros(count)
+    order = [names.index(joint) for joint in joints]
+    numbers = np.array([[point.positions, point.velocities or none, point.accelerations or none]
+                        for point in points], dtype=float)[:, :, order].reshape(len(points), -1)
+    position, velocity, acceleration = (
+        slice(k * count, (k + 1) * count) for k in range(3))
+    if lacking.any():
+        _fill_in(numbers, (velocity, acceleration), position_spline_derivatives(
+            (offsets - offsets[0]) / NANOSECONDS, numbers[:, position]), lacking)
+    return _request_of(start, offsets, lambda time: JointMotion.checked(
+        numbers[:, position], numbers[:, velocity], numbers[:, acceleration], time, count))
+
+
+class RequestReader(NamedTuple):
+    """How requests arrive.
+
+    Parameters
+    ----------
+    message : type
+    read : callable
+        Bytes, time of arrival [ns], largest age [s] and what to do about missing derivatives ->
+        TrajectoryRequest; see `read_trajectory`.
+    """
+
+    message: type
+    read: Callable[[bytes, int, float, str], TrajectoryRequest]
+
+
+def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
+    """Return how trajectories for a model arrive, by topic.
+
+    A robot with loops takes the motion of its drives, and beside it that of its tool where the
+    tool's pose determines the drives.
+    """
+    readers = {TRAJECTORY: reader_for(model, names)}
+    if isinstance(model, ArmModel):
+        try:
+            tool = model.tool_pose.structure.tool
+        except ModelError:
+            return readers
+        readers[POSES] = _poses((names and names.frame) or str(model.values[f'{model.block}.base']),
+                                tool)
+    return readers
+
+
+def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
+    """Return how trajectories for a model arrive, by the names of its robot."""
+    joints, frame = names or RobotNames.of(model)
+    if isinstance(model, ArmModel):
+        return RequestReader(JointTrajectory, lambda data, *rules: read_joint_trajectory(
+            message_in(data, JointTrajectory), joints, *rules))
+    if trajectories_have_known_bytes():
+        return RequestReader(MultiDOFJointTrajectory, partial(read_serialised, frame=frame))
+    return _poses(frame, PLATFORM)
+
+
+def _poses(frame: str, body: str) -> RequestReader:
+    return RequestReader(MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
+        message_in(data, MultiDOFJointTrajectory), now, age, missing, frame, body))

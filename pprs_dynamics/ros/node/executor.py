@@ -153,14 +153,23 @@ class StopSignals:
     node's back. To be made before rclpy starts threads, which inherit what is blocked.
     """
 
-    def __init__(self, stop: Callable[[], None]) -> None:
+    def __init__(self) -> None:
+        self._executor: StoppableExecutor | None = None
+        self._wanted = False
         signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
-        threading.Thread(target=self._wait, args=(stop,), daemon=True).start()
+        threading.Thread(target=self._wait, daemon=True).start()
 
-    @staticmethod
-    def _wait(stop: Callable[[], None]) -> None:
+    def stop(self, executor: StoppableExecutor) -> None:
+        """Stop an executor at the first signal, or now where one has come already."""
+        self._executor = executor
+        if self._wanted:
+            executor.stop()
+
+    def _wait(self) -> None:
         signal.sigwait(STOP_SIGNALS)
-        stop()
+        self._wanted = True
+        if self._executor is not None:
+            self._executor.stop()
         # A terminal and a launcher may both pass on one Ctrl-C; who asks again later is not to be
         # kept waiting by a node that hangs.
         time.sleep(PATIENCE)

@@ -21,7 +21,8 @@ class ManagedNode(LifecycleNode):
     Attributes
     ----------
     state : str
-        Label of the state that the last transition led to, which rclpy shows in no public way.
+        Label of the state that the last transition led to, which rclpy shows in no public way;
+        to be set in every transition.
     """
 
     def __init__(self, name: str, **options: Any) -> None:
@@ -30,31 +31,6 @@ class ManagedNode(LifecycleNode):
         for service in self.services:
             if service.srv_name.endswith(CHANGE_STATE):
                 service.callback = self._refusing(service.callback)
-
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go to `inactive`."""
-        self.state = 'inactive'
-        return super().on_configure(state)
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go to `active`."""
-        self.state = 'active'
-        return super().on_activate(state)
-
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go to `inactive`."""
-        self.state = 'inactive'
-        return super().on_deactivate(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go to `unconfigured`."""
-        self.state = 'unconfigured'
-        return super().on_cleanup(state)
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go to `finalized`."""
-        self.state = 'finalized'
-        return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Go where rclpy goes after a transition that failed."""

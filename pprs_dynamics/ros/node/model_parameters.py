@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
@@ -28,22 +28,16 @@ from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     added_descriptor,
     current_values,
-    declare_arm,
     declare_model,
+    declare_own,
     in_declared_type,
     overrides,
     with_hint,
 )
 
 NodeModel = DriveModel | ArmModel
+Checked = TypeVar('Checked')
 OF_OTHERS = NODE_KEYS - {'use_sim_time', 'start_type_description_service'}  # those are ROS 2's
-
-
-class Checks(Protocol):
-    """What says whether parameters may change."""
-
-    def check(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return whether they may, and why not."""
 
 
 class ExplainsRefusals(Node):
@@ -58,7 +52,7 @@ class ExplainsRefusals(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all parameters or none."""
-        settings: Checks | None = getattr(self, '_settings', None)
+        settings: Followed[Any] | None = getattr(self, '_settings', None)
         if settings is not None:  # else they are being declared
             parameter_list = [in_declared_type(self, each) for each in parameter_list]
             result = settings.check(parameter_list)
@@ -67,14 +61,53 @@ class ExplainsRefusals(Node):
         return super().set_parameters_atomically(parameter_list)
 
 
-class ModelParameters:
-    """Declares a model's parameters on a node, and follows their changes.
+class Followed(Generic[Checked]):
+    """Parameters of a running node: what they mean is checked before they change, and then applied.
 
     Parameters
     ----------
     node : Node
-    own : sequence of NodeParameter
+    own : iterable of NodeParameter
         The node's own parameters, declared already.
+    """
+
+    def __init__(self, node: Node, own: Iterable[NodeParameter]) -> None:
+        self._node, self._declared = node, tuple(own)
+        self._checked = self._validated(())
+        node.add_on_set_parameters_callback(self.check)
+        node.add_post_set_parameters_callback(self._after_change)
+
+    def _validated(self, changes: Iterable[Parameter]) -> Checked:
+        """Return what the parameters mean with some of them changed, or raise PprsError."""
+        raise NotImplementedError
+
+    def _apply(self, checked: Checked, changes: Iterable[Parameter]) -> None:
+        """Bring into force what was checked."""
+        raise NotImplementedError
+
+    def check(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return whether the parameters would be valid with some of them changed, and why not."""
+        if not are_of_topics(changes):
+            try:
+                self._checked = self._validated(changes)
+            except PprsError as error:
+                return SetParametersResult(successful=False, reason=with_hint(error))
+        return SetParametersResult(successful=True)
+
+    def _after_change(self, changes: list[Parameter]) -> None:
+        # What was checked, and nothing else, comes into force.
+        if not are_of_topics(changes):
+            self._apply(self._checked, changes)
+
+
+class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
+    """Declares a node's own parameters and those of a model, and follows their changes.
+
+    Parameters
+    ----------
+    node : Node
+    own : iterable of NodeParameter
+        The node's own parameters, which are declared before the model's.
     changed : callable
         Called after every change that was accepted.
 
@@ -96,15 +129,14 @@ class ModelParameters:
     def __init__(
         self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
     ) -> None:
-        self._node, self._declared, self._changed = node, tuple(own), changed
+        self._changed = changed
+        own = tuple(own)
+        declare_own(node, own)
         self._kind: type[NodeModel] = ArmModel if is_mechanism(overrides(node)) else DriveModel
-        taken_from_paper = []
-        if self._kind is ArmModel:
-            declare_arm(node)
-        else:
-            taken_from_paper = declare_model(node)
+        taken_from_paper = declare_model(node)
         self._stays: dict[str, Any] = {}
-        self.model, self.own = self._validated()
+        super().__init__(node, own)
+        self.model, self.own = self._checked
         self._stays = self._staying(self.model, self.own)
         # A status entry, and a line in the log: another robot would get wrong forces.
         self.taken_from_paper = taken_from_paper
@@ -113,11 +145,9 @@ class ModelParameters:
                 'no geometry is given: this is the paper\'s robot'
                 + (f', but for {len(KEYS) - len(taken_from_paper)} parameters'
                    if len(taken_from_paper) < len(KEYS) else ''))
-        self._checked = self.model, self.own
-        node.add_on_set_parameters_callback(self.check)
-        node.add_post_set_parameters_callback(self._apply)
 
-    def _validated(self, changes: Iterable[Parameter] = ()) -> tuple[NodeModel, dict[str, Any]]:
+    def _validated(self, changes: Iterable[Parameter]) -> tuple[NodeModel, dict[str, Any]]:
+        self._refuse_foreign(changes)
         values = current_values(self._node, changes)
         own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
         model = self._kind.from_parameters(values)
@@ -136,17 +166,6 @@ class ModelParameters:
         return {**{name: ', '.join(value) for name, value in names.items()},
                 **{each.name: own[each.name] for each in self._declared if each.stays}}
 
-    def check(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return whether the parameters would be valid with some of them changed, and why not."""
-        if are_of_topics(changes):
-            return SetParametersResult(successful=True)
-        try:
-            self._refuse_foreign(changes)
-            self._checked = self._validated(changes)
-        except PprsError as error:
-            return SetParametersResult(successful=False, reason=with_hint(error))
-        return SetParametersResult(successful=True)
-
     def _refuse_foreign(self, changes: Iterable[Parameter]) -> None:
         """Refuse new values for other nodes, which a model file may hold: nothing would come of it.
 
@@ -161,11 +180,9 @@ class ModelParameters:
                 raise ModelError(change.name, value, 'be set on the node that has it: '
                                  f'{self._node.get_name()} has no such parameter')
 
-    def _apply(self, changes: list[Parameter]) -> None:
-        if are_of_topics(changes):
-            return
-        # What was checked, and nothing else, comes into force.
-        self.model, self.own = self._checked
+    def _apply(self, checked: tuple[NodeModel, dict[str, Any]],
+               changes: Iterable[Parameter]) -> None:
+        self.model, self.own = checked
         for change in changes:
             if change.name not in NAMES and change.name.startswith('effects.') and (
                     self._node.has_parameter(change.name)):

@@ -21,6 +21,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ADDED,
+    ANY,
     FILES,
     KEYS,
     LARGEST,
@@ -46,88 +47,71 @@ LARGEST_INTEGER = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class NodeParameter:
-    """A parameter that only a node has.
+class NodeParameter(Key):
+    """A key that only a node has; a switch or a whole number where its default is one.
+
+    Listed in `pprs_dynamics.physics.model.keys.NODE_KEYS` too, so that model files may hold it.
 
     Parameters
     ----------
-    name : str
-        Listed in `pprs_dynamics.physics.model.keys.NODE_KEYS` too, so that model files may hold it.
-    default : bool, int, float, str or list of str
-        Gives the type; a whole number is right where a decimal one is asked for.
-    description : str
-    lower, upper : float
-        Bounds of a number, both allowed.
-    choices : tuple of str
-        Words that are allowed; () for any.
-    size : int
-        Of a list of numbers that may also be empty; its default is ().
     stays : bool
         Read once, at the start: a running node refuses another value.
     """
 
-    name: str
-    default: Any
-    description: str
-    lower: float = -math.inf
-    upper: float = math.inf
-    choices: tuple[str, ...] = ()
-    size: int = 0
     stays: bool = False
 
     @property
     def rule(self) -> str:
-        """What a value must be, completing "it must ..."."""
-        if self.choices:
-            return f'be one of {", ".join(self.choices)} ({self.description})'
-        if self.size:
-            return f'be empty, or {self._list.rule}'
-        kinds = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a word',
-                 list: 'a list of words'}
-        bounds = [f'at {side} {bound:g}' for side, bound in (
-            ('least', self.lower), ('most', self.upper)) if math.isfinite(bound)]
-        return (f'be {kinds[type(self.default)]}{", " if bounds else ""}{" and ".join(bounds)} '
-                f'({self.description})')
+        """The requirement on a value, completing "must ..."."""
+        if isinstance(self.default, bool):
+            return f'be true or false ({self.description})'
+        if isinstance(self.default, int):
+            return super().rule.replace('a number', 'a whole number', 1)
+        if self.is_text:
+            return super().rule.replace('name', 'word', 1)
+        if self.size is not None:
+            return f'be empty, or {super().rule}'
+        return super().rule
 
     def check(self, value: Any) -> Any:
         """Return the value in the default's type, or raise ModelError."""
-        kind = type(self.default)
-        if self.size:
-            empty = value is None or (hasattr(value, '__len__') and not len(value))
-            try:
-                return () if empty else self._list.check(value)
-            except ModelError:
-                raise ModelError(self.name, value, self.rule) from None
-        if kind is list:
-            # ROS 2 tells an empty list as a parameter that is not set.
-            words = [] if value is None else value
-            if isinstance(words, str) or not all(isinstance(word, str) for word in words):
+        if self.size is not None and value is None:
+            return ()  # as ROS 2 tells an empty list
+        if isinstance(self.default, int):
+            if type(value) is not type(self.default):
                 raise ModelError(self.name, value, self.rule)
-            return list(words)
-        if kind is float and type(value) is int:
-            value = float(value)
-        if type(value) is not kind or (self.choices and value not in self.choices):
-            raise ModelError(self.name, value, self.rule)
-        if kind in (int, float) and not self.lower <= value <= self.upper:
-            raise ModelError(self.name, value, self.rule)
-        return value
+            if not self.lower <= value <= self.upper:
+                raise ModelError(self.name, value, self.rule)
+            return value
+        return super().check(value)
 
-    @property
-    def descriptor(self) -> ParameterDescriptor:
-        """How the parameter is declared."""
-        return _descriptor(self.description, self.rule, type(self.default), self.lower, self.upper)
 
-    @property
-    def type_(self) -> Parameter.Type:
-        """Of the values."""
-        if self.size:
-            return Parameter.Type.DOUBLE_ARRAY
-        return {bool: Parameter.Type.BOOL, int: Parameter.Type.INTEGER, str: Parameter.Type.STRING,
-                float: Parameter.Type.DOUBLE, list: Parameter.Type.STRING_ARRAY}[type(self.default)]
+def own_parameter(
+    name: str, default: Any, description: str, size: int | None = None,
+    choices: tuple[str, ...] = (), **more: Any,
+) -> NodeParameter:
+    """Return a parameter of a node whose default gives its type; a list that is empty by default.
 
-    @property
-    def _list(self) -> Key:
-        return Key(self.name, self.description, size=self.size, positive=True)
+    Parameters
+    ----------
+    name : str
+    default : bool, int, float, str or ()
+        A whole number is right where a decimal one is asked for.
+    description : str
+    size : int, optional
+        Of a list of numbers; a list without one is of words.
+    choices : tuple of str
+        Words that are allowed; () for any.
+    more
+        Of `NodeParameter`.
+    """
+    is_list = isinstance(default, tuple)
+    if is_list and size is None:
+        size = ANY
+    is_text = (isinstance(default, str) and not choices) or size == ANY
+    return NodeParameter(
+        name, description, size=size, choices=choices,
+        is_text=is_text, may_be_empty=is_text or is_list, default=default, **more)
 
 
 def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
@@ -141,7 +125,7 @@ def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, An
     values, given = {}, overrides(node)
     for parameter in parameters:
         value = parameter.check(given.get(parameter.name, parameter.default))
-        _declare(node, parameter.name, parameter.type_, as_list(value), parameter.descriptor)
+        _declare_key(node, parameter, value)
         values[parameter.name] = value
     return values
 
@@ -154,8 +138,15 @@ def drive_count(node: Node) -> int:
     return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 
-def declare_arm(node: Node) -> None:
-    """Declare every key of an arm's model; a relative path of its URDF becomes an absolute one.
+def declare_model(node: Node) -> list[str]:
+    """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
+
+    A relative path of a mechanism's URDF becomes an absolute one.
+
+    Returns
+    -------
+    list of str
+        Keys of a 3-PPRS that were given neither in a file nor on the command line.
 
     Raises
     ------
@@ -163,28 +154,15 @@ def declare_arm(node: Node) -> None:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
+    if is_axis(given):
+        DriveModel.from_parameters(given)  # refuses it
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
             given[key] = str(folder_of(key) / given[key])
-    _declare_keys(node, keys_of(given), given, {})
-
-
-def declare_model(node: Node) -> list[str]:
-    """Declare every key of a 3-PPRS's model, with the paper's robot where nothing is given.
-
-    Returns
-    -------
-    list of str
-        Keys that were given neither in a file nor on the command line.
-    """
-    defaults = default_parameters()
-    given = overrides(node)
-    if is_axis(given) or is_mechanism(given):
-        DriveModel.from_parameters(given)  # refuses it
-    if any(name.startswith('geometry.') for name in given):
-        # Somebody's own robot: what is missing must not become the paper's in silence.
-        defaults = {}
-    _declare_keys(node, KEYS, given, defaults)
+    # Of somebody's own robot what is missing must not become the paper's in silence.
+    is_own = is_mechanism(given) or any(name.startswith('geometry.') for name in given)
+    defaults = {} if is_own else default_parameters()
+    _declare_keys(node, keys_of(given), given, defaults)
     return [name for name in KEYS if name not in given and name in defaults]
 
 
@@ -198,13 +176,20 @@ def _declare_keys(
             value = ()
         elif value is None and name not in given:
             raise ModelError(name, MISSING, key.rule)
-        _declare(node, name, _type_of(key), as_list(key.check(value)), _of_key(key))
+        _declare_key(node, key, key.check(value))
     for name, value in {ACTIVE: [], **given}.items():
         # The ledger is for `pprs history`: a page of numbers that no node reads.
         if not node.has_parameter(name) and not name.startswith(HISTORY):
             kind = _added_type(name, value)
             if kind != Parameter.Type.NOT_SET:
                 _declare(node, name, kind, _decimal(kind, value), added_descriptor(name))
+
+
+def _declare_key(node: Node, key: Key, value: Any) -> None:
+    unit, kind = f' [{key.unit}]' if key.unit else '', _type_of(key)
+    _declare(node, key.name, kind, as_list(value), _descriptor(
+        f'{key.description}{unit}', key.rule, kind,
+        max(key.lower, 0.0) if key.positive else key.lower, key.upper))
 
 
 def _declare(
@@ -251,9 +236,11 @@ def _added_type(name: str, value: Any) -> Parameter.Type:
 
 
 def _type_of(key: Key) -> Parameter.Type:
-    if key.size is None:
-        return Parameter.Type.DOUBLE if key.is_number else Parameter.Type.STRING
-    return Parameter.Type.DOUBLE_ARRAY if key.is_number else Parameter.Type.STRING_ARRAY
+    if key.size is not None:
+        return Parameter.Type.DOUBLE_ARRAY if key.is_number else Parameter.Type.STRING_ARRAY
+    if isinstance(key.default, int):  # or bool
+        return Parameter.Type.from_parameter_value(key.default)
+    return Parameter.Type.DOUBLE if key.is_number else Parameter.Type.STRING
 
 
 def refuse_unknown(node: Node) -> None:
@@ -280,7 +267,7 @@ def added_descriptor(name: str) -> ParameterDescriptor:
     """Return how a parameter is declared that is not in the table of keys, as of an effect."""
     if name == ACTIVE:
         return _descriptor('effects beside the paper\'s friction, in force',
-                           'be a list of names of effects', list)
+                           'be a list of names of effects', Parameter.Type.STRING_ARRAY)
     block, _, rest = name.partition('.')
     effect, _, place = rest.partition('.')
     if block == 'effects' and effect in CATALOGUE:
@@ -290,33 +277,27 @@ def added_descriptor(name: str) -> ParameterDescriptor:
                 descriptor = _descriptor(
                     f'{effect}: {parameter.description}{unit}',
                     f'lie in [{parameter.lower:g}, {parameter.upper:g}]{unit}',
-                    float, parameter.lower, parameter.upper)
+                    Parameter.Type.DOUBLE, parameter.lower, parameter.upper)
                 descriptor.dynamic_typing = True  # it may be taken away again
                 return descriptor
     return ParameterDescriptor(dynamic_typing=True)
 
 
-def _of_key(key: Key) -> ParameterDescriptor:
-    unit = f' [{key.unit}]' if key.unit else ''
-    is_word = bool(key.choices) or key.is_text
-    kind = list if key.size is not None else str if is_word else float
-    return _descriptor(f'{key.description}{unit}', key.rule, kind, key.lower if not key.positive
-                       else max(key.lower, 0.0), key.upper)
-
-
 def _descriptor(
-    description: str, rule: str, kind: type, lower: float = -math.inf, upper: float = math.inf,
+    description: str, rule: str, kind: Parameter.Type, lower: float = -math.inf,
+    upper: float = math.inf,
 ) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(
         description=description, additional_constraints=f'must {rule}')
-    if kind is float and (math.isfinite(lower) or math.isfinite(upper)):
-        descriptor.floating_point_range = [FloatingPointRange(
-            # Message fields of that type turn whole numbers into nonsense without a word.
-            from_value=float(max(lower, -LARGEST)), to_value=float(min(upper, LARGEST)))]
-    if kind is int and (math.isfinite(lower) or math.isfinite(upper)):
-        descriptor.integer_range = [IntegerRange(
-            from_value=round(max(lower, -LARGEST_INTEGER)),
-            to_value=round(min(upper, LARGEST_INTEGER)), step=0)]
+    if math.isfinite(lower) or math.isfinite(upper):
+        if kind == Parameter.Type.DOUBLE:
+            descriptor.floating_point_range = [FloatingPointRange(
+                # Message fields of that type turn whole numbers into nonsense without a word.
+                from_value=float(max(lower, -LARGEST)), to_value=float(min(upper, LARGEST)))]
+        elif kind == Parameter.Type.INTEGER:
+            descriptor.integer_range = [IntegerRange(
+                from_value=round(max(lower, -LARGEST_INTEGER)),
+                to_value=round(min(upper, LARGEST_INTEGER)), step=0)]
     return descriptor
 
 

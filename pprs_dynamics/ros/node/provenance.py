@@ -28,7 +28,8 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
     Without any it is the package's own model that a node runs.
     """
     paths = _paths(arguments) or [find_file(DEFAULT_MODEL)]
-    return [{'file': displayed(path.resolve()), 'sha256': _digest(path.read_bytes())}
+    return [{'file': displayed(path.resolve()),
+             'sha256': hashlib.sha256(path.read_bytes()).hexdigest()}
             for path in paths if path.is_file()]
 
 
@@ -82,7 +83,3 @@ def _flat(tree: Mapping[str, Any]) -> Iterator[str]:
             yield from (f'{name}.{rest}' for rest in _flat(value))
         else:
             yield str(name)
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

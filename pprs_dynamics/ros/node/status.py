@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -20,6 +21,8 @@ try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 except ImportError:
     DiagnosticArray = None
+
+WINDOW = 1000  # durations that are summed up
 
 
 class StatusReporter:
@@ -86,3 +89,30 @@ class StatusReporter:
             array = DiagnosticArray(status=[status])
             array.header.stamp = self._node.get_clock().now().to_msg()
             self._diagnostics.publish(array)
+
+
+class Durations:
+    """The last thousand durations [s], and the longest of all."""
+
+    def __init__(self) -> None:
+        self._recent, self._count, self._longest = np.zeros(WINDOW), 0, 0.0
+
+    def add(self, duration: float) -> None:
+        """Take one more [s]."""
+        self._recent[self._count % WINDOW] = duration
+        self._count += 1
+        if duration > self._longest:
+            self._longest = duration
+
+    @property
+    def median(self) -> float:
+        """Of the last thousand [s]; 0 where there was none."""
+        return float(np.median(self._recent[:self._count])) if self._count else 0.0
+
+    def summary(self) -> dict[str, Any]:
+        """Return p50 and p99 of the last thousand, and max of all [s], None where none was."""
+        if not self._count:
+            return {'p50': None, 'p99': None, 'max': None}
+        p50, p99 = np.percentile(self._recent[:self._count], (50, 99))
+        return {'p50': round(float(p50), 7), 'p99': round(float(p99), 7),
+                'max': round(self._longest, 7)}
