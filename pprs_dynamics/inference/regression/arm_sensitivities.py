@@ -54,10 +54,8 @@ class ArmSensitivities(Sensitivities):
         if not is_gain(number.key):
             return super()._change(number, forces, reference)
         # The more torque an ampere gives, the fewer amperes the model's torque takes.
-        k = number.element
-        assert k is not None
-        change = np.zeros_like(reference)
-        change[:, k] = -forces.total[:, k] * RELATIVE_STEP * number.value / self.model.gain[k]
+        given = np.asarray(self.given.values[number.key])
+        change: Array = -forces.total * RELATIVE_STEP * given / self.model.gain
         return change
 
     def of_homing(self, state: LinkageState, reference: Array) -> Array | None:

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.arm_sensitivities import ArmSensitivities
-from pprs_dynamics.inference.regression.sensitivities import following
 
 
 class AxisSensitivities(ArmSensitivities):
@@ -21,13 +19,8 @@ class AxisSensitivities(ArmSensitivities):
     given : ForceModel
     """
 
-    def _efforts(self, model: Any, state: Any) -> Array:
-        total: Array = model.mass * (state.acceleration - model.gravity) + sum(
-            effect.force(state) for effect in following(model))
-        return total
-
     def _at(self, model: Any, state: Any) -> Any:
-        return state
+        return model.mechanism(state)
 
-    def of_homing(self, state: Any, reference: Array) -> None:
+    def of_homing(self, state: Any, reference: Any) -> None:
         """Return nothing: no force depends on where an axis is."""
