@@ -114,7 +114,8 @@ class LinkagePlant:
         self.hidden = [self._hide(name, motion, efforts, random, scale)
                        for name in _drawn(names, random)]
         home, _ = s.room(np.pi)  # where motions that are drawn begin
-        self.lower, self.upper = s.lower, s.upper
+        self.limits = model.limits
+        self.lower, self.upper = self.limits.strokes
         with np.errstate(invalid='ignore'):
             span = self.upper - self.lower
         self._span = np.where(np.isfinite(span), span, 2 * np.pi)

@@ -37,7 +37,8 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.errors import PprsError, SingularityError
+from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.simulation.closed_chains import (
     DRIVE_DOFS,
     ClosedChains,
@@ -148,15 +149,16 @@ class Plant:
     def __init__(self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (),
                  settings: PlantSettings | None = None) -> None:
         self.settings, self._values = settings or PlantSettings(), values
-        self.lower = np.repeat([values['limits.slide_stroke'][0],
-                                values['limits.lift_stroke'][0]], 3)
-        self.upper = np.repeat([values['limits.slide_stroke'][1],
-                                values['limits.lift_stroke'][1]], 3)
+        self.limits = Limits.of(values)
+        self.lower, self.upper = self.limits.strokes
         self._friction = EngineFriction(
             values, np.asarray(self.settings.drive_width), self.settings.passive_width,
             self.settings.friction)
         self._effects: tuple[HiddenEffect, ...] = ()
         self.chains = self._with(effects)
+        # A copy without hidden effects, of which the drives' control knows the weight.
+        self._known = ClosedChains(values)
+        self._held = np.zeros(6)
         self.time = 0.0
         self.velocity = np.zeros(6)
         self._all_velocities = np.zeros(15)
@@ -183,6 +185,24 @@ class Plant:
         before = self.chains.qpos.copy()
         self.chains = self._with(effects)
         self.chains.qpos[:] = before
+
+    @property
+    def hidden(self) -> list[dict[str, Any]]:
+        """What is hidden in it: name, drives, parameters and form of each effect."""
+        return [effect.truth() for effect in self._effects]
+
+    def holding(self, position: Array) -> Array:
+        """Return the efforts [N] that hold the model's weight at drive positions (6,) [m].
+
+        Where it cannot close there, those of the last that did.
+        """
+        kept = self._known.qpos.copy()
+        try:
+            self._known.place_drives(position)
+            self._held = self._known.evaluate(np.zeros(6)).drive_bias
+        except SingularityError:
+            self._known.qpos[:] = kept
+        return self._held
 
     @property
     def position(self) -> Array:

@@ -178,7 +178,7 @@ def simulate(
     return SimulatedRun(
         np.array([m.time for m in measured]), np.array([m.position for m in measured]),
         np.array([m.velocity for m in measured]), np.array([m.effort for m in measured]),
-        reference, _stacked(true), [effect.truth() for effect in robot.effects],
+        reference, _stacked(true), robot.hidden,
         list(robot.notes), robot.control.saturated_steps)
 
 

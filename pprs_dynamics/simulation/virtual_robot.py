@@ -12,14 +12,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.model.limits import DriveLimits, Limits
 from pprs_dynamics.simulation.drive_control import (
     ControlSettings,
     DriveControl,
     Note,
     Setpoint,
-    Weight,
-    WeightModel,
 )
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.linkage_plant import LinkagePlant
@@ -64,25 +61,17 @@ class SimulatedRobot:
         seed: int = 0, rate: float = 500.0, plant: PlantSettings | None = None,
         control: ControlSettings | None = None, sensors: SensorSettings | None = None,
     ) -> None:
-        self.plant: Plant | LinkagePlant
-        weight: Weight
-        noise = None
-        if isinstance(values, LinkagePlant):
-            self.plant = weight = values
-            limits: DriveLimits = values.model.limits
-            noise = values.largest
-        else:
-            self.plant, weight = Plant(values, effects, plant), WeightModel(values)
-            limits = Limits.of(values)
+        self.plant: Plant | LinkagePlant = (
+            values if isinstance(values, LinkagePlant) else Plant(values, effects, plant))
         step = self.plant.settings.step
         self.steps_per_tick = max(1, round(1 / (rate * step)))
         if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
             raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
-        self.effects = tuple(effects)
-        self.sensors = Sensors(sensors or SensorSettings(), step, np.random.default_rng(seed),
-                               effects, noise)
-        self.control = DriveControl(limits, weight, control or ControlSettings(), step,
-                                    self.sensors.smoothing)
+        self.sensors = Sensors(
+            sensors or SensorSettings(), step, np.random.default_rng(seed), effects,
+            values.largest if isinstance(values, LinkagePlant) else None)
+        self.control = DriveControl(self.plant.limits, self.plant.holding,
+                                    control or ControlSettings(), step, self.sensors.smoothing)
         self._ticks = 0
         self._stopped = False
         self.unsolved: UnsolvedError | None = None
@@ -96,9 +85,7 @@ class SimulatedRobot:
     @property
     def hidden(self) -> list[dict[str, Any]]:
         """What is hidden in it: name, drives, parameters and form of each effect."""
-        if isinstance(self.plant, LinkagePlant):
-            return self.plant.hidden
-        return [effect.truth() for effect in self.effects]
+        return self.plant.hidden
 
     @property
     def notes(self) -> list[Note]:
@@ -126,7 +113,6 @@ class SimulatedRobot:
             raise TypeError('what is hidden in a mechanism stays')
         self.plant.use_effects(effects)
         self.sensors.use_effects(effects)
-        self.effects = tuple(effects)
 
     def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
         """Take a command for now, and the next tick's where it is known; False if refused."""

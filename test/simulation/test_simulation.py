@@ -24,7 +24,6 @@ from pprs_dynamics.simulation.drive_control import (
     ControlSettings,
     DriveControl,
     Setpoint,
-    WeightModel,
 )
 from pprs_dynamics.simulation.hidden_effect import DRIVES, HiddenEffectError
 from pprs_dynamics.simulation.hidden_effects import (
@@ -238,7 +237,7 @@ def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
     """Setpoints every 5 ms fall between ticks every 2 ms: up to one tick passes before the next."""
     speed, period, step = 0.2, 0.005, 0.0005
     model = DriveModel.load()
-    control = DriveControl(model.limits, WeightModel(model.values), ControlSettings(), step)
+    control = DriveControl(model.limits, Plant(model.values).holding, ControlSettings(), step)
 
     def setpoint(time: float) -> Setpoint:
         return Setpoint(np.full(6, 0.1 + speed * time), np.full(6, speed))
@@ -252,7 +251,7 @@ def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
 @pytest.mark.parametrize('late', [0.05, 0.15, 1e4])
 def test_setpoints_that_come_late_are_followed_as_long_as_they_come(late: float) -> None:
     speed, period, model = 0.2, 0.01, DriveModel.load()
-    control = DriveControl(model.limits, WeightModel(model.values), ControlSettings(), period)
+    control = DriveControl(model.limits, Plant(model.values).holding, ControlSettings(), period)
     led = min(late, LONGEST_LATE) * speed  # its velocity leads on from its own time
     for now in np.arange(late, late + 0.5, period):
         goal = np.full(6, 0.1 + speed * (now - late))
