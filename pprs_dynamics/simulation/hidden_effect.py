@@ -22,7 +22,6 @@ from pprs_dynamics.errors import PprsError
 
 if TYPE_CHECKING:
     from pprs_dynamics.simulation.closed_chains import ClosedChains
-    from pprs_dynamics.simulation.engine_friction import EngineFriction
 
 DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
 """Names of the drives, in the interface's order."""
@@ -206,8 +205,16 @@ class DriveForce(DriveBound):
 
     steep: ClassVar[bool] = False
 
-    def prepare(self, friction: EngineFriction) -> None:
-        """Take note of the robot's own friction before it starts; by default not."""
+    def prepare(self, coulomb: Array, width: Array) -> None:
+        """Take note of the drives' own friction before it starts; by default not.
+
+        Parameters
+        ----------
+        coulomb : (6,) array
+            Coefficients of dry friction.
+        width : (6,) array
+            In which it turns over [m/s].
+        """
         return
 
     @abstractmethod

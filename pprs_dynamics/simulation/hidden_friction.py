@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     DriveForce,
     DriveMoment,
@@ -134,9 +133,9 @@ class Hysteresis(DriveForce):
         'distance': Range('m', 0.0003, 0.002, 'log', scales=True, neutral=1.0),
         'power': Range('1', 1.0, 2.5, neutral=1.0)}
 
-    def prepare(self, friction: EngineFriction) -> None:
+    def prepare(self, coulomb: Array, width: Array) -> None:
         """Start from a relaxed contact."""
-        self._coulomb, self._width = friction.dry[:6], friction.width[:6]
+        self._coulomb, self._width = coulomb, width
         self._z = np.zeros(6)
 
     def force(self, moment: DriveMoment) -> Array:
@@ -166,7 +165,7 @@ class FrictionDrift(DriveForce):
         'cooling_time': Range('s', 60.0, 200.0, 'log', neutral=1.0), 'width': WIDTH}
     steep: ClassVar[bool] = True
 
-    def prepare(self, friction: EngineFriction) -> None:
+    def prepare(self, coulomb: Array, width: Array) -> None:
         """Start cold."""
         # Heat per F, so that the fading does not depend on the strength: a path [m].
         self._heat = np.zeros(6)

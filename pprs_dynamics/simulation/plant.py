@@ -44,7 +44,6 @@ from pprs_dynamics.simulation.closed_chains import (
     ClosedChains,
     Equations,
 )
-from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveMoment,
@@ -151,9 +150,8 @@ class Plant:
         self.settings, self._values = settings or PlantSettings(), values
         self.limits = Limits.of(values)
         self.lower, self.upper = self.limits.strokes
-        self._friction = EngineFriction(
-            values, np.asarray(self.settings.drive_width), self.settings.passive_width,
-            self.settings.friction)
+        self.resistance = Resistance(values, self.settings.drive_width,
+                                     self.settings.passive_width, self.settings.friction)
         self._effects: tuple[HiddenEffect, ...] = ()
         self.chains = self._with(effects)
         # A copy without hidden effects, of which the drives' control knows the weight.
@@ -172,7 +170,7 @@ class Plant:
     def _with(self, effects: Sequence[HiddenEffect]) -> ClosedChains:
         """Take effects, and return the bodies with them."""
         chains = ClosedChains(self._values)
-        self.resistance = Resistance(self._friction, effects, self._effects)
+        self.resistance.use_effects(effects)
         self._structure_forces = [e for e in effects if isinstance(e, StructureForce)]
         self._body_changes = [e for e in effects if isinstance(e, BodyChange)]
         for change in self._body_changes:
