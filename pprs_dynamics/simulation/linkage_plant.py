@@ -29,7 +29,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, tilted, truth
+from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
@@ -133,28 +133,17 @@ class LinkagePlant:
               scale: float) -> dict[str, Any]:
         model = self.model
         if name == 'payload_mass':
-            mass = scale * float(random.uniform(0.05, 0.12) * model.robot.masses.sum())
-            self.engine.add_payload(mass, np.zeros(3))
-            return truth(name, None, {'mass': mass}, 'a point at the tool\'s origin')
+            return self.engine.hide_payload(random, scale, 0.0)
         if name == 'link_mass':
             links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier]
             if not links:
                 raise HiddenEffectError('link_mass needs a link beside that of the tool')
-            body = int(random.choice(links))
-            mass = scale * float(random.uniform(0.1, 0.3) * model.robot.masses[body])
-            self.engine.add_to_link(body, mass)
-            return truth(name, None, {f'{model.robot.body_names[body]}.mass': mass},
-                         'a point at its centre')
+            return self.engine.hide_link_mass(random, scale, links)
         if name == 'base_tilt':
-            angle = scale * float(random.uniform(0.01, 0.03))
-            self.engine.gravity = tilted(self.engine.gravity, angle)
-            return truth(name, None, {'x': angle, 'y': 0.0}, 'about x')
+            return self.engine.hide_tilt(random, scale)
         j = int(random.integers(len(model.drives)))
-        assert motion.time is not None
-        moment = JointMoment(
-            motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
-            np.abs(efforts[:, j]), float(self.largest[j]),
-            float(np.abs(motion.velocity[:, j]).max()), float(model.gear_ratios[j]))
+        moment = JointMoment.along(motion, j, np.abs(efforts[:, j]), self.largest[j],
+                                   model.gear_ratios[j])
         drawn = draw_form(name, random, moment, scale)
         self._pushes.append((j, name, drawn, moment))
         return truth(name, [model.drives[j]], drawn, FORMS[name].form)

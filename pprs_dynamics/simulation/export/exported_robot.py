@@ -31,6 +31,7 @@ from pprs_dynamics.physics.mechanism.description import (
     Joint,
     Loop,
     body_at,
+    principal_inertia,
     rotation_of,
 )
 from pprs_dynamics.physics.mechanism.linkage import survey
@@ -176,21 +177,14 @@ def _bodies(mechanism: Mechanism) -> Iterator[Body]:
 
 def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     """Return mass, centre, principal moments and their axes."""
-    mass = float(parameters[0])
-    if not mass > 0:
+    if not parameters[0] > 0:
         return LEAST, np.zeros(3), np.full(3, LEAST), np.eye(3)
-    centre = parameters[1:4] / mass
-    xx, xy, yy, xz, yz, zz = parameters[4:]
-    about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-             - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
-    moments, axes = np.linalg.eigh(about)
+    mass, centre, moments, axes = principal_inertia(parameters)
     slack = SOUND * max(float(np.abs(parameters[4:]).max()), LEAST)
     if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
         raise ModelError(f'inertia of {name}', tuple(float(value) for value in moments),
                          'be principal moments of a real body, of which none is negative and each '
                          'two sum to at least the third: no simulator takes another')
-    axes = axes.copy()
-    axes[:, 0] *= np.linalg.det(axes)
     moments = np.maximum(moments, LEAST)
     # What rounding left of the triangle's rule, which simulators take to the letter.
     moments[2] = min(moments[2], moments[0] + moments[1])
