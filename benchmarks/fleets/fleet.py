@@ -40,11 +40,9 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.model_fingerprint import fingerprint
 from pprs_dynamics.simulation.hidden_bodies import PayloadMass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_forces import DriveSpring
-from pprs_dynamics.simulation.hidden_friction import CoulombFriction
-from pprs_dynamics.simulation.hidden_sensors import HomingError
+from pprs_dynamics.simulation.hidden_forces import CoulombFriction, DriveSpring
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.sensors import EffortNoise, HomingError, SensorSettings
 
 DURATION, RATE = 20.0, 100.0  # [s, Hz]
 LEAD = 10  # samples before the recording, for effects that look back

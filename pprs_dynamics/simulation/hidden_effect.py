@@ -18,13 +18,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError
 
 if TYPE_CHECKING:
     from pprs_dynamics.simulation.closed_chains import ClosedChains
-
-DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
-"""Names of the drives, in the interface's order."""
 
 
 class HiddenEffectError(PprsError, ValueError):

@@ -10,23 +10,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pprs_dynamics.simulation import (
-    hidden_bodies,
-    hidden_forces,
-    hidden_friction,
-    hidden_sensors,
-)
+from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
 from pprs_dynamics.simulation.hidden_effect import DriveBound, HiddenEffect, HiddenEffectError
 
 IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
-    hidden_friction.ViscousFriction, hidden_friction.CoulombFriction,
-    hidden_friction.AsymmetricFriction, hidden_friction.StribeckFriction,
-    hidden_friction.QuadraticFriction, hidden_friction.LoadFriction,
-    hidden_friction.Hysteresis, hidden_friction.FrictionDrift,
-    hidden_forces.EffortOffset, hidden_sensors.EffortGain, hidden_sensors.HomingError,
+    hidden_forces.ViscousFriction, hidden_forces.CoulombFriction,
+    hidden_forces.AsymmetricFriction, hidden_forces.StribeckFriction,
+    hidden_forces.QuadraticFriction, hidden_forces.LoadFriction,
+    hidden_forces.Hysteresis, hidden_forces.FrictionDrift,
+    hidden_forces.EffortOffset, sensors.EffortGain, sensors.HomingError,
     hidden_forces.DriveSpring, hidden_forces.ForceRipple, hidden_bodies.DriveInertia,
-    hidden_sensors.TimeDelay, hidden_friction.RevoluteFriction,
-    hidden_friction.SphericalFriction, hidden_forces.RevoluteStiffness,
+    sensors.TimeDelay, hidden_forces.RevoluteFriction,
+    hidden_forces.SphericalFriction, hidden_forces.RevoluteStiffness,
     hidden_bodies.PayloadMass, hidden_bodies.PayloadOffset, hidden_bodies.PlatformInertia,
     hidden_forces.ExternalWrench, hidden_bodies.BaseTilt, hidden_forces.PlatformDrag,
     hidden_bodies.RodMass)}

@@ -19,11 +19,15 @@ from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_bodies import PayloadPickUp
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
-from pprs_dynamics.simulation.hidden_forces import EffortOffset
-from pprs_dynamics.simulation.hidden_friction import CoulombFriction, Hysteresis
-from pprs_dynamics.simulation.hidden_sensors import EffortGain, HomingError, TimeDelay
+from pprs_dynamics.simulation.hidden_forces import CoulombFriction, EffortOffset, Hysteresis
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.sensors import (
+    EffortGain,
+    EffortNoise,
+    HomingError,
+    SensorSettings,
+    TimeDelay,
+)
 from pprs_dynamics.simulation.simulated_run import DriveReference, SimulatedRun, simulate
 
 MODEL = DriveModel.load('config/paper.yaml')

@@ -16,6 +16,7 @@ import pytest
 
 import pprs_dynamics
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError, MotionError
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
@@ -25,7 +26,7 @@ from pprs_dynamics.simulation.drive_control import (
     DriveControl,
     Setpoint,
 )
-from pprs_dynamics.simulation.hidden_effect import DRIVES, HiddenEffectError
+from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.hidden_effects import (
     HIDDEN_EFFECTS,
     IN_CATALOGUE,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from pprs_dynamics.app.report.terminal import text_table
-from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
+from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 
 MOST_SHOWN = 12

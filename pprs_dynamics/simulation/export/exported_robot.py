@@ -40,11 +40,13 @@ from pprs_dynamics.physics.mechanism.structure import build_structure
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import AXIS, Robot
 from pprs_dynamics.simulation.export.expressed import (
     STANDARD_GRAVITY,
     URDF,
     Expressed,
+    express,
 )
 
 HOME_HEIGHT = 0.5  # [m], of the 3-PPRS' platform
@@ -271,3 +273,42 @@ def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
     bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
     return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
                      robot.gravity)
+
+
+class TreePositions:
+    """The joints of a model's URDF; free bodies, which are no joints of a message, are left out.
+
+    Parameters
+    ----------
+    model : ForceModel
+
+    Attributes
+    ----------
+    names : tuple of J str
+
+    Raises
+    ------
+    ModelError
+        As `export_robot`.
+    """
+
+    def __init__(self, model: ForceModel) -> None:
+        robot = export_robot(express(model, URDF), URDF)
+        self._mechanism = robot.mechanism
+        joints = [body for body in robot.bodies if body.kind != FREE]
+        self.names = tuple(body.joint for body in joints)
+        self._rows = np.array([body.row for body in joints])
+
+    def at(self, position: Array) -> Array:
+        """Return the positions [rad, m], (J,), for those of the drives, (D,).
+
+        Raises
+        ------
+        WorkspaceError, SingularityError
+            See `Mechanism.at`.
+        """
+        given = np.array(position, dtype=float)[None]
+        still = np.zeros_like(given)
+        q = self._mechanism.at(given, still, still).motion.q[0]
+        t, rows = self._mechanism.structure.tables, self._rows
+        return t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows]
