@@ -18,10 +18,12 @@ from pprs_dynamics.simulation.hidden_effect import (
     HiddenJointFriction,
     PlatformMoment,
     Range,
+    SteepDriveForce,
     StructureForce,
 )
 
 PHASE = Range('rad', -np.pi, np.pi)
+PULLEY = 3.0  # [m], from the middle of the workspace
 WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
 
@@ -30,96 +32,51 @@ def algebraic_sign(velocity: Array, width: Array) -> Array:
     return velocity / np.sqrt(velocity * velocity + width * width)
 
 
-class ViscousFriction(DriveForce):
+@DriveForce.by_law('c v_1 asinh(v / v_1)',
+                   coefficient=Range('N s/m', 3.0, 10.0, 'log', scales=True),
+                   thinning_velocity=Range('m/s', 0.2, 0.6, 'log', neutral=1.0))
+def viscous_friction(m: DriveMoment, coefficient: Array, thinning_velocity: Array) -> Array:
     """Grease that thins with the shear rate (Eyring)."""
-
-    name: ClassVar[str] = 'viscous_friction'
-    form: ClassVar[str] = 'c v_1 asinh(v / v_1)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'coefficient': Range('N s/m', 3.0, 10.0, 'log', scales=True),
-        'thinning_velocity': Range('m/s', 0.2, 0.6, 'log', neutral=1.0)}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return c v_1 asinh(v / v_1)."""
-        v_1 = self.values['thinning_velocity']
-        return self.values['coefficient'] * v_1 * np.arcsinh(moment.velocity / v_1)
+    return coefficient * thinning_velocity * np.arcsinh(m.velocity / thinning_velocity)
 
 
-class CoulombFriction(DriveForce):
+@SteepDriveForce.by_law('F v / sqrt(v^2 + w^2)',
+                        force=Range('N', 0.3, 1.0, 'log', scales=True), width=WIDTH)
+def coulomb_friction(m: DriveMoment, force: Array, width: Array) -> Array:
     """Seals and preload: a force against the motion that no load changes."""
-
-    name: ClassVar[str] = 'coulomb_friction'
-    form: ClassVar[str] = 'F v / sqrt(v^2 + w^2)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'force': Range('N', 0.3, 1.0, 'log', scales=True), 'width': WIDTH}
-    steep: ClassVar[bool] = True
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return F v / sqrt(v^2 + w^2)."""
-        return self.values['force'] * algebraic_sign(moment.velocity, self.values['width'])
+    return force * algebraic_sign(m.velocity, width)
 
 
-class AsymmetricFriction(DriveForce):
+@DriveForce.by_law('c v where v has the sign of side, else 0',
+                   coefficient=Range('N s/m', 4.0, 12.0, 'log', scales=True),
+                   side=Range('1', -1, 1, 'sign', neutral=1.0))
+def asymmetric_friction(m: DriveMoment, coefficient: Array, side: Array) -> Array:
     """A wiper or a check valve: viscous friction in one direction only."""
-
-    name: ClassVar[str] = 'asymmetric_friction'
-    form: ClassVar[str] = 'c v where v has the sign of side, else 0'
-    ranges: ClassVar[dict[str, Range]] = {
-        'coefficient': Range('N s/m', 4.0, 12.0, 'log', scales=True),
-        'side': Range('1', -1, 1, 'sign', neutral=1.0)}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return c (v + side |v|) / 2."""
-        v = moment.velocity
-        return self.values['coefficient'] * (v + self.values['side'] * np.abs(v)) / 2
+    return coefficient * (m.velocity + side * np.abs(m.velocity)) / 2
 
 
-class StribeckFriction(DriveForce):
+@SteepDriveForce.by_law('F exp(-|v| / v_s) v / sqrt(v^2 + w^2)',
+                        force=Range('N', 0.4, 1.2, 'log', scales=True),
+                        velocity=Range('m/s', 0.008, 0.03, 'log', neutral=1.0), width=WIDTH)
+def stribeck_friction(m: DriveMoment, force: Array, velocity: Array, width: Array) -> Array:
     """Boundary lubrication: friction that falls exponentially with the speed."""
-
-    name: ClassVar[str] = 'stribeck_friction'
-    form: ClassVar[str] = 'F exp(-|v| / v_s) v / sqrt(v^2 + w^2)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'force': Range('N', 0.4, 1.2, 'log', scales=True),
-        'velocity': Range('m/s', 0.008, 0.03, 'log', neutral=1.0), 'width': WIDTH}
-    steep: ClassVar[bool] = True
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return F exp(-|v| / v_s) v / sqrt(v^2 + w^2)."""
-        v = moment.velocity
-        fall = np.exp(-np.abs(v) / self.values['velocity'])
-        return self.values['force'] * fall * algebraic_sign(v, self.values['width'])
+    return force * np.exp(-np.abs(m.velocity) / velocity) * algebraic_sign(m.velocity, width)
 
 
-class QuadraticFriction(DriveForce):
+@DriveForce.by_law('c v (|v| / 1 m/s)^(p - 1)',
+                   coefficient=Range('N s/m', 15.0, 50.0, 'log', scales=True),
+                   power=Range('1', 1.8, 2.2, neutral=2.0))
+def quadratic_friction(m: DriveMoment, coefficient: Array, power: Array) -> Array:
     """Churning of lubricant or air: a power of the speed near the square."""
-
-    name: ClassVar[str] = 'quadratic_friction'
-    form: ClassVar[str] = 'c v (|v| / 1 m/s)^(p - 1)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'coefficient': Range('N s/m', 15.0, 50.0, 'log', scales=True),
-        'power': Range('1', 1.8, 2.2, neutral=2.0)}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return c v |v|^(p - 1)."""
-        v = moment.velocity
-        return self.values['coefficient'] * v * np.abs(v) ** (self.values['power'] - 1)
+    return coefficient * m.velocity * np.abs(m.velocity) ** (power - 1)
 
 
-class LoadFriction(DriveForce):
+@SteepDriveForce.by_law('dmu N (N / 10 N)^(-1/3) v / sqrt(v^2 + w^2)',
+                        coefficient=Range('1', 0.02, 0.06, 'log', scales=True), width=WIDTH)
+def load_friction(m: DriveMoment, coefficient: Array, width: Array) -> Array:
     """A guide rougher than the model's, less so under load (Hertzian contact)."""
-
-    name: ClassVar[str] = 'load_friction'
-    form: ClassVar[str] = 'dmu N (N / 10 N)^(-1/3) v / sqrt(v^2 + w^2)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'coefficient': Range('1', 0.02, 0.06, 'log', scales=True), 'width': WIDTH}
-    steep: ClassVar[bool] = True
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return dmu N^(2/3) (10 N)^(1/3) v / sqrt(v^2 + w^2)."""
-        load = np.cbrt(moment.guide_load * moment.guide_load * 10.0)
-        sign = algebraic_sign(moment.velocity, self.values['width'])
-        return self.values['coefficient'] * load * sign
+    load = np.cbrt(m.guide_load * m.guide_load * 10.0)
+    return coefficient * load * algebraic_sign(m.velocity, width)
 
 
 class Hysteresis(DriveForce):
@@ -159,7 +116,7 @@ class Hysteresis(DriveForce):
         self._z = z
 
 
-class FrictionDrift(DriveForce):
+class FrictionDrift(SteepDriveForce):
     """Cold friction that fades as dissipated heat warms the drive, and comes back as it cools."""
 
     name: ClassVar[str] = 'friction_drift'
@@ -168,7 +125,6 @@ class FrictionDrift(DriveForce):
         'force': Range('N', 0.6, 1.5, 'log', scales=True),
         'path': Range('m', 0.4, 1.2, 'log', neutral=1.0),
         'cooling_time': Range('s', 60.0, 200.0, 'log', neutral=1.0), 'width': WIDTH}
-    steep: ClassVar[bool] = True
 
     def prepare(self, coulomb: Array, width: Array) -> None:
         """Start cold."""
@@ -187,82 +143,49 @@ class FrictionDrift(DriveForce):
         self._heat = self._heat + duration * (np.abs(moment.velocity) - cooling)
 
 
-class EffortOffset(DriveForce):
+@DriveForce.by_law('F',
+                   force=Range('N', 0.3, 1.0, 'signed', scales=True))
+def effort_offset(m: DriveMoment, force: Array) -> Array:
     """A counterbalance or a hanging cable: the same force everywhere."""
-
-    name: ClassVar[str] = 'effort_offset'
-    form: ClassVar[str] = 'F'
-    ranges: ClassVar[dict[str, Range]] = {'force': Range('N', 0.3, 1.0, 'signed', scales=True)}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return F."""
-        return self.values['force']
+    return force
 
 
-class DriveSpring(DriveForce):
+@DriveForce.by_law('k x (1 + (x / x_h)^2), x = q - q_0',
+                   stiffness=Range('N/m', 8.0, 30.0, 'log', scales=True),
+                   rest=Range('m', -0.05, 0.05, lifts=(0.15, 0.25)),
+                   hardening=Range('m', 0.15, 0.3, 'log', neutral=1.0))
+def drive_spring(m: DriveMoment, stiffness: Array, rest: Array, hardening: Array) -> Array:
     """A cable chain or counterbalance that stiffens as it is drawn out."""
-
-    name: ClassVar[str] = 'drive_spring'
-    form: ClassVar[str] = 'k x (1 + (x / x_h)^2), x = q - q_0'
-    ranges: ClassVar[dict[str, Range]] = {
-        'stiffness': Range('N/m', 8.0, 30.0, 'log', scales=True),
-        'rest': Range('m', -0.05, 0.05, lifts=(0.15, 0.25)),
-        'hardening': Range('m', 0.15, 0.3, 'log', neutral=1.0)}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return k x (1 + (x / x_h)^2)."""
-        x = moment.position - self.values['rest']
-        hardened = 1 + (x / self.values['hardening']) ** 2
-        return self.values['stiffness'] * x * hardened
+    x = m.position - rest
+    return stiffness * x * (1 + (x / hardening) ** 2)
 
 
-class ForceRipple(DriveForce):
+@DriveForce.by_law('A (sin(2 pi q / p + phi) + a_2 sin(4 pi q / p + phi_2))',
+                   force=Range('N', 0.25, 0.8, 'log', scales=True),
+                   pitch=Range('m', 0.003, 0.012, 'log', neutral=1.0), phase=PHASE,
+                   second=Range('1', 0.2, 0.5), second_phase=PHASE)
+def force_ripple(m: DriveMoment, force: Array, pitch: Array, phase: Array, second: Array,
+                 second_phase: Array) -> Array:
     """Screw or cogging of the motor: two harmonics of the pitch."""
-
-    name: ClassVar[str] = 'force_ripple'
-    form: ClassVar[str] = 'A (sin(2 pi q / p + phi) + a_2 sin(4 pi q / p + phi_2))'
-    ranges: ClassVar[dict[str, Range]] = {
-        'force': Range('N', 0.25, 0.8, 'log', scales=True),
-        'pitch': Range('m', 0.003, 0.012, 'log', neutral=1.0), 'phase': PHASE,
-        'second': Range('1', 0.2, 0.5), 'second_phase': PHASE}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return A (sin(2 pi q / p + phi) + a_2 sin(4 pi q / p + phi_2))."""
-        turn = 2 * np.pi * moment.position / self.values['pitch']
-        first = np.sin(turn + self.values['phase'])
-        second = np.sin(2 * turn + self.values['second_phase'])
-        return self.values['force'] * (first + self.values['second'] * second)
+    turn = 2 * np.pi * m.position / pitch
+    return force * (np.sin(turn + phase) + second * np.sin(2 * turn + second_phase))
 
 
-class LocalBump(DriveForce):
+@DriveForce.by_law('F / (1 + ((q - q_0) / w)^4)',
+                   force=Range('N', 0.5, 1.5, 'signed', scales=True),
+                   place=Range('m', -0.03, 0.03, lifts=(0.18, 0.22)),
+                   width=Range('m', 0.003, 0.01, 'log', neutral=1.0))
+def local_bump(m: DriveMoment, force: Array, place: Array, width: Array) -> Array:
     """A dent in a guide: a force that drives back from one place. Not in the catalogue."""
-
-    name: ClassVar[str] = 'local_bump'
-    form: ClassVar[str] = 'F / (1 + ((q - q_0) / w)^4)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'force': Range('N', 0.5, 1.5, 'signed', scales=True),
-        'place': Range('m', -0.03, 0.03, lifts=(0.18, 0.22)),
-        'width': Range('m', 0.003, 0.01, 'log', neutral=1.0)}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return F / (1 + ((q - q_0) / w)^4)."""
-        away = (moment.position - self.values['place']) / self.values['width']
-        return self.values['force'] / (1 + away ** 4)
+    return force / (1 + ((m.position - place) / width) ** 4)
 
 
-class Vibration(DriveForce):
+@DriveForce.by_law('A sin(2 pi f t + phi)',
+                   force=Range('N', 0.2, 0.7, 'log', scales=True),
+                   frequency=Range('Hz', 6.0, 30.0, 'log', neutral=1.0), phase=PHASE)
+def vibration(m: DriveMoment, force: Array, frequency: Array, phase: Array) -> Array:
     """A force of one frequency, from a machine nearby. Not in the catalogue."""
-
-    name: ClassVar[str] = 'vibration'
-    form: ClassVar[str] = 'A sin(2 pi f t + phi)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'force': Range('N', 0.2, 0.7, 'log', scales=True),
-        'frequency': Range('Hz', 6.0, 30.0, 'log', neutral=1.0), 'phase': PHASE}
-
-    def force(self, moment: DriveMoment) -> Array:
-        """Return A sin(2 pi f t + phi)."""
-        turn = 2 * np.pi * self.values['frequency'] * moment.time
-        return self.values['force'] * np.sin(turn + self.values['phase'])
+    return force * np.sin(2 * np.pi * frequency * m.time + phase)
 
 
 class DriveCoupling(DriveForce):
@@ -329,59 +252,41 @@ class SphericalFriction(_PassiveJointFriction):
     joint: ClassVar[str] = 'spherical'
 
 
-class RevoluteStiffness(StructureForce):
+@StructureForce.by_law('k x (1 + (x / x_h)^2), x = u_i - u_0',
+                       stiffness=Range('N m/rad', 0.4, 1.5, 'log', scales=True),
+                       rest=Range('rad', 1.2, 1.6), hardening=Range('rad', 0.8, 1.5))
+def revolute_stiffness(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
+                       ) -> tuple[Array, Array, Array]:
     """Cable looms across the revolute joints C_i, stiffening as they bend."""
-
-    name: ClassVar[str] = 'revolute_stiffness'
-    form: ClassVar[str] = 'k x (1 + (x / x_h)^2), x = u_i - u_0'
-    ranges: ClassVar[dict[str, Range]] = {
-        'stiffness': Range('N m/rad', 0.4, 1.5, 'log', scales=True),
-        'rest': Range('rad', 1.2, 1.6), 'hardening': Range('rad', 0.8, 1.5)}
-
-    def apply(self, moment: PlatformMoment) -> tuple[Array, Array, Array]:
-        """Return the torques that turn the rods back."""
-        p = self.parameters
-        x = moment.rod_angle - p['rest']
-        return -p['stiffness'] * x * (1 + (x / p['hardening']) ** 2), np.zeros(3), np.zeros(3)
+    x = m.rod_angle - rest
+    return -stiffness * x * (1 + (x / hardening) ** 2), np.zeros(3), np.zeros(3)
 
 
-class ExternalWrench(StructureForce):
+@StructureForce.by_law('F towards a pulley 3 m away, at a point off o',
+                       force=Range('N', 1.0, 4.0, 'log', scales=True),
+                       azimuth=Range('rad', -np.pi, np.pi), elevation=Range('rad', -0.6, 0.6),
+                       x=Range('m', -0.05, 0.05), y=Range('m', -0.05, 0.05),
+                       z=Range('m', 0.0, 0.05))
+def external_wrench(m: PlatformMoment, force: float, azimuth: float, elevation: float, x: float,
+                    y: float, z: float) -> tuple[Array, Array, Array]:
     """A cord over a far pulley pulls at a point of the platform.
 
     Its force hardly changes, but turns a little as the platform moves.
     """
-
-    name: ClassVar[str] = 'external_wrench'
-    form: ClassVar[str] = 'F towards a pulley 3 m away, at a point off o'
-    ranges: ClassVar[dict[str, Range]] = {
-        'force': Range('N', 1.0, 4.0, 'log', scales=True),
-        'azimuth': Range('rad', -np.pi, np.pi), 'elevation': Range('rad', -0.6, 0.6),
-        'x': Range('m', -0.05, 0.05), 'y': Range('m', -0.05, 0.05), 'z': Range('m', 0.0, 0.05)}
-    distance: ClassVar[float] = 3.0
-
-    def apply(self, moment: PlatformMoment) -> tuple[Array, Array, Array]:
-        """Return the cord's pull."""
-        p = self.parameters
-        arm = moment.rotation @ np.array([p['x'], p['y'], p['z']])
-        level = np.cos(p['elevation'])
-        pulley = np.array([0.0, 0.0, 0.5]) + self.distance * np.array([
-            level * np.cos(p['azimuth']), level * np.sin(p['azimuth']), np.sin(p['elevation'])])
-        cord = pulley - moment.position - arm
-        force = p['force'] * cord / np.sqrt(cord @ cord)
-        return np.zeros(3), force, np.cross(arm, force)
+    arm = m.rotation @ np.array([x, y, z])
+    level = np.cos(elevation)
+    pulley = np.array([0.0, 0.0, 0.5]) + PULLEY * np.array([
+        level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+    cord = pulley - m.position - arm
+    pull = force * cord / np.sqrt(cord @ cord)
+    return np.zeros(3), pull, np.cross(arm, pull)
 
 
-class PlatformDrag(StructureForce):
+@StructureForce.by_law('-c v sqrt(1 + (|v| / v_1)^2)',
+                       coefficient=Range('N s/m', 5.0, 15.0, 'log', scales=True),
+                       turbulent_velocity=Range('m/s', 0.2, 0.6, 'log'))
+def platform_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
+                  ) -> tuple[Array, Array, Array]:
     """A liquid or a curtain that the platform moves through."""
-
-    name: ClassVar[str] = 'platform_drag'
-    form: ClassVar[str] = '-c v sqrt(1 + (|v| / v_1)^2)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'coefficient': Range('N s/m', 5.0, 15.0, 'log', scales=True),
-        'turbulent_velocity': Range('m/s', 0.2, 0.6, 'log')}
-
-    def apply(self, moment: PlatformMoment) -> tuple[Array, Array, Array]:
-        """Return the drag at o."""
-        p, v = self.parameters, moment.velocity
-        grown = np.sqrt(1 + (v @ v) / p['turbulent_velocity'] ** 2)
-        return np.zeros(3), -p['coefficient'] * grown * v, np.zeros(3)
+    grown = np.sqrt(1 + (m.velocity @ m.velocity) / turbulent_velocity ** 2)
+    return np.zeros(3), -coefficient * grown * m.velocity, np.zeros(3)

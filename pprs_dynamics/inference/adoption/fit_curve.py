@@ -112,15 +112,12 @@ class FittedCurve:
         Twice the gain in log restricted likelihood, the curve's coefficients integrated out.
     freedom : float
         Effective number of coefficients.
-    roughness : float
-        Prior standard deviation of second differences [N].
     """
 
     curve: Curve
     covariance: Array
     evidence: float
     freedom: float
-    roughness: float
 
     def parameters(self, drive: str, unit: str) -> dict[str, Estimate]:
         """Return the curve's values with their standard deviations, by key of the model file."""
@@ -195,7 +192,7 @@ def fit_curve(
     root = np.sqrt(noise.power(series.frequency))
     error = series.transform(series.error) / root
     scale = root_mean_square(series.error[series.known])
-    best: FittedCurve | None = None
+    found = []
     for intervals in INTERVALS:
         index, weight = spline_basis(x[series.index], start, end, intervals, turns)
         count = intervals + (0 if turns else DEGREE)
@@ -204,20 +201,15 @@ def fit_curve(
             np.add.at(columns, (index[:, k], np.arange(len(series))), weight[:, k])
         rows = series.transform(columns) / root
         gram, moment = rows @ rows.T, rows @ error
-        for fitted in _smoothed(gram, moment, scale, turns):
-            if best is None or fitted[2] > best.evidence:
-                values, covariance, evidence, freedom, roughness = fitted
-                best = FittedCurve(
-                    Curve(request.variable, float(start), float(end),
-                          tuple(map(float, values)), turns), covariance, evidence, freedom,
-                    roughness)
-    assert best is not None
-    return best
+        for values, covariance, evidence, freedom in _smoothed(gram, moment, scale, turns):
+            curve = Curve(request.variable, float(start), float(end), tuple(values.tolist()), turns)
+            found.append(FittedCurve(curve, covariance, evidence, freedom))
+    return max(found, key=lambda one: one.evidence)
 
 
 def _smoothed(gram: Array, moment: Array, scale: float, periodic: bool,
-              ) -> Iterator[tuple[Array, Array, float, float, float]]:
-    """Yield values, covariance, evidence, freedom and roughness for each prior of smoothness."""
+              ) -> Iterator[tuple[Array, Array, float, float]]:
+    """Yield values, covariance, evidence and freedom for each prior of smoothness."""
     count = len(gram)
     second = np.diff(np.eye(count), 2, axis=0)
     if periodic:
@@ -232,8 +224,7 @@ def _smoothed(gram: Array, moment: Array, scale: float, periodic: bool,
         inverse = np.linalg.inv(factor)
         covariance = inverse.T @ inverse
         logs = 2 * np.log(np.diag(factor)).sum() - np.linalg.slogdet(prior)[1]
-        yield (values, covariance, float(half @ half - logs),
-               float(np.trace(covariance @ gram)), deviation)
+        yield values, covariance, float(half @ half - logs), float(np.trace(covariance @ gram))
 
 
 def held_out_residuals(
