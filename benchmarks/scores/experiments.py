@@ -47,7 +47,7 @@ from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import EffortNoise
-from pprs_dynamics.simulation.simulated_run import DriveReference, simulate
+from pprs_dynamics.simulation.virtual_robot import DriveReference, simulate
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'rod_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
@@ -101,7 +101,7 @@ class HiddenRobot:
         """
         forces = self.model.drive_forces(motion)
         state = forces.mechanism
-        run = simulate(_Values(self.values), DriveReference(
+        run = simulate(self.values, DriveReference(
             state.position, state.velocity, forces.total), [self.effect()], seed=self.seed,
             rate=RATE)
         truth = run.truth
@@ -112,12 +112,6 @@ class HiddenRobot:
                 'acceleration': float(np.abs(truth.acceleration).max() / limits.acceleration),
                 'effort': float(np.max(np.abs(truth.effort) / self.model.limits.efforts)),
                 'tilt': float(run.platform_motion().tilt.max() / limits.tilt)}
-
-
-class _Values:
-
-    def __init__(self, values: dict[str, Any]) -> None:
-        self.values = values
 
 
 @dataclass(frozen=True)

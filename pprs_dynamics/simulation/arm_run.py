@@ -41,8 +41,8 @@ from pprs_dynamics.simulation.arm_forms import (
     tilted,
     truth,
 )
-from pprs_dynamics.simulation.engine_model import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState
+from pprs_dynamics.simulation.closed_chains import load_engine
+from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 RATE = 100.0  # [Hz]
@@ -96,7 +96,12 @@ class ArmEngine:
             self.model = mujoco.MjModel.from_xml_string(_bare(path))
         else:
             self.model = mujoco.MjModel.from_xml_path(str(path))
-        self.data = mujoco.MjData(self.model)
+        # MuJoCo's world is the root of the description, ours its base.
+        hung = {joint.child for joint in structure.description.joints.values()}
+        root = next(name for name in structure.description.links if name not in hung)
+        self.root = structure.links[root][1]
+        self.state = EngineState(mujoco, self.model, structure, self.root)
+        self.data = self.state.data
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.model.dof_armature[:], self.model.dof_damping[:] = 0.0, 0.0
         self.model.dof_frictionloss[:], self.model.jnt_stiffness[:] = 0.0, 0.0
@@ -109,13 +114,7 @@ class ArmEngine:
         for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
             self._set_body(self.links[int(row)], parameters)
         mujoco.mj_setConst(self.model, self.data)
-        # MuJoCo's world is the root of the description, ours its base.
-        hung = {joint.child for joint in structure.description.joints.values()}
-        root = next(name for name in structure.description.links if name not in hung)
-        self.root = structure.links[root][1]
         self.gravity = np.asarray(robot.gravity, dtype=float)
-        self.state = EngineState(mujoco, self.model, structure, self.root)
-        self.data = self.state.data
 
     def _set_body(self, body: int, parameters: Array) -> None:
         mass, centre, moments, axes = principal_inertia(parameters)
@@ -201,7 +200,7 @@ class ArmEngine:
             self.engine.mj_inverse(self.model, data)
             needed = data.qfrc_inverse.copy()
             for name, effort in (passive or {}).items():
-                needed[int(self.model.joint(name).dofadr[0])] += effort[k]
+                needed[self.state.dof(name)] += effort[k]
             found[k] = self.state.driven(needed, self._constraints())
         return found
 
@@ -229,15 +228,10 @@ class ArmEngine:
                 rows.append(A[:, i] @ linear if kind == TRANSLATION else
                             (f * np.cross(B[:, j], A[:, i]) + s * np.cross(B[:, h], A[:, g]))
                             @ angular)
-        for name, row in structure.rows.items():
-            if structure.description.joints[name].mimic is not None:
-                coupling = np.zeros(nv)
-                first = next(other for other, at in structure.rows.items()
-                             if t.coordinate[at] == t.coordinate[row]
-                             and structure.description.joints[other].mimic is None)
-                coupling[int(self.model.joint(name).dofadr[0])] = 1.0
-                coupling[int(self.model.joint(first).dofadr[0])] = -t.ratio[row]
-                rows.append(coupling)
+        for name, leader, ratio, _ in couplings(structure):
+            coupling = np.zeros(nv)
+            coupling[self.state.dof(name)], coupling[self.state.dof(leader)] = 1.0, -ratio
+            rows.append(coupling)
         return np.array(rows).reshape(-1, nv)
 
 

@@ -28,7 +28,7 @@ from pprs_dynamics.simulation.sensors import (
     SensorSettings,
     TimeDelay,
 )
-from pprs_dynamics.simulation.simulated_run import DriveReference, SimulatedRun, simulate
+from pprs_dynamics.simulation.virtual_robot import DriveReference, SimulatedRun, simulate
 
 MODEL = DriveModel.load('config/paper.yaml')
 # The plant iterates loads until what is left in the forces is below mu times 3e-5 N.
@@ -89,7 +89,7 @@ def run_plant(effects: list[HiddenEffect], actual_loads: bool = False) -> Simula
         size * rates * np.cos(rates * time + phases))
     quiet = SensorSettings(quantisation=0.0, true_velocity=True, white_noise=0.0,
                            coloured_noise=0.0)
-    return simulate(MODEL, reference, effects, sensors=quiet,
+    return simulate(MODEL.values, reference, effects, sensors=quiet,
                     plant=PlantSettings(actual_loads=actual_loads),
                     control=ControlSettings(gravity_compensation=True))
 

@@ -181,15 +181,15 @@ def _simulate_platform(model: DriveModel, names: Sequence[str], seed: int, scale
                        progress: Any) -> SimulationResult:
     from pprs_dynamics.simulation.hidden_effects import draw_effects
     from pprs_dynamics.simulation.sensors import SensorSettings
-    from pprs_dynamics.simulation.simulated_run import DriveReference
-    from pprs_dynamics.simulation.simulated_run import simulate as simulate_robot
+    from pprs_dynamics.simulation.virtual_robot import DriveReference
+    from pprs_dynamics.simulation.virtual_robot import simulate as simulate_robot
 
     forces = model.drive_forces(motion)
     model.limits.check_strokes(forces.mechanism.position)
     effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
     run = simulate_robot(
-        model, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
-                              effort[feedforward]),
+        model.values, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
+                                     effort[feedforward]),
         draw_effects(list(names), np.random.default_rng(seed), scale), seed=seed, rate=RATE,
         truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
         sensors=SensorSettings.with_effort_noise(noise), progress=progress)
