@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -50,13 +49,6 @@ OF_MOMENT = tuple(name for name in FORMS if name not in ('hysteresis', 'drive_in
 HIDDEN = (*OF_MOMENT, *BODIES, 'base_tilt')
 
 
-@dataclass(frozen=True)
-class LinkagePlantSettings:
-    """Time step of the simulation [s]."""
-
-    step: float
-
-
 class LinkagePlant:
     """A mechanism under efforts of its drives; it starts at home, an arm amid its ranges.
 
@@ -75,7 +67,8 @@ class LinkagePlant:
 
     Attributes
     ----------
-    time : float
+    time, time_step : float
+        [s]
     position, velocity : (D,) arrays
         Of the drives [m, rad].
     hidden : list of dict
@@ -96,7 +89,7 @@ class LinkagePlant:
 
     def __init__(self, model: ArmModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
-        self.settings = LinkagePlantSettings(1 / (rate * math.ceil(1 / (rate * LONGEST_STEP))))
+        self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
         self.model, self.engine = model, ArmEngine(model)
         self.structure = s = model.robot.structure
         random = np.random.default_rng(seed)
@@ -191,7 +184,7 @@ class LinkagePlant:
         UnsolvedError
             Where the step has no solution that means anything.
         """
-        h, v, a = self.settings.step, self.velocity, self._acceleration
+        h, v, a = self.time_step, self.velocity, self._acceleration
         middle = self.position + h / 2 * v + h * h / 8 * a
         acceleration = self.acceleration(middle, v + h / 2 * a, effort, v, h / 2)
         velocity = v + h * acceleration

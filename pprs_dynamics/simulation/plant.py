@@ -148,6 +148,7 @@ class Plant:
     def __init__(self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (),
                  settings: PlantSettings | None = None) -> None:
         self.settings, self._values = settings or PlantSettings(), values
+        self.time_step = self.settings.step
         self.limits = Limits.of(values)
         self.lower, self.upper = self.limits.strokes
         self.resistance = Resistance(values, self.settings.drive_width,
@@ -163,7 +164,7 @@ class Plant:
         self._acceleration = np.zeros(15)
         self._loads = np.zeros(12)
         strokes = self.upper - self.lower
-        self._fastest = LONGEST_MOVE * float(strokes.min()) / self.settings.step
+        self._fastest = LONGEST_MOVE * float(strokes.min()) / self.time_step
         self._widest = 3 * float(strokes.max())  # a whole stroke beyond the end
         self.place(self.position)
 
@@ -234,7 +235,7 @@ class Plant:
         UnsolvedError
             Where the step has no solution that means anything.
         """
-        h, chains = self.settings.step, self.chains
+        h, chains = self.time_step, self.chains
         qpos, y, last = chains.qpos, self.velocity, self._acceleration
         for change in self._body_changes:
             change.advance(chains, self.time + h / 2)

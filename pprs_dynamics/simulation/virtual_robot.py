@@ -61,7 +61,7 @@ class SimulatedRobot:
     ) -> None:
         self.plant: Plant | LinkagePlant = (
             values if isinstance(values, LinkagePlant) else Plant(values, effects, plant))
-        step = self.plant.settings.step
+        step = self.plant.time_step
         self.steps_per_tick = max(1, round(1 / (rate * step)))
         if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
             raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
@@ -78,7 +78,7 @@ class SimulatedRobot:
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return self._ticks * self.steps_per_tick * self.plant.settings.step
+        return self._ticks * self.steps_per_tick * self.plant.time_step
 
     @property
     def hidden(self) -> list[dict[str, Any]]:
@@ -115,7 +115,7 @@ class SimulatedRobot:
     def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
         """Take a command for now, and the next tick's where it is known; False if refused."""
         return self.control.command(
-            self.time, setpoint, following, self.steps_per_tick * self.plant.settings.step)
+            self.time, setpoint, following, self.steps_per_tick * self.plant.time_step)
 
     def tick(self) -> Measurement:
         """Return the readings now, and advance to the next tick."""
@@ -123,7 +123,7 @@ class SimulatedRobot:
 
     def tick_with_truth(self, want_truth: bool = True) -> tuple[Measurement, Truth | None]:
         """Return the readings and the true state now, and advance to the next tick."""
-        now, step, plant = self.time, self.plant.settings.step, self.plant
+        now, step, plant = self.time, self.plant.time_step, self.plant
         measurement, truth = None, None
         for k in range(self.steps_per_tick):
             effort = self._next_effort(now + k * step)
