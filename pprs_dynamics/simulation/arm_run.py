@@ -41,7 +41,7 @@ from pprs_dynamics.simulation.arm_forms import (
     tilted,
     truth,
 )
-from pprs_dynamics.simulation.closed_chains import load_engine
+from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 

@@ -26,7 +26,7 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 from pprs_dynamics.simulation.arm_run import draw_motion
-from pprs_dynamics.simulation.closed_chains import load_engine
+from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
 from pprs_dynamics.simulation.export.expressed import AT_ONCE, MJCF, Expressed
