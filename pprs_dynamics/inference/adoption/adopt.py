@@ -23,7 +23,6 @@ from pprs_dynamics.inference.adoption.fit_curve import (
     FittedCurve,
     fit_curve,
     held_out_residuals,
-    price,
     with_curve,
     without_curve,
 )
@@ -263,8 +262,9 @@ def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], N
             start, request, noise, lambda share: report(
                 DIAGNOSIS_BEFORE_CURVE + (1 - DIAGNOSIS_BEFORE_CURVE) * share))
     held_out = rms(given), rms(found)
-    evidence = fitted.evidence - price(
-        len(model.drives), len(OWN) + len(OF) * (len(model.drives) - 1))
+    count = len(model.drives)
+    # Chosen among the curves of every drive over every variable.
+    evidence = fitted.evidence - 2 * float(np.log(count * (len(OWN) + len(OF) * (count - 1))))
     against = [] if evidence > 0 else [
         f'no curve over {request.variable} is called for on {drive}: evidence {evidence:.3g}, '
         'where 0 is the threshold']

@@ -242,11 +242,6 @@ def held_out_residuals(
     return replace(residuals, model=model)
 
 
-def price(drives: int, variables: int) -> float:
-    """Return what choosing one curve among all costs [2 log odds]."""
-    return 2.0 * float(np.log(drives * variables))
-
-
 def with_curve(model: ForceModel, drive: str, fitted: FittedCurve) -> ForceModel:
     """Return a model with a curve on a drive."""
     curve, prefix = fitted.curve, f'effects.{MeasuredCurve.name}.{drive}'

@@ -235,29 +235,29 @@ class _Information:
     def __init__(self, motions: ArmMotions) -> None:
         self.model, self.duration = motions.model, motions.duration
         self.effort = motions.effort
-        self.bodies = Bodies(motions.model.robot.inertial)
+        bodies = Bodies(motions.model.robot.inertial)
+        self.count = len(bodies)
+        origin, step = np.zeros(self.count), 1e-6
+        self.described = bodies.inertial(origin).ravel()
+        self.slopes = np.column_stack([
+            (bodies.inertial(origin + step * unit).ravel() - self.described) / step
+            for unit in np.eye(self.count)])
 
     def of(self, found: JointSeries) -> Array:
         """Return by how much each combination is told better than by the description, squared."""
         motion = found.motion(np.linspace(0, self.duration, LOOKED_AT))
         count = len(self.effort)
         rows = self.model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
-        origin = np.zeros(len(self.bodies))
-        described = self.bodies.inertial(origin).ravel()
-        step = 1e-6
-        slopes = np.column_stack([
-            (self.bodies.inertial(origin + step * unit).ravel() - described) / step
-            for unit in np.eye(len(origin))])
         direction = np.tanh(motion.velocity / np.asarray(self.model.reversal.velocity))
         own = np.zeros((LOOKED_AT, count, 4 * count))
         for j in range(count):
             own[:, j, 4 * j:4 * j + 4] = np.column_stack((
                 motion.acceleration[:, j], motion.velocity[:, j], direction[:, j],
                 np.ones(LOOKED_AT)))
-        efforts = np.abs(rows @ described).max(axis=0)
+        efforts = np.abs(rows @ self.described).max(axis=0)
         largest = np.where(np.isfinite(self.effort), self.effort, np.maximum(efforts, 1e-3))
-        columns = np.concatenate((rows @ slopes, own), axis=2) / (NOISE * largest)[:, None]
+        columns = np.concatenate((rows @ self.slopes, own), axis=2) / (NOISE * largest)[:, None]
         # Friction and offsets are not known to begin with: to a tenth of the largest effort.
-        scale = np.concatenate((np.ones(len(origin)), np.repeat(0.1 * largest, 4)))
+        scale = np.concatenate((np.ones(self.count), np.repeat(0.1 * largest, 4)))
         J = (columns * scale).reshape(-1, columns.shape[2])
         return np.asarray(np.linalg.eigvalsh(J.T @ J), dtype=float)

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy import fft
@@ -88,13 +87,6 @@ def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:
     density = noise.power(np.arange(count) / (2 * duration)) * count * noise.period / duration
     white: Array = fft.dct(rows, norm='ortho', axis=-1) / np.sqrt(density)
     return white
-
-
-class Criterion(Protocol):
-    """Objective of a design, to be maximised."""
-
-    def value(self, gram: Array) -> float:
-        """Return it for the information of recordings, motion and prior together, (P, P)."""
 
 
 @dataclass(frozen=True)

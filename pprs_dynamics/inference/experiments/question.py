@@ -18,7 +18,6 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm, reversal_shapes
 from pprs_dynamics.inference.experiments.criteria import (
     Contest,
-    Criterion,
     Explanation,
     Information,
     Precision,
@@ -77,7 +76,9 @@ class Question:
     noise : mapping of drive to NoiseSpectrum
     known : (P, P) array
         What recordings and tolerances tell already.
-    criterion : Criterion
+    criterion : Separation or Precision
+        Objective of a design, to be maximised, of the information of recordings, motion and prior
+        together, (P, P).
     contests : tuple of Contest
         For 'separate'.
     subjects : tuple of Explanation
@@ -90,7 +91,7 @@ class Question:
     plan: ColumnPlan
     noise: Mapping[int, NoiseSpectrum]
     known: Array
-    criterion: Criterion
+    criterion: Separation | Precision
     contests: tuple[Contest, ...]
     subjects: tuple[Explanation, ...]
     noise_floor: float
@@ -241,8 +242,9 @@ def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision
     return Precision(free_of(subjects), tuple(range(len(plan.base))), scales)
 
 
-def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan, criterion: Criterion,
-           contests: Sequence[Contest], subjects: Sequence[Explanation]) -> Question:
+def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan,
+           criterion: Separation | Precision, contests: Sequence[Contest],
+           subjects: Sequence[Explanation]) -> Question:
     """Return a question under the noise of a set."""
     regression, fit = fits.regression, found.fit
     noise = regression.noise(fit)

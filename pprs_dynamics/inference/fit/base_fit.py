@@ -18,7 +18,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.estimates import Calibration, calibrations
+from pprs_dynamics.inference.search.estimates import calibrations
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import relinearised
@@ -163,9 +163,13 @@ def _fitted(model: ForceModel, recordings: Sequence[Recording],
     if isinstance(model, ArmModel):
         fit = fit_arm(model, columns_of(model, recordings))
         return fit.model, _numbers(model, fit), _told(model, fit)
-    after, calibrated = fit_open_numbers(model, recordings)
-    return after, tuple(FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
-                        for one in calibrated), ()
+    # As in a diagnosis without any effect: the tolerance is the prior, and how friction turns over
+    # is left free.
+    fits = FittedSets(Design.of(model, recordings), DECISIONS)
+    fits, found = relinearised(fits, fits.evaluate(()))
+    return fitted_model(fits, found), tuple(
+        FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
+        for one in calibrations(fits, found, {})), ()
 
 
 def _numbers(model: ArmModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
@@ -195,22 +199,6 @@ def _told(model: ArmModel, fit: ArmFit) -> tuple[str, ...]:
         told.append(f'efforts are currents times {model.block}.gain: a gain that is wrong by '
                     '1 % makes all numbers wrong by 1 %')
     return tuple(told)
-
-
-def fit_open_numbers(model: ForceModel, recordings: Sequence[Recording],
-                     ) -> tuple[ForceModel, list[Calibration]]:
-    """Return the model with its open numbers fitted, and these.
-
-    Their prior is the tolerance, as in a diagnosis; how friction turns over is left free.
-
-    Raises
-    ------
-    PprsError
-        As `measure_residuals`.
-    """
-    fits = FittedSets(Design.of(model, recordings), DECISIONS)
-    fits, found = relinearised(fits, fits.evaluate(()))
-    return fitted_model(fits, found), calibrations(fits, found, {})
 
 
 @dataclass(frozen=True)
