@@ -139,6 +139,11 @@ class Plant:
     effects : sequence of HiddenEffect
     settings : PlantSettings, optional
 
+    Attributes
+    ----------
+    effects : tuple of HiddenEffect
+        Those that are hidden in it now.
+
     Raises
     ------
     MissingLibraryError
@@ -153,7 +158,7 @@ class Plant:
         self.lower, self.upper = self.limits.strokes
         self.resistance = Resistance(values, self.settings.drive_width,
                                      self.settings.passive_width, self.settings.friction)
-        self._effects: tuple[HiddenEffect, ...] = ()
+        self.effects: tuple[HiddenEffect, ...] = ()
         self.chains = self._with(effects)
         # A copy without hidden effects, of which the drives' control knows the weight.
         self._known = ClosedChains(values)
@@ -176,7 +181,7 @@ class Plant:
         self._body_changes = [e for e in effects if isinstance(e, BodyChange)]
         for change in self._body_changes:
             change.apply(chains, self._values)
-        self._effects = tuple(effects)
+        self.effects = tuple(effects)
         return chains
 
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
@@ -188,7 +193,7 @@ class Plant:
     @property
     def hidden(self) -> list[dict[str, Any]]:
         """What is hidden in it: name, drives, parameters and form of each effect."""
-        return [effect.truth() for effect in self._effects]
+        return [effect.truth() for effect in self.effects]
 
     def holding(self, position: Array) -> Array:
         """Return the efforts [N] that hold the model's weight at drive positions (6,) [m].
