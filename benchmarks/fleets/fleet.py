@@ -37,13 +37,11 @@ from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends, main_change
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.simulation.hidden_bodies import PayloadMass
+from pprs_dynamics.simulation.hidden_bodies import payload_mass
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_forces import DriveSpring
-from pprs_dynamics.simulation.hidden_friction import CoulombFriction
-from pprs_dynamics.simulation.hidden_sensors import HomingError
+from pprs_dynamics.simulation.hidden_forces import coulomb_friction, drive_spring
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.sensors import EffortNoise, HomingError, SensorSettings
 
 DURATION, RATE = 20.0, 100.0  # [s, Hz]
 LEAD = 10  # samples before the recording, for effects that look back
@@ -79,13 +77,13 @@ class Truth:
             return None
         if self.kind == 'friction':
             force = self.size * (day - self.day)
-            return CoulombFriction({self.drive: {'force': force, 'width': 0.001}})
+            return coulomb_friction({self.drive: {'force': force, 'width': 0.001}})
         if self.kind == 'payload':
-            return PayloadMass(mass=self.size)
+            return payload_mass(mass=self.size)
         if self.kind == 'zero':
             return HomingError({self.drive: {'zero': self.size}})
         rest = 0.2 if self.drive.startswith('lift') else 0.0
-        return DriveSpring({self.drive: {'stiffness': self.size, 'rest': rest,
+        return drive_spring({self.drive: {'stiffness': self.size, 'rest': rest,
                                          'hardening': 0.25}})
 
 

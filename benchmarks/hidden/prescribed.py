@@ -33,7 +33,6 @@ from pprs_dynamics.simulation.closed_chains import (
     PASSIVE_DOFS,
     ClosedChains,
 )
-from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveForce,
@@ -129,9 +128,9 @@ class PrescribedPlant:
             of the first sample.
         """
         motion, settings = self.motion, self.settings
-        friction = EngineFriction(self.values, np.asarray(settings.drive_width),
-                                 settings.passive_width, settings.friction)
-        resistance = Resistance(friction, effects)
+        resistance = Resistance(self.values, settings.drive_width, settings.passive_width,
+                                settings.friction)
+        resistance.use_effects(effects)
         bodies = self._bodies_with([e for e in effects if isinstance(e, BodyChange)])
         structure = self._structure([e for e in effects if isinstance(e, StructureForce)])
         relative = np.einsum('nij,nj->ni', motion.rates, motion.velocity)

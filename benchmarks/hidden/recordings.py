@@ -34,7 +34,7 @@ from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.hidden_effect import DriveForce, HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
-from pprs_dynamics.simulation.hidden_forces import Vibration
+from pprs_dynamics.simulation.hidden_forces import vibration
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
@@ -269,7 +269,7 @@ def _effect(case: Case, name: str, what: str, scale: float) -> HiddenEffect:
     if case.row != 'vibration':
         return effect
     frequency = float(np.exp(case.rng(f'frequency {what}').uniform(*np.log(VIBRATIONS))))
-    return Vibration({drive: {**own, 'frequency': frequency}
+    return vibration({drive: {**own, 'frequency': frequency}
                       for drive, own in effect.parameters.items()})
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from pprs_dynamics.simulation.hidden_effect import DRIVES
+from pprs_dynamics.drives import DRIVES
 
 # Hidden effects whose form is the catalogue's.
 SAME_FORM = ('effort_offset', 'effort_gain', 'homing_error', 'time_delay', 'drive_inertia',

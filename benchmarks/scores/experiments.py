@@ -36,7 +36,7 @@ from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.fourier_path import FourierFamily
+from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import experiment_of
 from pprs_dynamics.inference.experiments.question import Question, question_of
@@ -47,7 +47,7 @@ from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import EffortNoise
-from pprs_dynamics.simulation.simulated_run import DriveReference, simulate
+from pprs_dynamics.simulation.virtual_robot import DriveReference, simulate
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'rod_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
@@ -101,7 +101,7 @@ class HiddenRobot:
         """
         forces = self.model.drive_forces(motion)
         state = forces.mechanism
-        run = simulate(_Values(self.values), DriveReference(
+        run = simulate(self.values, DriveReference(
             state.position, state.velocity, forces.total), [self.effect()], seed=self.seed,
             rate=RATE)
         truth = run.truth
@@ -112,12 +112,6 @@ class HiddenRobot:
                 'acceleration': float(np.abs(truth.acceleration).max() / limits.acceleration),
                 'effort': float(np.max(np.abs(truth.effort) / self.model.limits.efforts)),
                 'tilt': float(run.platform_motion().tilt.max() / limits.tilt)}
-
-
-class _Values:
-
-    def __init__(self, values: dict[str, Any]) -> None:
-        self.values = values
 
 
 @dataclass(frozen=True)
@@ -138,11 +132,11 @@ def times(duration: float) -> np.ndarray:
 
 def poor_motions(seed: int) -> dict[str, PlatformMotion]:
     """Return motions that tell little: up and down only, and slow and small."""
-    family = FourierFamily(OLD, np.tile(HEAVE_HARMONICS, (6, 1)), HOME)
+    family = FourierPath.at_rest(OLD, np.tile(HEAVE_HARMONICS, (6, 1)), HOME)
     parameters = np.zeros((6, family.size // 6))
     parameters[2] = np.random.default_rng((seed, 5)).normal(size=family.size // 6)
     parameters[2] *= HEAVE / np.abs(parameters[2]).max()
-    return {'heave': family.path(parameters.ravel()).motion(times(OLD)),
+    return {'heave': family.with_parameters(parameters.ravel()).motion(times(OLD)),
             'slow': Excitation(duration=OLD, seed=seed, amplitude=0.025, tilt=0.05,
                                highest_frequency=0.25).motion(times(OLD))}
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
@@ -40,6 +41,16 @@ class JointMoment:
     effort: float
     speed: float
     gear_ratio: float
+
+    @classmethod
+    def along(cls, motion: JointMotion, joint: int, load: Array, effort: float, gear_ratio: float,
+              ) -> JointMoment:
+        """Return a joint along a motion, under loads (N,) and with a largest effort."""
+        assert motion.time is not None
+        velocity = motion.velocity[:, joint]
+        return cls(motion.time, motion.position[:, joint], velocity,
+                   motion.acceleration[:, joint], load, float(effort),
+                   float(np.abs(velocity).max()), float(gear_ratio))
 
     @property
     def sign(self) -> Array:

@@ -21,7 +21,11 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
 from pprs_dynamics.physics.mechanism.closures import ROWS
-from pprs_dynamics.physics.mechanism.description import Frame, body_at
+from pprs_dynamics.physics.mechanism.description import (
+    Frame,
+    body_at,
+    principal_inertia,
+)
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
@@ -38,7 +42,7 @@ from pprs_dynamics.simulation.arm_forms import (
     truth,
 )
 from pprs_dynamics.simulation.engine_model import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState
+from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 RATE = 100.0  # [Hz]
@@ -85,14 +89,19 @@ class ArmEngine:
 
     def __init__(self, model: ArmModel) -> None:
         self.engine = mujoco = load_engine('a simulated robot')
-        robot = self.robot = model.robot
+        robot = self.robot = self.described = model.robot
         structure = self.structure = robot.structure
         path = Path(structure.description.path)
         if path.suffix == '.urdf' or model.values.get(f'{model.block}.urdf'):
             self.model = mujoco.MjModel.from_xml_string(_bare(path))
         else:
             self.model = mujoco.MjModel.from_xml_path(str(path))
-        self.data = mujoco.MjData(self.model)
+        # MuJoCo's world is the root of the description, ours its base.
+        hung = {joint.child for joint in structure.description.joints.values()}
+        root = next(name for name in structure.description.links if name not in hung)
+        self.root = structure.links[root][1]
+        self.state = EngineState(mujoco, self.model, structure, self.root)
+        self.data = self.state.data
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.model.dof_armature[:], self.model.dof_damping[:] = 0.0, 0.0
         self.model.dof_frictionloss[:], self.model.jnt_stiffness[:] = 0.0, 0.0
@@ -105,24 +114,12 @@ class ArmEngine:
         for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
             self._set_body(self.links[int(row)], parameters)
         mujoco.mj_setConst(self.model, self.data)
-        # MuJoCo's world is the root of the description, ours its base.
-        hung = {joint.child for joint in structure.description.joints.values()}
-        root = next(name for name in structure.description.links if name not in hung)
-        self.root = structure.links[root][1]
         self.gravity = np.asarray(robot.gravity, dtype=float)
-        self.state = EngineState(mujoco, self.model, structure, self.root)
-        self.data = self.state.data
 
     def _set_body(self, body: int, parameters: Array) -> None:
-        mass = float(parameters[0])
-        centre = parameters[1:4] / mass
-        xx, xy, yy, xz, yz, zz = parameters[4:]
-        about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-                 - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
-        values, axes = np.linalg.eigh(about)
-        axes[:, 0] *= np.linalg.det(axes)
+        mass, centre, moments, axes = principal_inertia(parameters)
         self.model.body_mass[body], self.model.body_ipos[body] = mass, centre
-        self.model.body_inertia[body] = np.maximum(values, LEAST)
+        self.model.body_inertia[body] = np.maximum(moments, LEAST)
         quaternion = np.empty(4)
         self.engine.mju_mat2Quat(quaternion, axes.ravel())
         self.model.body_iquat[body] = quaternion
@@ -152,6 +149,30 @@ class ArmEngine:
         centre = frame.inverse.of_point(parameters[1:4] / parameters[0])
         self._put(self.robot.with_body(link, body_at(mass, tuple(centre), np.zeros((3, 3)))), row)
 
+    def hide_payload(self, random: np.random.Generator, scale: float, ahead: float,
+                     ) -> dict[str, Any]:
+        """Hang a point on the tool, so far along its z axis [m], and return what it is."""
+        mass = scale * float(random.uniform(0.05, 0.12)) * float(self.described.masses.sum())
+        self.add_payload(mass, np.array([0.0, 0.0, ahead]))
+        return truth('payload_mass', None, {'mass': mass}, (
+            f'a point {100 * ahead:g} cm before the tool' if ahead else
+            'a point at the tool\'s origin'))
+
+    def hide_link_mass(self, random: np.random.Generator, scale: float, links: Sequence[int],
+                       ) -> dict[str, Any]:
+        """Make one of some bodies heavier, and return what was done."""
+        body = int(random.choice(links))
+        mass = scale * float(random.uniform(0.1, 0.3)) * float(self.described.masses[body])
+        self.add_to_link(body, mass)
+        return truth('link_mass', None, {f'{self.described.body_names[body]}.mass': mass},
+                     'a point at its centre')
+
+    def hide_tilt(self, random: np.random.Generator, scale: float) -> dict[str, Any]:
+        """Let the base lean, and return how."""
+        angle = scale * float(random.uniform(0.01, 0.03))
+        self.gravity = tilted(self.gravity, angle)
+        return truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x')
+
     def inverse(self, motion: Motion) -> tuple[Array, Array]:
         """Return efforts of all joints of the tree, (nv,), and its inertia, at one sample."""
         self.model.opt.gravity[:] = self.root.R.T @ self.gravity
@@ -161,20 +182,17 @@ class ArmEngine:
         self.engine.mj_fullM(self.model, self.data, inertia)
         return self.data.qfrc_inverse, inertia
 
-    def torques(self, motion: JointMotion, gravity: Array | None = None,
-                passive: Mapping[str, Array] | None = None) -> Array:
+    def torques(self, motion: JointMotion, passive: Mapping[str, Array] | None = None) -> Array:
         """Return inverse dynamics along a motion, (N, D).
 
         Parameters
         ----------
         motion : JointMotion
-        gravity : (3,) array, optional
-            In the base.
         passive : mapping of str to (N,) array, optional
             Efforts against friction of passive joints, by joint.
         """
         m = self.robot.at(motion.position, motion.velocity, motion.acceleration).motion
-        self.model.opt.gravity[:] = self.root.R.T @ (self.gravity if gravity is None else gravity)
+        self.model.opt.gravity[:] = self.root.R.T @ self.gravity
         found = np.empty_like(motion.position)
         data = self.data
         for k in range(len(motion)):
@@ -182,7 +200,7 @@ class ArmEngine:
             self.engine.mj_inverse(self.model, data)
             needed = data.qfrc_inverse.copy()
             for name, effort in (passive or {}).items():
-                needed[int(self.model.joint(name).dofadr[0])] += effort[k]
+                needed[self.state.dof(name)] += effort[k]
             found[k] = self.state.driven(needed, self._constraints())
         return found
 
@@ -210,15 +228,10 @@ class ArmEngine:
                 rows.append(A[:, i] @ linear if kind == TRANSLATION else
                             (f * np.cross(B[:, j], A[:, i]) + s * np.cross(B[:, h], A[:, g]))
                             @ angular)
-        for name, row in structure.rows.items():
-            if structure.description.joints[name].mimic is not None:
-                coupling = np.zeros(nv)
-                first = next(other for other, at in structure.rows.items()
-                             if t.coordinate[at] == t.coordinate[row]
-                             and structure.description.joints[other].mimic is None)
-                coupling[int(self.model.joint(name).dofadr[0])] = 1.0
-                coupling[int(self.model.joint(first).dofadr[0])] = -t.ratio[row]
-                rows.append(coupling)
+        for name, leader, ratio, _ in couplings(structure):
+            coupling = np.zeros(nv)
+            coupling[self.state.dof(name)], coupling[self.state.dof(leader)] = 1.0, -ratio
+            rows.append(coupling)
         return np.array(rows).reshape(-1, nv)
 
 
@@ -304,22 +317,15 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         progress(0.1)
     plain = engine.torques(motion)
     hidden: list[dict[str, Any]] = []
-    gravity = None
     if 'payload_mass' in chosen:
-        mass = scale * float(random.uniform(0.05, 0.12)) * float(model.robot.masses.sum())
-        engine.add_payload(mass, np.array([0.0, 0.0, 0.05]))
-        hidden.append(truth('payload_mass', None, {'mass': mass}, 'a point 5 cm before the tool'))
+        hidden.append(engine.hide_payload(random, scale, 0.05))
     if 'link_mass' in chosen:
         # What turns about an upright axis shows in no weight, and the last link is the payload's.
         links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
                  and (j or model.robot.structure.loops)]
         if not links:
             raise HiddenEffectError('link_mass needs a link between the first and that of the tool')
-        body = int(random.choice(links))
-        mass = scale * float(random.uniform(0.1, 0.3)) * float(model.robot.masses[body])
-        engine.add_to_link(body, mass)
-        hidden.append(truth('link_mass', None, {f'{model.robot.body_names[body]}.mass': mass},
-                            'a point at its centre'))
+        hidden.append(engine.hide_link_mass(random, scale, links))
     passive = {}
     if 'joint_friction' in chosen:
         name, effort, parameters = _hidden_joint(model, motion, plain, random, scale)
@@ -328,10 +334,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
             f'{name}.{key}': value for key, value in parameters.items()},
                             'T w / sqrt(w^2 + w_0^2)'))
     if 'base_tilt' in chosen:
-        angle = scale * float(random.uniform(0.01, 0.03))
-        gravity = tilted(engine.gravity, angle)
-        hidden.append(truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x'))
-    bodies = engine.torques(motion, gravity, passive) if hidden else plain
+        hidden.append(engine.hide_tilt(random, scale))
+    bodies = engine.torques(motion, passive) if hidden else plain
     if progress is not None:
         progress(0.8)
     efforts = bodies + _own_friction(model, motion)
@@ -411,12 +415,8 @@ def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: 
     everywhere = bool(random.random() < 0.25)
     chosen = range(len(drives)) if everywhere else [int(random.integers(len(drives)))]
     parameters = {}
-    assert motion.time is not None
     for j in chosen:
-        moment = JointMoment(
-            motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
-            load[:, j], float(largest[j]), float(np.abs(motion.velocity[:, j]).max()),
-            float(model.gear_ratios[j]))
+        moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j])
         drawn = draw_form(name, random, moment, scale)
         efforts[:, j] += form.force(drawn, moment)
         parameters[drives[j]] = drawn

@@ -333,11 +333,3 @@ class ClosedChains:
     def rotation(self) -> Array:
         """From `platform` to `base` at the last evaluation, (3, 3); a view."""
         return self._rotation
-
-    def energy(self) -> float:
-        """Return kinetic and potential energy at `qpos` and `qvel` [J]."""
-        self.engine.mj_fwdPosition(self.model, self.data)
-        self.engine.mj_fwdVelocity(self.model, self.data)
-        self.engine.mj_energyPos(self.model, self.data)
-        self.engine.mj_energyVel(self.model, self.data)
-        return float(self.data.energy.sum())

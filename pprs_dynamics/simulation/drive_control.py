@@ -6,17 +6,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import COUNT
-from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.simulation.closed_chains import ClosedChains
 
 # [m, m/s, N, ...]: no drive's; with more, products with gains would overflow, and differences of
 # what overflowed are no numbers.
@@ -79,38 +76,14 @@ class Note:
     message: str
 
 
-class Weight(Protocol):
-    """Efforts that hold a robot still."""
-
-    def holding(self, position: Array) -> Array:
-        """Return efforts at drive positions (D,); where it cannot close, those of the last."""
-
-
-class WeightModel:
-    """Efforts that hold the robot of a model file still, by its own copy in the engine."""
-
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        self._chains = ClosedChains(values)
-        self._effort = np.zeros(COUNT)
-
-    def holding(self, position: Array) -> Array:
-        """Return efforts at drive positions (6,); where it cannot close, those of the last."""
-        kept = self._chains.qpos.copy()
-        try:
-            self._chains.place_drives(position)
-            self._effort = self._chains.evaluate(np.zeros(COUNT)).drive_bias
-        except SingularityError:
-            self._chains.qpos[:] = kept
-        return self._effort
-
-
 class DriveControl:
     """From commands and measurements to the efforts of the drives.
 
     Parameters
     ----------
     limits : DriveLimits
-    weight : Weight
+    weight : callable
+        Drive positions (D,) -> efforts that hold the robot still there.
     settings : ControlSettings
     step : float
         Time between two calls of `effort` [s].
@@ -126,8 +99,8 @@ class DriveControl:
         How many steps each drive spent at its limit.
     """
 
-    def __init__(self, limits: DriveLimits, weight: Weight, settings: ControlSettings, step: float,
-                 smoothing: float = 1.0) -> None:
+    def __init__(self, limits: DriveLimits, weight: Callable[[Array], Array],
+                 settings: ControlSettings, step: float, smoothing: float = 1.0) -> None:
         self.settings, self._limits, self._weight = settings, limits, weight
         self._smoothing = smoothing
         count = len(limits.drives)
@@ -183,7 +156,7 @@ class DriveControl:
             following = None  # refused when its time comes
         self._following, self._after = following, after
         if self.settings.gravity_compensation and setpoint.position is not None:
-            self._compensation = self._weight.holding(setpoint.position)
+            self._compensation = self._weight(setpoint.position)
         else:
             self._compensation = self._nothing
         return True
@@ -250,7 +223,7 @@ class DriveControl:
         self._following, self._after = None, 0.0
         self._setpoint = Setpoint(np.array(position), self._nothing)
         # Holding against gravity without it would sag by millimetres.
-        self._compensation = self._weight.holding(position)
+        self._compensation = self._weight(position)
 
     def _limited(self, now: float, wanted: Array) -> Array:
         limits = self._limits

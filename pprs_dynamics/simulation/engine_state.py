@@ -18,6 +18,15 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 LEAST_SINGULAR = 1e-10  # of the largest singular value; closures may say a thing twice
 
 
+def couplings(structure: Structure) -> list[tuple[str, str, float, float]]:
+    """Return coupled joints: name, the free joint that each follows, ratio and offset."""
+    t, joints = structure.tables, structure.description.joints
+    leaders = {int(t.coordinate[row]): name for name, row in structure.rows.items()
+               if joints[name].mimic is None}
+    return [(name, leaders[int(t.coordinate[row])], float(t.ratio[row]), float(t.offset[row]))
+            for name, row in structure.rows.items() if joints[name].mimic is not None]
+
+
 class EngineState:
     """The state of a model of MuJoCo whose joints are those of a structure.
 
@@ -39,7 +48,11 @@ class EngineState:
     @cached_property
     def drives(self) -> list[int]:
         """Degrees of freedom of the drives."""
-        return [int(self.model.joint(name).dofadr[0]) for name in self.structure.drives]
+        return [self.dof(name) for name in self.structure.drives]
+
+    def dof(self, joint: str) -> int:
+        """Return the degree of freedom of a joint of one coordinate."""
+        return int(self.model.joint(joint).dofadr[0])
 
     @cached_property
     def _standing(self) -> Array:

@@ -44,86 +44,55 @@ def _steiner(mass: float, arm: Array) -> Array:
     return tensor
 
 
-class PayloadMass(BodyChange):
+@BodyChange.by_law('a ball of mass m and radius 2 cm at the centre of mass',
+                   mass=Range('kg', 0.1, 0.4, 'signed', scales=True))
+def payload_mass(chains: ClosedChains, values: Mapping[str, Any], mass: float) -> None:
     """A payload heavier or lighter than the model's, in the same place."""
-
-    name: ClassVar[str] = 'payload_mass'
-    form: ClassVar[str] = 'a ball of mass m and radius 2 cm at the centre of mass'
-    ranges: ClassVar[dict[str, Range]] = {'mass': Range('kg', 0.1, 0.4, 'signed', scales=True)}
-
-    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
-        """Add the mass."""
-        more = ball(self.parameters['mass'], chains.platform_centre, 0.02)
-        chains.set_platform(*join(_platform(chains), more))
+    chains.set_platform(*join(_platform(chains), ball(mass, chains.platform_centre, 0.02)))
 
 
-class PayloadOffset(BodyChange):
+@BodyChange.by_law('the centre of mass moved by (x, y, z), the tensor about it as it was',
+                   x=Range('m', 0.003, 0.01, 'signed', scales=True),
+                   y=Range('m', 0.003, 0.01, 'signed', scales=True),
+                   z=Range('m', 0.003, 0.02, 'signed', scales=True))
+def payload_offset(chains: ClosedChains, values: Mapping[str, Any], x: float, y: float, z: float,
+                   ) -> None:
     """The centre of mass of platform and payload lies elsewhere."""
-
-    name: ClassVar[str] = 'payload_offset'
-    form: ClassVar[str] = 'the centre of mass moved by (x, y, z), the tensor about it as it was'
-    ranges: ClassVar[dict[str, Range]] = {
-        'x': Range('m', 0.003, 0.01, 'signed', scales=True),
-        'y': Range('m', 0.003, 0.01, 'signed', scales=True),
-        'z': Range('m', 0.003, 0.02, 'signed', scales=True)}
-
-    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
-        """Move the centre."""
-        p = self.parameters
-        mass, centre, inertia = _platform(chains)
-        chains.set_platform(mass, centre + np.array([p['x'], p['y'], p['z']]), inertia)
+    mass, centre, inertia = _platform(chains)
+    chains.set_platform(mass, centre + np.array([x, y, z]), inertia)
 
 
-class PlatformInertia(BodyChange):
+@BodyChange.by_law('I (E - a a^T), a = (cos beta, sin beta, 0)',
+                   inertia=Range('kg m^2', 0.01, 0.04, 'log', scales=True),
+                   angle=Range('rad', 0.0, np.pi))
+def platform_inertia(chains: ClosedChains, values: Mapping[str, Any], inertia: float, angle: float,
+                     ) -> None:
     """A beam across the platform: more inertia, of which one axis in the plane feels nothing."""
-
-    name: ClassVar[str] = 'platform_inertia'
-    form: ClassVar[str] = 'I (E - a a^T), a = (cos beta, sin beta, 0)'
-    ranges: ClassVar[dict[str, Range]] = {
-        'inertia': Range('kg m^2', 0.01, 0.04, 'log', scales=True),
-        'angle': Range('rad', 0.0, np.pi)}
-
-    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
-        """Add the beam's inertia."""
-        p = self.parameters
-        along = np.array([np.cos(p['angle']), np.sin(p['angle']), 0.0])
-        mass, centre, inertia = _platform(chains)
-        beam = p['inertia'] * (np.eye(3) - np.outer(along, along))
-        chains.set_platform(mass, centre, inertia + beam)
+    along = np.array([np.cos(angle), np.sin(angle), 0.0])
+    mass, centre, own = _platform(chains)
+    chains.set_platform(mass, centre, own + inertia * (np.eye(3) - np.outer(along, along)))
 
 
-class RodMass(BodyChange):
+@BodyChange.by_law('a uniform collar of mass m over the middle 60 % of every rod',
+                   mass=Range('kg', 0.05, 0.2, 'log', scales=True))
+def rod_mass(chains: ClosedChains, values: Mapping[str, Any], mass: float) -> None:
     """Guiding rods heavier than the model's: a collar in the middle of each."""
-
-    name: ClassVar[str] = 'rod_mass'
-    form: ClassVar[str] = 'a uniform collar of mass m over the middle 60 % of every rod'
-    ranges: ClassVar[dict[str, Range]] = {'mass': Range('kg', 0.05, 0.2, 'log', scales=True)}
-
-    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
-        """Add the collars."""
-        l, extra = values['geometry.rod_length'], self.parameters['mass']  # noqa: E741
-        for i, mass in enumerate(values['masses.rods']):
-            across = mass * l ** 2 / 12 + extra * (0.6 * l) ** 2 / 12
-            chains.set_mass(f'rod_{i + 1}', mass + extra, np.array([-l / 2, 0.0, 0.0]),
-                            np.diag([0.0, across, across]))
+    l = values['geometry.rod_length']  # noqa: E741
+    for i, own in enumerate(values['masses.rods']):
+        across = own * l ** 2 / 12 + mass * (0.6 * l) ** 2 / 12
+        chains.set_mass(f'rod_{i + 1}', own + mass, np.array([-l / 2, 0.0, 0.0]),
+                        np.diag([0.0, across, across]))
 
 
-class BaseTilt(BodyChange):
+@BodyChange.by_law('gravity turned by x about x, then by y about y',
+                   x=Range('rad', 0.01, 0.05, 'signed', scales=True),
+                   y=Range('rad', 0.01, 0.05, 'signed', scales=True))
+def base_tilt(chains: ClosedChains, values: Mapping[str, Any], x: float, y: float) -> None:
     """The base does not stand level: gravity leans in it."""
-
-    name: ClassVar[str] = 'base_tilt'
-    form: ClassVar[str] = 'gravity turned by x about x, then by y about y'
-    ranges: ClassVar[dict[str, Range]] = {
-        'x': Range('rad', 0.01, 0.05, 'signed', scales=True),
-        'y': Range('rad', 0.01, 0.05, 'signed', scales=True)}
-
-    def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:
-        """Turn gravity."""
-        (c_x, s_x), (c_y, s_y) = ((np.cos(self.parameters[axis]), np.sin(self.parameters[axis]))
-                                  for axis in 'xy')
-        about_x = np.array([[1, 0, 0], [0, c_x, -s_x], [0, s_x, c_x]])
-        about_y = np.array([[c_y, 0, s_y], [0, 1, 0], [-s_y, 0, c_y]])
-        chains.model.opt.gravity[:] = about_y @ about_x @ np.array(values['gravity'])
+    (c_x, s_x), (c_y, s_y) = ((np.cos(angle), np.sin(angle)) for angle in (x, y))
+    about_x = np.array([[1, 0, 0], [0, c_x, -s_x], [0, s_x, c_x]])
+    about_y = np.array([[c_y, 0, s_y], [0, 1, 0], [-s_y, 0, c_y]])
+    chains.model.opt.gravity[:] = about_y @ about_x @ np.array(values['gravity'])
 
 
 class DriveInertia(DriveBound, BodyChange):

@@ -11,21 +11,18 @@ what the drives must apply more.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError
 
 if TYPE_CHECKING:
     from pprs_dynamics.simulation.closed_chains import ClosedChains
-    from pprs_dynamics.simulation.engine_friction import EngineFriction
-
-DRIVES = ('slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')
-"""Names of the drives, in the interface's order."""
 
 
 class HiddenEffectError(PprsError, ValueError):
@@ -123,6 +120,8 @@ class HiddenEffect(ABC):
         Its equation, for reports.
     ranges : dict of Range
         Its parameters.
+    method : str
+        Name of what it does, see `by_law`.
 
     Parameters
     ----------
@@ -133,6 +132,20 @@ class HiddenEffect(ABC):
     name: ClassVar[str]
     form: ClassVar[str]
     ranges: ClassVar[Mapping[str, Range]]
+    method: ClassVar[str]
+
+    @classmethod
+    def by_law(cls, form: str, **ranges: Range) -> Callable[[Callable[..., Any]], type[Self]]:
+        """Return what makes a law an effect of the law's name, without memory.
+
+        The law takes what the `method` of this class takes, and then the parameters by name.
+        """
+        def made(law: Callable[..., Any]) -> type[Self]:
+            return type(law.__name__, (cls,), {
+                '__doc__': law.__doc__, '__module__': law.__module__, 'name': law.__name__,
+                'form': form, 'ranges': ranges,
+                cls.method: lambda self, *state: law(*state, **self.arguments)})
+        return made
 
     def __init__(self, **parameters: float) -> None:
         require_parameters(type(self), parameters)
@@ -142,6 +155,11 @@ class HiddenEffect(ABC):
     def draw(cls, rng: np.random.Generator, scale: float = 1.0) -> Self:
         """Return the effect with random parameters; `scale` multiplies its strength."""
         return cls(**{name: r.draw(rng, scale) for name, r in cls.ranges.items()})
+
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """Parameters as a law takes them."""
+        return self.parameters
 
     @property
     def drives(self) -> tuple[str, ...] | None:
@@ -189,6 +207,11 @@ class DriveBound(HiddenEffect):
                     for drive in drives})
 
     @property
+    def arguments(self) -> Mapping[str, Array]:
+        """Parameters as a law takes them, (6,) each."""
+        return self.values
+
+    @property
     def drives(self) -> tuple[str, ...]:
         """Drives on which it acts."""
         return tuple(drive for drive in DRIVES if drive in self.parameters)
@@ -204,10 +227,19 @@ class DriveForce(DriveBound):
         implicitly.
     """
 
+    method: ClassVar[str] = 'force'
     steep: ClassVar[bool] = False
 
-    def prepare(self, friction: EngineFriction) -> None:
-        """Take note of the robot's own friction before it starts; by default not."""
+    def prepare(self, coulomb: Array, width: Array) -> None:
+        """Take note of the drives' own friction before it starts; by default not.
+
+        Parameters
+        ----------
+        coulomb : (6,) array
+            Coefficients of dry friction.
+        width : (6,) array
+            In which it turns over [m/s].
+        """
         return
 
     @abstractmethod
@@ -217,6 +249,12 @@ class DriveForce(DriveBound):
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Advance memory by a time step; nothing to do without one."""
         return
+
+
+class SteepDriveForce(DriveForce):
+    """One that changes fast with the drive's own velocity."""
+
+    steep: ClassVar[bool] = True
 
 
 class HiddenJointFriction(HiddenEffect):
@@ -232,6 +270,8 @@ class HiddenJointFriction(HiddenEffect):
 class StructureForce(HiddenEffect):
     """Forces on rods and platform."""
 
+    method: ClassVar[str] = 'apply'
+
     @abstractmethod
     def apply(self, moment: PlatformMoment) -> tuple[Array, Array, Array]:
         """Return torques on the hinges of C_i, force at o and torque on the platform, in `base`.
@@ -242,6 +282,8 @@ class StructureForce(HiddenEffect):
 
 class BodyChange(HiddenEffect):
     """A difference of bodies or gravity from the model."""
+
+    method: ClassVar[str] = 'apply'
 
     @abstractmethod
     def apply(self, chains: ClosedChains, values: Mapping[str, Any]) -> None:

@@ -10,30 +10,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pprs_dynamics.simulation import (
-    hidden_bodies,
-    hidden_forces,
-    hidden_friction,
-    hidden_sensors,
-)
+from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
 from pprs_dynamics.simulation.hidden_effect import DriveBound, HiddenEffect, HiddenEffectError
 
 IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
-    hidden_friction.ViscousFriction, hidden_friction.CoulombFriction,
-    hidden_friction.AsymmetricFriction, hidden_friction.StribeckFriction,
-    hidden_friction.QuadraticFriction, hidden_friction.LoadFriction,
-    hidden_friction.Hysteresis, hidden_friction.FrictionDrift,
-    hidden_forces.EffortOffset, hidden_sensors.EffortGain, hidden_sensors.HomingError,
-    hidden_forces.DriveSpring, hidden_forces.ForceRipple, hidden_bodies.DriveInertia,
-    hidden_sensors.TimeDelay, hidden_friction.RevoluteFriction,
-    hidden_friction.SphericalFriction, hidden_forces.RevoluteStiffness,
-    hidden_bodies.PayloadMass, hidden_bodies.PayloadOffset, hidden_bodies.PlatformInertia,
-    hidden_forces.ExternalWrench, hidden_bodies.BaseTilt, hidden_forces.PlatformDrag,
-    hidden_bodies.RodMass)}
+    hidden_forces.viscous_friction, hidden_forces.coulomb_friction,
+    hidden_forces.asymmetric_friction, hidden_forces.stribeck_friction,
+    hidden_forces.quadratic_friction, hidden_forces.load_friction,
+    hidden_forces.Hysteresis, hidden_forces.FrictionDrift,
+    hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
+    hidden_forces.drive_spring, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
+    sensors.TimeDelay, hidden_forces.RevoluteFriction,
+    hidden_forces.SphericalFriction, hidden_forces.revolute_stiffness,
+    hidden_bodies.payload_mass, hidden_bodies.payload_offset, hidden_bodies.platform_inertia,
+    hidden_forces.external_wrench, hidden_bodies.base_tilt, hidden_forces.platform_drag,
+    hidden_bodies.rod_mass)}
 """Effects that the catalogue has under the same name, in the interface's order."""
 
 NOT_IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
-    hidden_forces.LocalBump, hidden_forces.Vibration, hidden_forces.DriveCoupling,
+    hidden_forces.local_bump, hidden_forces.vibration, hidden_forces.DriveCoupling,
     hidden_bodies.PayloadPickUp)}
 """Effects that no catalogue effect explains."""
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, tilted, truth
+from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
@@ -50,13 +49,6 @@ OF_MOMENT = tuple(name for name in FORMS if name not in ('hysteresis', 'drive_in
 HIDDEN = (*OF_MOMENT, *BODIES, 'base_tilt')
 
 
-@dataclass(frozen=True)
-class LinkagePlantSettings:
-    """Time step of the simulation [s]."""
-
-    step: float
-
-
 class LinkagePlant:
     """A mechanism under efforts of its drives; it starts at home, an arm amid its ranges.
 
@@ -75,7 +67,8 @@ class LinkagePlant:
 
     Attributes
     ----------
-    time : float
+    time, time_step : float
+        [s]
     position, velocity : (D,) arrays
         Of the drives [m, rad].
     hidden : list of dict
@@ -96,7 +89,7 @@ class LinkagePlant:
 
     def __init__(self, model: ArmModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
-        self.settings = LinkagePlantSettings(1 / (rate * math.ceil(1 / (rate * LONGEST_STEP))))
+        self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
         self.model, self.engine = model, ArmEngine(model)
         self.structure = s = model.robot.structure
         random = np.random.default_rng(seed)
@@ -114,7 +107,8 @@ class LinkagePlant:
         self.hidden = [self._hide(name, motion, efforts, random, scale)
                        for name in _drawn(names, random)]
         home, _ = s.room(np.pi)  # where motions that are drawn begin
-        self.lower, self.upper = s.lower, s.upper
+        self.limits = model.limits
+        self.lower, self.upper = self.limits.strokes
         with np.errstate(invalid='ignore'):
             span = self.upper - self.lower
         self._span = np.where(np.isfinite(span), span, 2 * np.pi)
@@ -132,28 +126,17 @@ class LinkagePlant:
               scale: float) -> dict[str, Any]:
         model = self.model
         if name == 'payload_mass':
-            mass = scale * float(random.uniform(0.05, 0.12) * model.robot.masses.sum())
-            self.engine.add_payload(mass, np.zeros(3))
-            return truth(name, None, {'mass': mass}, 'a point at the tool\'s origin')
+            return self.engine.hide_payload(random, scale, 0.0)
         if name == 'link_mass':
             links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier]
             if not links:
                 raise HiddenEffectError('link_mass needs a link beside that of the tool')
-            body = int(random.choice(links))
-            mass = scale * float(random.uniform(0.1, 0.3) * model.robot.masses[body])
-            self.engine.add_to_link(body, mass)
-            return truth(name, None, {f'{model.robot.body_names[body]}.mass': mass},
-                         'a point at its centre')
+            return self.engine.hide_link_mass(random, scale, links)
         if name == 'base_tilt':
-            angle = scale * float(random.uniform(0.01, 0.03))
-            self.engine.gravity = tilted(self.engine.gravity, angle)
-            return truth(name, None, {'x': angle, 'y': 0.0}, 'about x')
+            return self.engine.hide_tilt(random, scale)
         j = int(random.integers(len(model.drives)))
-        assert motion.time is not None
-        moment = JointMoment(
-            motion.time, motion.position[:, j], motion.velocity[:, j], motion.acceleration[:, j],
-            np.abs(efforts[:, j]), float(self.largest[j]),
-            float(np.abs(motion.velocity[:, j]).max()), float(model.gear_ratios[j]))
+        moment = JointMoment.along(motion, j, np.abs(efforts[:, j]), self.largest[j],
+                                   model.gear_ratios[j])
         drawn = draw_form(name, random, moment, scale)
         self._pushes.append((j, name, drawn, moment))
         return truth(name, [model.drives[j]], drawn, FORMS[name].form)
@@ -201,7 +184,7 @@ class LinkagePlant:
         UnsolvedError
             Where the step has no solution that means anything.
         """
-        h, v, a = self.settings.step, self.velocity, self._acceleration
+        h, v, a = self.time_step, self.velocity, self._acceleration
         middle = self.position + h / 2 * v + h * h / 8 * a
         acceleration = self.acceleration(middle, v + h / 2 * a, effort, v, h / 2)
         velocity = v + h * acceleration

@@ -37,13 +37,13 @@ import numpy as np
 from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.errors import PprsError, SingularityError
+from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.simulation.closed_chains import (
     DRIVE_DOFS,
     ClosedChains,
     Equations,
 )
-from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     BodyChange,
     DriveMoment,
@@ -139,6 +139,11 @@ class Plant:
     effects : sequence of HiddenEffect
     settings : PlantSettings, optional
 
+    Attributes
+    ----------
+    effects : tuple of HiddenEffect
+        Those that are hidden in it now.
+
     Raises
     ------
     MissingLibraryError
@@ -148,34 +153,35 @@ class Plant:
     def __init__(self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (),
                  settings: PlantSettings | None = None) -> None:
         self.settings, self._values = settings or PlantSettings(), values
-        self.lower = np.repeat([values['limits.slide_stroke'][0],
-                                values['limits.lift_stroke'][0]], 3)
-        self.upper = np.repeat([values['limits.slide_stroke'][1],
-                                values['limits.lift_stroke'][1]], 3)
-        self._friction = EngineFriction(
-            values, np.asarray(self.settings.drive_width), self.settings.passive_width,
-            self.settings.friction)
-        self._effects: tuple[HiddenEffect, ...] = ()
+        self.time_step = self.settings.step
+        self.limits = Limits.of(values)
+        self.lower, self.upper = self.limits.strokes
+        self.resistance = Resistance(values, self.settings.drive_width,
+                                     self.settings.passive_width, self.settings.friction)
+        self.effects: tuple[HiddenEffect, ...] = ()
         self.chains = self._with(effects)
+        # A copy without hidden effects, of which the drives' control knows the weight.
+        self._known = ClosedChains(values)
+        self._held = np.zeros(6)
         self.time = 0.0
         self.velocity = np.zeros(6)
         self._all_velocities = np.zeros(15)
         self._acceleration = np.zeros(15)
         self._loads = np.zeros(12)
         strokes = self.upper - self.lower
-        self._fastest = LONGEST_MOVE * float(strokes.min()) / self.settings.step
+        self._fastest = LONGEST_MOVE * float(strokes.min()) / self.time_step
         self._widest = 3 * float(strokes.max())  # a whole stroke beyond the end
         self.place(self.position)
 
     def _with(self, effects: Sequence[HiddenEffect]) -> ClosedChains:
         """Take effects, and return the bodies with them."""
         chains = ClosedChains(self._values)
-        self.resistance = Resistance(self._friction, effects, self._effects)
+        self.resistance.use_effects(effects)
         self._structure_forces = [e for e in effects if isinstance(e, StructureForce)]
         self._body_changes = [e for e in effects if isinstance(e, BodyChange)]
         for change in self._body_changes:
             change.apply(chains, self._values)
-        self._effects = tuple(effects)
+        self.effects = tuple(effects)
         return chains
 
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
@@ -183,6 +189,24 @@ class Plant:
         before = self.chains.qpos.copy()
         self.chains = self._with(effects)
         self.chains.qpos[:] = before
+
+    @property
+    def hidden(self) -> list[dict[str, Any]]:
+        """What is hidden in it: name, drives, parameters and form of each effect."""
+        return [effect.truth() for effect in self.effects]
+
+    def holding(self, position: Array) -> Array:
+        """Return the efforts [N] that hold the model's weight at drive positions (6,) [m].
+
+        Where it cannot close there, those of the last that did.
+        """
+        kept = self._known.qpos.copy()
+        try:
+            self._known.place_drives(position)
+            self._held = self._known.evaluate(np.zeros(6)).drive_bias
+        except SingularityError:
+            self._known.qpos[:] = kept
+        return self._held
 
     @property
     def position(self) -> Array:
@@ -216,7 +240,7 @@ class Plant:
         UnsolvedError
             Where the step has no solution that means anything.
         """
-        h, chains = self.settings.step, self.chains
+        h, chains = self.time_step, self.chains
         qpos, y, last = chains.qpos, self.velocity, self._acceleration
         for change in self._body_changes:
             change.advance(chains, self.time + h / 2)

@@ -1,18 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Velocity-dependent resistance to the drives, and the acceleration with it."""
+"""Velocity-dependent resistance to the drives, and the acceleration with it.
+
+By the model file's numbers a joint resists with c v + mu N tanh(v / v_rev); a spherical joint along
+the relative angular velocity of rod and platform. N comes from the engine's inverse dynamics. The
+width v_rev may differ from the model's: that is one of the ways in which a robot is unlike its
+model. Arrays of 12 hold the drives, C_1..C_3, A_1..A_3.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import Equations
-from pprs_dynamics.simulation.engine_friction import EngineFriction
 from pprs_dynamics.simulation.hidden_effect import (
     DriveForce,
     DriveMoment,
@@ -27,6 +34,8 @@ FORCE_TOLERANCE = 1e-8  # [N]
 RESOLVED_SHARE = 0.1
 ITERATIONS = 40
 SMALLEST_SHARE = 1 / 64  # of a Newton step that would not lower the error
+# Speeds are taken as at least this share of the width: tanh(s)/s is 1 there to rounding.
+SMALLEST_SPEED = 1e-6
 VELOCITY_NUDGE = 1e-7  # [m/s], for slopes of hidden forces; below every width of turning over
 
 # Joint (of 12) to which each relative velocity (of 18) belongs.
@@ -39,23 +48,46 @@ class Resistance:
 
     Parameters
     ----------
-    friction : EngineFriction
-        By the model file.
-    effects : sequence of HiddenEffect
-        Those of other kinds are left to others.
-    running : sequence of HiddenEffect
-        Those that act already: they keep their memory.
+    values : mapping
+        Flat keys and values of a model file.
+    drive_width : float or (6,) array_like
+        Width in which the drives' friction turns over, as a multiple of the model file's.
+    passive_width : float
+        The same for the passive joints.
+    friction : bool
+        False for a robot without friction of its own.
     """
 
-    def __init__(self, friction: EngineFriction, effects: Sequence[HiddenEffect],
-                 running: Sequence[HiddenEffect] = ()) -> None:
-        self.friction = friction
+    def __init__(self, values: Mapping[str, Any], drive_width: ArrayLike = 1.0,
+                 passive_width: float = 1.0, friction: bool = True) -> None:
+        joints = [{key: values[f'friction.{joint}.{key}'] for key in
+                   ('viscous', 'coulomb', 'diameter')} for joint in ('revolute', 'spherical')]
+        self.viscous = np.concatenate((
+            values['friction.drives.viscous'], *([joint['viscous']] * 3 for joint in joints)))
+        self.dry = np.concatenate((
+            values['friction.drives.coulomb'],
+            *([joint['coulomb'] * joint['diameter'] / 2] * 3 for joint in joints)))
+        if not friction:
+            self.viscous, self.dry = np.zeros(12), np.zeros(12)
+        self.width = np.concatenate((
+            np.broadcast_to(np.multiply(drive_width, values['friction.reversal_velocity']), 6),
+            np.full(6, passive_width * values['friction.reversal_rate'])))
+        self._smallest_squares = (SMALLEST_SPEED * self.width) ** 2
+        self._resolved = RESOLVED_SHARE * float(self.width[:6].min())
+        self.drive_forces: list[DriveForce] = []
+        self._passive_friction: list[HiddenJointFriction] = []
+
+    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+        """Have these hidden effects from now on; those of other kinds are left to others.
+
+        Those that act already keep their memory.
+        """
+        running = self.drive_forces
         self.drive_forces = [e for e in effects if isinstance(e, DriveForce)]
         self._passive_friction = [e for e in effects if isinstance(e, HiddenJointFriction)]
         for force in self.drive_forces:
             if force not in running:
-                force.prepare(friction)
-        self._resolved = RESOLVED_SHARE * float(friction.width[:6].min())
+                force.prepare(self.dry[:6], self.width[:6])
 
     def in_drives(self, equations: Equations, moment: DriveMoment, loads: Array) -> Array:
         """Return the additional drive forces [N], (6,), at loads (12,) [N]."""
@@ -127,9 +159,15 @@ class Resistance:
         relative : (..., 18) array
             Relative velocities, see `Equations.rates`.
         loads : (..., 12) array
+            N [N].
         """
         squares = (relative * relative).dot(SUM_PER_JOINT)
-        resistances, slopes = self.friction.resist(squares, loads)
+        speeds = np.sqrt(squares + self._smallest_squares)
+        sign = np.tanh(speeds / self.width)
+        dry = self.dry * loads
+        resistances: Array = self.viscous + dry * sign / speeds
+        sign = sign[..., :6]
+        slopes: Array = self.viscous[:6] + dry[..., :6] / self.width[:6] * (1.0 - sign * sign)
         for effect in self._passive_friction:
             part = slice(6, 9) if effect.joint == 'revolute' else slice(9, 12)
             resistances[..., part] += effect.resistance(

@@ -12,12 +12,13 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect, SensorEffect
+from pprs_dynamics.simulation.hidden_effect import HiddenEffect, Range, SensorEffect
 
 # Correlation times of the slow processes that add up to 1/f noise [samples], a factor 4 apart:
 # the sum follows 1/f within 10 % from 1/200 of the sampling rate down to 1/400 000 of it.
@@ -247,3 +248,28 @@ class Sensors:
         newer = np.array([self._past[min(whole[i], last)][quantity][i] for i in drives])
         older = np.array([self._past[min(whole[i] + 1, last)][quantity][i] for i in drives])
         return newer + share * (older - newer)
+
+
+class EffortGain(SensorEffect):
+    """A drive constant that is not what the amplifier thinks."""
+
+    name: ClassVar[str] = 'effort_gain'
+    form: ClassVar[str] = 'measured effort = (1 + gain) effort'
+    ranges: ClassVar[dict[str, Range]] = {'gain': Range('1', 0.03, 0.12, 'signed', scales=True)}
+
+
+class HomingError(SensorEffect):
+    """A drive whose zero is off: it is elsewhere than its encoder, and its control, believe."""
+
+    name: ClassVar[str] = 'homing_error'
+    form: ClassVar[str] = 'measured position = position + zero'
+    ranges: ClassVar[dict[str, Range]] = {'zero': Range('m', 0.0005, 0.003, 'signed', scales=True)}
+
+
+class TimeDelay(SensorEffect):
+    """Effort measured late (positive), or early because all encoders' values are late."""
+
+    name: ClassVar[str] = 'time_delay'
+    form: ClassVar[str] = ('measured effort (t) = effort (t - delay), '
+                           'by late encoders where delay < 0')
+    ranges: ClassVar[dict[str, Range]] = {'delay': Range('s', 0.003, 0.015, 'signed', scales=True)}

@@ -16,8 +16,12 @@ import pytest
 from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.arm_excitation import _Information, excite_arm
-from pprs_dynamics.inference.experiments.arm_motions import ArmLimits, ArmMotions
+from pprs_dynamics.inference.experiments.arm_motions import (
+    ArmLimits,
+    ArmMotions,
+    _Information,
+    excite_arm,
+)
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model

@@ -15,11 +15,9 @@ import pytest
 from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.inference.adoption.refit import refit_base
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.fit.arm_columns import columns_of
-from pprs_dynamics.inference.fit.arm_fit import fit_arm
-from pprs_dynamics.inference.fit.base_fit import fit_base
+from pprs_dynamics.inference.fit.arm_fit import columns_of, fit_arm
+from pprs_dynamics.inference.fit.base_fit import fit_base, refit_base
 from pprs_dynamics.inference.fit.bodies import Bodies, pseudo_inertia
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording

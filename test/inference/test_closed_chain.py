@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import ArmModel
-from pprs_dynamics.inference.fit.arm_columns import columns_of
-from pprs_dynamics.inference.fit.arm_fit import fit_arm
+from pprs_dynamics.inference.fit.arm_fit import columns_of, fit_arm
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS

@@ -14,7 +14,7 @@ from benchmarks.hidden.recordings import Case, make_case
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.inference.experiments.fourier_path import FourierFamily, FourierPath
+from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
@@ -213,10 +213,11 @@ WRENCH = {'force_x': 0.66, 'force_y': 0.78, 'force_z': 0.1,
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     true = build_model({**MODEL.values, 'effects.active': ['base_tilt'],
                         'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
-    family = FourierFamily(TIME[-1], np.tile((1, 2, 3), (6, 1)), HOME)
+    family = FourierPath.at_rest(TIME[-1], np.tile((1, 2, 3), (6, 1)), HOME)
     up_and_down = np.zeros((6, family.size // 6))
     up_and_down[2] = 0.03, -0.02, 0.04
-    found = diagnose(MODEL, [record(true, 0.08, motion=family.path(up_and_down.ravel()))])
+    motion = family.with_parameters(up_and_down.ravel())
+    found = diagnose(MODEL, [record(true, 0.08, motion=motion)])
     assert [one.name for one in found.effects] == ['base_tilt']
     assert found.effects[0].parameters['x'].value == pytest.approx(0.045, abs=5e-4)
     assert found.effects[0].parameters['y'].value == pytest.approx(-0.048, abs=5e-4)

@@ -16,7 +16,7 @@ from pprs_dynamics import DriveModel, load_model
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.adopt_curve import without_curve
+from pprs_dynamics.inference.adoption.fit_curve import without_curve
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.measured_curve import Curve, spline_basis

@@ -17,17 +17,21 @@ from ros_processes import executable
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
-from pprs_dynamics.inference.experiments.commissioning import commissioning
-from pprs_dynamics.inference.experiments.criteria import Contest, Explanation, Precision
-from pprs_dynamics.inference.experiments.fourier_path import FourierFamily
-from pprs_dynamics.inference.experiments.information import Information, whitened
+from pprs_dynamics.inference.experiments.criteria import (
+    Contest,
+    Explanation,
+    Information,
+    Precision,
+    whitened,
+)
+from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.inference.experiments.next_experiment import (
     PurposeError,
     experiment_of,
     next_experiment,
 )
-from pprs_dynamics.inference.experiments.question import question_after
+from pprs_dynamics.inference.experiments.question import commissioning, question_after
 from pprs_dynamics.inference.experiments.trajectory_search import (
     NoMotionError,
     TrajectorySearch,
@@ -59,7 +63,7 @@ from pprs_dynamics.physics.model.parameter_file import default_parameters
 
 DURATION = 8.0
 HARMONICS = np.array([[1, 2, 4], [1, 3, 5], [2, 3, 4], [1, 2, 3], [1, 4, 5], [2, 4, 5]])
-FAMILY = FourierFamily(DURATION, HARMONICS, (0.0, 0.0, 0.5))
+FAMILY = FourierPath.at_rest(DURATION, HARMONICS, (0.0, 0.0, 0.5))
 TOLERANT = {'tolerances.masses.payload': 0.05, 'tolerances.friction.drives.coulomb': 0.1}
 
 
@@ -86,8 +90,8 @@ def recorded(model: DriveModel, motion: PlatformMotion, seed: int, noise: float)
 # Paths.
 
 def test_a_path_starts_and_ends_at_rest_in_the_same_pose(parameters: np.ndarray) -> None:
-    ends = FAMILY.path(parameters).motion(np.array([0.0, DURATION]))
-    middle = FAMILY.path(parameters).motion(np.linspace(1.0, DURATION - 1.0, 50))
+    ends = FAMILY.with_parameters(parameters).motion(np.array([0.0, DURATION]))
+    middle = FAMILY.with_parameters(parameters).motion(np.linspace(1.0, DURATION - 1.0, 50))
     assert np.allclose(ends.position, (0.0, 0.0, 0.5), atol=1e-12)
     assert np.allclose(np.abs(ends.orientation), (0.0, 0.0, 0.0, 1.0), atol=1e-12)
     for name in ('linear_velocity', 'angular_velocity', 'linear_acceleration',
@@ -98,7 +102,7 @@ def test_a_path_starts_and_ends_at_rest_in_the_same_pose(parameters: np.ndarray)
 
 def test_velocities_and_accelerations_are_those_of_the_poses(parameters: np.ndarray) -> None:
     time = np.linspace(0.0, DURATION, 4001)
-    exact = FAMILY.path(parameters).motion(time)
+    exact = FAMILY.with_parameters(parameters).motion(time)
     spline = PlatformMotion.from_poses(time, exact.position, exact.orientation)
     inside = slice(20, -20)  # a spline is poor at its ends
     for name, tolerance in (('linear_velocity', 1e-7), ('angular_velocity', 1e-5),
@@ -129,7 +133,7 @@ EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_
 def design(model: DriveModel, parameters: np.ndarray) -> Design:
     """Columns on a recording of a robot that has effects already."""
     model = DriveModel.from_parameters({**model.values, **EFFECTS})
-    motion = FAMILY.path(parameters).motion(np.arange(0.0, DURATION, 0.002))
+    motion = FAMILY.with_parameters(parameters).motion(np.arange(0.0, DURATION, 0.002))
     return Design.of(model, [recorded(model, motion, 0, 0.0)])
 
 
@@ -137,7 +141,7 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     design: Design, parameters: np.ndarray,
 ) -> None:
     """The columns on a motion nobody made agree with those of the diagnosis on its recording."""
-    path = FAMILY.path(parameters)
+    path = FAMILY.with_parameters(parameters)
     regression = Regression(design.residuals, design.base)
     white = np.zeros((6, len(regression.noise_shapes.corners) + 1))
     white[:, 0] = 0.05 ** 2
@@ -166,7 +170,7 @@ def test_a_drive_that_stood_may_turn_over_in_a_motion(
     found = []
     for one in (design, stood):
         plan = ColumnPlan.of_design(one, ())
-        forces = forces_of(plan.model, [FAMILY.path(parameters)], time)
+        forces = forces_of(plan.model, [FAMILY.with_parameters(parameters)], time)
         index, rows = plan.on_motions(forces, time)[0][2]
         mine = [k for k, at in enumerate(index) if isinstance(plan.base[at], ReversalShape)
                 and plan.base[at].drive == 2]
@@ -176,7 +180,7 @@ def test_a_drive_that_stood_may_turn_over_in_a_motion(
 
 
 def test_few_samples_tell_nearly_the_same(model: DriveModel, parameters: np.ndarray) -> None:
-    path = FAMILY.path(parameters)
+    path = FAMILY.with_parameters(parameters)
     noise = NoiseSpectrum(np.array([1.7]), np.array([7e-4, 0.25]), 0.01)
     question = commissioning(model, [], 0.05)
     plan = replace(question.plan, terms=(TERMS[1], TERMS[4]))
@@ -247,7 +251,7 @@ def test_use_of_limits_is_measured_against_what_the_margin_leaves(
     model: DriveModel, parameters: np.ndarray,
 ) -> None:
     time = np.linspace(0, DURATION, 500)
-    forces = forces_of(model, [FAMILY.path(parameters)], time)
+    forces = forces_of(model, [FAMILY.with_parameters(parameters)], time)
     limits = MotionLimits(velocity=0.4, margin=0.2, effort_reserve=1.0)
     uses = dict(zip(limit_names(model), limits.uses(model, forces, 500)[0], strict=True))
     state = forces.mechanism
@@ -286,9 +290,9 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(
     assert np.abs(forces.mechanism.chains.sin_u).min() >= 0.5
     tight.limits.check_efforts(forces.total)
     again = TrajectorySearch(question, limits, DURATION, 1).run()
-    assert np.array_equal(found.path.cosines, again.path.cosines)
+    assert np.array_equal(found.path.parameters, again.path.parameters)
     other = TrajectorySearch(question, limits, DURATION, 2).screen(draws=1)[0]
-    assert not np.array_equal(found.path.harmonics, other.family.harmonics)
+    assert not np.array_equal(found.path.harmonics, other.path.harmonics)
 
 
 def test_improving_a_motion_makes_it_tell_more(
@@ -350,7 +354,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
         **model.values, 'effects.active': ['coulomb_friction'],
         'effects.coulomb_friction.lift_1.force': 0.6})
     time = np.arange(0.0, DURATION, 0.004)
-    path = FAMILY.path(parameters)
+    path = FAMILY.with_parameters(parameters)
     old = recorded(robot, path.motion(time), 1, 0.1)
     fits = FittedSets(Design.of(model, [old]), DECISIONS)
     fits.evaluate(())
@@ -379,8 +383,8 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
         assert contest.now == costs[contest.rival.name] - costs[contest.truth.name]
     # What the same motion tells again doubles the misfit and leaves the priors as they are.
     fine = np.arange(0.0, DURATION, 0.002)
-    columns = question.plan.on_motions(forces_of(model, [path], fine), fine, 5)[0]
-    again = question.known + question.information.of_motion(columns, DURATION)
+    again = question.known + question.grams(
+        forces_of(model, [path], fine), fine, DURATION, 5)[0]
     for contest in question.contests:
         once = contest.misfit(question.known)
         assert once < contest.misfit(again) < 2.6 * once + 1.0

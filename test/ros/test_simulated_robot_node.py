@@ -181,7 +181,7 @@ def test_a_hidden_effect_acts() -> None:
         assert running.spin_until(lambda: len(robot.states) > 500, 60)
         # Encoder steps keep the loop busy: a mean over two seconds.
         change = np.mean([state.effort for state in robot.states[-200:]], axis=0) - WEIGHT
-        truth = robot.node._robot.effects[0].truth()
+        truth = robot.node._robot.plant.effects[0].truth()
         for k, drive in enumerate(DRIVES):
             expected = truth['parameters'].get(drive, {}).get('force', 0.0)
             assert change[k] == pytest.approx(expected, abs=0.05), drive
@@ -202,7 +202,7 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
     place, stamp = robot.position, robot.states[-1].header.stamp
     assert change('hidden_effects', ['effort_offset:lift_2']).successful
     assert change('hidden_effects', ['effort_offset:lift_2', 'homing_error:slide_1']).successful
-    offset, zero = robot.node._robot.effects
+    offset, zero = robot.node._robot.plant.effects
     expected = WEIGHT + [offset.parameters.get(drive, {}).get('force', 0.0) for drive in DRIVES]
     robot.states.clear()
     # Friction creeps until the loop carries all; then the mean of half a second.
@@ -211,7 +211,7 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
     np.testing.assert_allclose(effort[4:], expected[4:], atol=0.1)
     assert np.abs(robot.states[0].velocity).max() < 1.0  # a moved zero is no jump of the drive
     assert change('hidden_effects', ['homing_error:slide_1']).successful
-    assert robot.node._robot.effects == (zero,)
+    assert robot.node._robot.plant.effects == (zero,)
     assert conversions.nanoseconds(robot.states[-1].header.stamp) > conversions.nanoseconds(stamp)
     np.testing.assert_allclose(robot.position, place, atol=1e-3)
     for name, value, words in (
@@ -227,10 +227,10 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
         assert not answer.successful
         assert words in answer.reason
         assert len(answer.reason.splitlines()) == 1
-    assert robot.node._robot.effects == (zero,)
+    assert robot.node._robot.plant.effects == (zero,)
     assert change('stiffness', 4000.0).successful  # a dump of the parameters loads
     assert change('hidden_effects', []).successful
-    assert robot.node._robot.effects == ()
+    assert robot.node._robot.plant.effects == ()
 
 
 def test_it_restarts_where_it_was_killed(ros_domain: int, tmp_path: Path) -> None:

@@ -23,10 +23,9 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.arm_run import draw_motion
-from pprs_dynamics.simulation.export.exported_robot import export_robot
+from pprs_dynamics.simulation.export.exported_robot import TreePositions, export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
 from pprs_dynamics.simulation.export.replay import Replay, replay_excitation
-from pprs_dynamics.simulation.export.tree_positions import TreePositions
 from pprs_dynamics.simulation.export.writers import closures, written
 
 EXACT = 1e-9  # of the largest effort

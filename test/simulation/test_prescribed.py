@@ -19,12 +19,16 @@ from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_bodies import PayloadPickUp
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
-from pprs_dynamics.simulation.hidden_forces import EffortOffset
-from pprs_dynamics.simulation.hidden_friction import CoulombFriction, Hysteresis
-from pprs_dynamics.simulation.hidden_sensors import EffortGain, HomingError, TimeDelay
+from pprs_dynamics.simulation.hidden_forces import Hysteresis, coulomb_friction, effort_offset
 from pprs_dynamics.simulation.plant import PlantSettings
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
-from pprs_dynamics.simulation.simulated_run import DriveReference, SimulatedRun, simulate
+from pprs_dynamics.simulation.sensors import (
+    EffortGain,
+    EffortNoise,
+    HomingError,
+    SensorSettings,
+    TimeDelay,
+)
+from pprs_dynamics.simulation.virtual_robot import DriveReference, SimulatedRun, simulate
 
 MODEL = DriveModel.load('config/paper.yaml')
 # The plant iterates loads until what is left in the forces is below mu times 3e-5 N.
@@ -85,7 +89,7 @@ def run_plant(effects: list[HiddenEffect], actual_loads: bool = False) -> Simula
         size * rates * np.cos(rates * time + phases))
     quiet = SensorSettings(quantisation=0.0, true_velocity=True, white_noise=0.0,
                            coloured_noise=0.0)
-    return simulate(MODEL, reference, effects, sensors=quiet,
+    return simulate(MODEL.values, reference, effects, sensors=quiet,
                     plant=PlantSettings(actual_loads=actual_loads),
                     control=ControlSettings(gravity_compensation=True))
 
@@ -185,7 +189,7 @@ def test_what_has_a_memory_is_delayed_as_it_is(name: str, motion: DrivenMotion) 
 def test_friction_that_turns_over_between_samples_is_delayed_without_rounding_it_off() -> None:
     fine, _ = excited(MODEL, rate=2 * RATE)
     coarse, _ = excited(MODEL)
-    hidden = [CoulombFriction({drive: {'force': 1.0, 'width': 0.0005} for drive in (
+    hidden = [coulomb_friction({drive: {'force': 1.0, 'width': 0.0005} for drive in (
         'slide_1', 'slide_2', 'slide_3')})]
     between = TimeDelay({f'slide_{i}': {'delay': 0.5 / RATE} for i in (1, 2, 3)})
     found = PrescribedPlant(MODEL.values, coarse).readings([*hidden, between]).effort[1:, :3]
@@ -196,7 +200,7 @@ def test_friction_that_turns_over_between_samples_is_delayed_without_rounding_it
 
 def test_gain_and_zero_change_what_is_measured_and_not_the_robot(motion: DrivenMotion) -> None:
     plant = PrescribedPlant(MODEL.values, motion)
-    offset = EffortOffset({'slide_1': {'force': 0.7}})
+    offset = effort_offset({'slide_1': {'force': 0.7}})
     faults = [EffortGain({'slide_1': {'gain': 0.1}}), HomingError({'lift_3': {'zero': 0.002}})]
     found, true = plant.readings([offset, *faults]), plant.readings([offset])
     np.testing.assert_allclose(found.effort, true.effort * [1.1, 1, 1, 1, 1, 1], rtol=1e-12)

@@ -170,8 +170,8 @@ class Inputs:
         from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
-            return tuple(RecordingEntry.of(name, one) if name in self.paths
-                         else RecordingEntry.of_samples(one) for name, one in recordings.items())
+            return tuple(RecordingEntry.of(one, name if name in self.paths else None)
+                         for name, one in recordings.items())
         return LedgerBook(entries(self.recordings), entries(self.validation))
 
 

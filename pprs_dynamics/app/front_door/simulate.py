@@ -170,8 +170,8 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
                           f'be one of {", ".join(FEEDFORWARDS)}', 'shape')
     from pprs_dynamics.simulation.hidden_effects import draw_effects
     from pprs_dynamics.simulation.sensors import SensorSettings
-    from pprs_dynamics.simulation.simulated_run import DriveReference
-    from pprs_dynamics.simulation.simulated_run import simulate as simulate_robot
+    from pprs_dynamics.simulation.virtual_robot import DriveReference
+    from pprs_dynamics.simulation.virtual_robot import simulate as simulate_robot
 
     if motion is None:
         path = Excitation(duration=duration, seed=path_seed)
@@ -180,8 +180,8 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     found.limits.check_strokes(forces.mechanism.position)
     effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
     run = simulate_robot(
-        found, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
-                              effort[feedforward]),
+        found.values, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
+                                     effort[feedforward]),
         draw_effects(names, np.random.default_rng(seed), scale), seed=seed, rate=RATE,
         truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
         sensors=SensorSettings.with_effort_noise(NOISE if noise is None else noise),

@@ -17,9 +17,15 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption import objections
-from pprs_dynamics.inference.adoption.adopt_curve import adopt_curve
 from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
-from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
+from pprs_dynamics.inference.adoption.fit_curve import (
+    CurveRequest,
+    FittedCurve,
+    fit_curve,
+    held_out_residuals,
+    with_curve,
+    without_curve,
+)
 from pprs_dynamics.inference.adoption.fit_effect import StandingError, fit_effect
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
@@ -38,12 +44,15 @@ from pprs_dynamics.inference.search.relinearisation import SettledSet
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import original_values
 from pprs_dynamics.physics.model.model_file import build_model
 
 # Shares of the work, for the progress bar.
 DIAGNOSIS, FIT = 0.5, 0.85
+DIAGNOSIS_BEFORE_CURVE = 0.7
+WEAK = 'blocks of the same recordings are weak evidence: give one'
 
 
 def adopt(
@@ -52,6 +61,8 @@ def adopt(
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
 ) -> Adoption:
     """Return a model with an effect, or why it should not have it.
+
+    A curve of the same drive that the model has already is replaced.
 
     Parameters
     ----------
@@ -66,18 +77,25 @@ def adopt(
     progress : callable, optional
         Called with the share of the work that is done.
     diagnosis : Diagnosis, optional
-        Of `original(model)` on the same recordings, where it is known already.
+        On the same recordings, where it is known already: of `original(model)`, and for a curve
+        of the model itself.
 
     Raises
     ------
     EffectRequestError
         For an effect that cannot act in what the model is of.
+    CurveError
+        Where the recordings cannot give the curve.
     PprsError
         As `measure_residuals`.
     """
-    if isinstance(request, CurveRequest):
-        return adopt_curve(model, request, recordings, validate, force, progress, diagnosis)
     report = progress or (lambda share: None)
+    if isinstance(request, CurveRequest):
+        if diagnosis is None:
+            diagnosis = diagnose(model, recordings, (),
+                                 lambda share: report(DIAGNOSIS_BEFORE_CURVE * share))
+        return _adopt_curve(
+            _Case(model, model, request, recordings, validate, force, diagnosis), request, report)
     request.require_place(model)
     start = original(model)
     if diagnosis is None:
@@ -114,8 +132,8 @@ def adopt(
     found += [*objections.of_linearity(promised, rms(after), after.unit),
               *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
     report(1.0)
-    return case.answer(fitted.model, fitted.drives, found, remarks, rivals, fitted.parameters,
-                       tuple(fitted.calibrated), before, after, held_out)
+    return case.answer(fitted.model, fitted.drives, found, [*remarks, *case.weakness(found)],
+                       before, after, held_out, fitted.parameters, tuple(fitted.calibrated), rivals)
 
 
 def original(model: ForceModel) -> ForceModel:
@@ -136,7 +154,7 @@ class _Case:
 
     model: ForceModel
     start: ForceModel
-    request: EffectRequest
+    request: EffectRequest | CurveRequest
     recordings: Sequence[Recording]
     validate: Sequence[Recording]
     force: bool
@@ -162,36 +180,37 @@ class _Case:
         # What the model's own numbers gain by being fitted is not the effect's.
         return (rms(given), rms(after)), block_gains(before, after, noises)
 
+    def weakness(self, objections: list[str]) -> list[str]:
+        """Return what to say of the evidence for an effect that nothing speaks against."""
+        return [] if objections or self.validate else [
+            f'{WEAK} in another regime (other speeds, other payload) with --validate']
+
     def without_model(self, reason: str) -> Adoption:
         """Return the refusal of an effect whose fit gives no model."""
         before, _ = measure_residuals(self.model, self.recordings)
-        error = rms(before)
-        held_out = rms(measure_residuals(self.model, self.validate)[0]) if self.validate else error
-        return Adoption(
-            self.request, self.request.drives, False, False, f'its fit gives no model: {reason}',
-            (reason,), (), {}, (), (), self.model, self.model, before, before, error, error,
-            held_out, held_out, VALIDATION if self.validate else BLOCKS,
-            self.diagnosis.noise_floor, self.diagnosis.noise_floors)
+        held_out = rms(measure_residuals(self.model, self.validate)[0] if self.validate else before)
+        refused = self.answer(self.model, self.request.drives, [reason], [], before, before,
+                              (held_out, held_out), {})
+        return replace(refused, adopted=False, forced=False,
+                       reason=f'its fit gives no model: {reason}')
 
     def answer(
         self, after: ForceModel, drives: tuple[str, ...] | None, found: list[str],
-        remarks: list[str], rivals: tuple[str, ...], parameters: dict[str, Estimate],
-        calibrated: tuple[Calibration, ...], residuals_before: Residuals,
-        residuals_after: Residuals, held_out: tuple[float, float],
+        remarks: list[str], residuals_before: Residuals, residuals_after: Residuals,
+        held_out: tuple[float, float], parameters: dict[str, Estimate],
+        calibrated: tuple[Calibration, ...] = (), rivals: tuple[str, ...] = (),
+        curve: FittedCurve | None = None,
     ) -> Adoption:
         """Return the answer to all objections that were found."""
         adopted = not found or self.force
         falls = f'{held_out[0]:.4g} to {held_out[1]:.4g} {residuals_before.unit}'
         reason = '; '.join(found) or f'the error on {self.held_out} falls from {falls}'
-        if not found and not self.validate:
-            remarks = [*remarks, 'blocks of the same recordings are weak evidence: give one in '
-                       'another regime (other speeds, other payload) with --validate']
         return Adoption(
             self.request, drives, adopted, bool(found) and self.force, reason, tuple(found),
             tuple(remarks), parameters, calibrated, rivals, self.model, after, residuals_before,
             residuals_after, rms(residuals_before), rms(residuals_after), *held_out,
             VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor,
-            self.diagnosis.noise_floors)
+            self.diagnosis.noise_floors, curve)
 
 
 def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
@@ -223,5 +242,43 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     report(1.0)
     effect = next(one for one in fitted.effects if one.name == name)
     return case.answer(
-        fitted, tuple(effect.drives) if isinstance(effect, DriveEffect) else None, refused, [], (),
-        estimate_present(fits, found, fitted, name), (), before, after, held_out)
+        fitted, tuple(effect.drives) if isinstance(effect, DriveEffect) else None, refused,
+        case.weakness(refused), before, after, held_out,
+        estimate_present(fits, found, fitted, name))
+
+
+def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:
+    model, drive, noise = case.model, request.drive, case.diagnosis.noise[request.drive]
+    plain = without_curve(model, drive)
+    start, _ = measure_residuals(plain, case.recordings)
+    fitted = fit_curve(start, request, noise)
+    after = with_curve(plain, drive, fitted)
+    residuals, _ = measure_residuals(after, case.recordings)
+    before = start if plain is model else measure_residuals(model, case.recordings)[0]
+    if case.validate:
+        given, found = (measure_residuals(one, case.validate)[0] for one in (plain, after))
+    else:
+        given, found = start, held_out_residuals(
+            start, request, noise, lambda share: report(
+                DIAGNOSIS_BEFORE_CURVE + (1 - DIAGNOSIS_BEFORE_CURVE) * share))
+    held_out = rms(given), rms(found)
+    count = len(model.drives)
+    # Chosen among the curves of every drive over every variable.
+    evidence = fitted.evidence - 2 * float(np.log(count * (len(OWN) + len(OF) * (count - 1))))
+    against = [] if evidence > 0 else [
+        f'no curve over {request.variable} is called for on {drive}: evidence {evidence:.3g}, '
+        'where 0 is the threshold']
+    against += objections.of_held_out_error(
+        *held_out, block_gains(given, found, {drive: noise}), model, case.held_out)
+    remarks = [f'a measured curve, not a cause: {fitted.freedom:.0f} degrees of freedom over '
+               f'{request.variable} from {fitted.curve.start:.4g} to {fitted.curve.end:.4g}; '
+               'beyond, it goes on with its last value']
+    if case.diagnosis.effects:
+        remarks.append('the recordings call for '
+                       f'{", ".join(one.name for one in case.diagnosis.effects)}: a curve that '
+                       'stands for it holds for this motion only; adopt causes first')
+    if not case.validate:
+        remarks.append(f'{WEAK} along another motion with --validate')
+    report(1.0)
+    return case.answer(after, request.drives, against, remarks, before, residuals, held_out,
+                       fitted.parameters(drive, start.units_of(drive).effort), curve=fitted)

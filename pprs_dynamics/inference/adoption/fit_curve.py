@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from pprs_dynamics.errors import PprsError, UnknownNameError
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.laws.measured_curve import (
     DEGREE,
     OF,
@@ -32,6 +34,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import (
     spline_basis,
 )
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model
 
 INTERVALS = (6, 12, 24, 48, 96, 192)  # between knots, tried
 # Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
@@ -40,6 +43,7 @@ WIDEST = 10.0  # prior standard deviation of the curve itself, as a multiple of 
 LEAST_SHARE = 0.002  # of the samples at each end of the variable, beyond which nothing is fitted
 TURN = 2 * pi
 BLOCKS = 10
+ACTIVE = 'effects.active'
 
 
 class CurveError(PprsError, ValueError):
@@ -108,15 +112,18 @@ class FittedCurve:
         Twice the gain in log restricted likelihood, the curve's coefficients integrated out.
     freedom : float
         Effective number of coefficients.
-    roughness : float
-        Prior standard deviation of second differences [N].
     """
 
     curve: Curve
     covariance: Array
     evidence: float
     freedom: float
-    roughness: float
+
+    def parameters(self, drive: str, unit: str) -> dict[str, Estimate]:
+        """Return the curve's values with their standard deviations, by key of the model file."""
+        spread = np.sqrt(np.diag(self.covariance))
+        return {f'{drive}.values[{k}]': Estimate(value, float(std), unit)
+                for k, (value, std) in enumerate(zip(self.curve.values, spread, strict=True))}
 
     def band(self, x: Array) -> Array:
         """Return the standard deviation of the curve at values of its variable, (N,)."""
@@ -185,7 +192,7 @@ def fit_curve(
     root = np.sqrt(noise.power(series.frequency))
     error = series.transform(series.error) / root
     scale = root_mean_square(series.error[series.known])
-    best: FittedCurve | None = None
+    found = []
     for intervals in INTERVALS:
         index, weight = spline_basis(x[series.index], start, end, intervals, turns)
         count = intervals + (0 if turns else DEGREE)
@@ -194,20 +201,15 @@ def fit_curve(
             np.add.at(columns, (index[:, k], np.arange(len(series))), weight[:, k])
         rows = series.transform(columns) / root
         gram, moment = rows @ rows.T, rows @ error
-        for fitted in _smoothed(gram, moment, scale, turns):
-            if best is None or fitted[2] > best.evidence:
-                values, covariance, evidence, freedom, roughness = fitted
-                best = FittedCurve(
-                    Curve(request.variable, float(start), float(end),
-                          tuple(map(float, values)), turns), covariance, evidence, freedom,
-                    roughness)
-    assert best is not None
-    return best
+        for values, covariance, evidence, freedom in _smoothed(gram, moment, scale, turns):
+            curve = Curve(request.variable, float(start), float(end), tuple(values.tolist()), turns)
+            found.append(FittedCurve(curve, covariance, evidence, freedom))
+    return max(found, key=lambda one: one.evidence)
 
 
 def _smoothed(gram: Array, moment: Array, scale: float, periodic: bool,
-              ) -> Iterator[tuple[Array, Array, float, float, float]]:
-    """Yield values, covariance, evidence, freedom and roughness for each prior of smoothness."""
+              ) -> Iterator[tuple[Array, Array, float, float]]:
+    """Yield values, covariance, evidence and freedom for each prior of smoothness."""
     count = len(gram)
     second = np.diff(np.eye(count), 2, axis=0)
     if periodic:
@@ -222,25 +224,46 @@ def _smoothed(gram: Array, moment: Array, scale: float, periodic: bool,
         inverse = np.linalg.inv(factor)
         covariance = inverse.T @ inverse
         logs = 2 * np.log(np.diag(factor)).sum() - np.linalg.slogdet(prior)[1]
-        yield (values, covariance, float(half @ half - logs),
-               float(np.trace(covariance @ gram)), deviation)
+        yield values, covariance, float(half @ half - logs), float(np.trace(covariance @ gram))
 
 
-def held_out_error(
+def held_out_residuals(
     residuals: Residuals, request: CurveRequest, noise: NoiseSpectrum,
     report: Callable[[float], None] = lambda share: None,
-) -> Array:
-    """Return a drive's error with the curve, each block's from a fit to the others, (M,)."""
+) -> Residuals:
+    """Return residuals whose model has the curve, in each block from a fit to the others."""
     drive, x = residuals.drives.index(request.drive), curve_variable(residuals, request)
-    error: Array = residuals.error[:, drive].copy()
+    model: Array = residuals.model.copy()
     edges = np.linspace(0, len(residuals), BLOCKS + 1).astype(int)
     for number, (first, last) in enumerate(pairwise(edges)):
         block = slice(int(first), int(last))
-        error[block] -= fit_curve(residuals, request, noise, block).curve.force(x[block])
+        model[block, drive] += fit_curve(residuals, request, noise, block).curve.force(x[block])
         report((number + 1) / BLOCKS)
-    return error
+    return replace(residuals, model=model)
 
 
-def price(drives: int, variables: int) -> float:
-    """Return what choosing one curve among all costs [2 log odds]."""
-    return 2.0 * float(np.log(drives * variables))
+def with_curve(model: ForceModel, drive: str, fitted: FittedCurve) -> ForceModel:
+    """Return a model with a curve on a drive."""
+    curve, prefix = fitted.curve, f'effects.{MeasuredCurve.name}.{drive}'
+    active = [name for name in model.values.get(ACTIVE, ()) if name != MeasuredCurve.name]
+    return _built(model, {
+        **model.values, ACTIVE: [*active, MeasuredCurve.name],
+        f'{prefix}.variable': curve.variable, f'{prefix}.from': curve.start,
+        f'{prefix}.to': curve.end, f'{prefix}.periodic': curve.periodic,
+        f'{prefix}.values': list(curve.values)})
+
+
+def without_curve(model: ForceModel, drive: str) -> ForceModel:
+    """Return a model without a drive's curve: itself, where there is none."""
+    prefix = f'effects.{MeasuredCurve.name}.'
+    if not any(key.startswith(f'{prefix}{drive}.') for key in model.values):
+        return model
+    values = {key: value for key, value in model.values.items()
+              if not key.startswith(f'{prefix}{drive}.')}
+    if not any(key.startswith(prefix) for key in values):
+        values[ACTIVE] = [name for name in values[ACTIVE] if name != MeasuredCurve.name]
+    return _built(model, values)
+
+
+def _built(model: ForceModel, values: dict[str, Any]) -> ForceModel:
+    return replace(build_model(values), source=model.source)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from os import PathLike
@@ -30,18 +29,10 @@ class RecordingEntry:
     span: tuple[float, float]
 
     @classmethod
-    def of(cls, path: str | PathLike[str], recording: Recording) -> RecordingEntry:
-        """Return what the ledger says of a recording from a file."""
-        return cls._of(recording, fingerprint(path))
-
-    @classmethod
-    def of_samples(cls, recording: Recording) -> RecordingEntry:
-        """Return what the ledger says of a recording that came from no file."""
-        return cls._of(recording, samples_fingerprint(recording))
-
-    @classmethod
-    def _of(cls, recording: Recording, sha256: str) -> RecordingEntry:
+    def of(cls, recording: Recording, path: str | PathLike[str] | None = None) -> RecordingEntry:
+        """Return what the ledger says of a recording, which may come from no file."""
         time = recording.epoch + recording.time
+        sha256 = samples_fingerprint(recording) if path is None else fingerprint(path)
         return cls(recording.name, sha256, (float(time[0]), float(time[-1])))
 
 
@@ -56,12 +47,6 @@ class LedgerBook:
 
     fitted: tuple[RecordingEntry, ...]
     validation: tuple[RecordingEntry, ...]
-
-    @classmethod
-    def of(cls, fitted: Mapping[str, Recording], validation: Mapping[str, Recording]) -> LedgerBook:
-        """Make it from recordings by path."""
-        return cls(tuple(RecordingEntry.of(*one) for one in fitted.items()),
-                   tuple(RecordingEntry.of(*one) for one in validation.items()))
 
     def entered(self, adoption: Adoption) -> ForceModel:
         """Return the model of an adoption with its step in the ledger."""

@@ -1,7 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Criteria of experiment design: expected evidence between rival models; D-optimality of numbers.
+"""Information of a motion, and criteria of experiment design.
+
+Information (Gram) matrices are those of columns under the noise of the drives: as in a fit, columns
+are transformed by the orthonormal DCT and divided by the root of the noise's power spectrum.
+Criteria are the expected evidence between rival models, and D-optimality of numbers.
 
 References
 ----------
@@ -13,15 +17,18 @@ K. Chaloner, I. Verdinelli, Bayesian experimental design: a review, Statistical 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
+from scipy import fft
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.experiments.columns import FittedTerm
+from pprs_dynamics.inference.experiments.columns import ColumnPlan, Columns, FittedTerm
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 
 WEAK = 1e-9  # prior precision of what is free, relative to what is known of it
 # A direction of less information, per scale, is unknown, and so is what has a share in it.
@@ -29,11 +36,57 @@ UNSEEN, WEIGHT = 1e-8, 1e-4
 EVIDENCE_FLOOR = 1.0  # misfits below it count as none
 
 
-class Criterion(Protocol):
-    """Objective of a design, to be maximised."""
+@dataclass(frozen=True)
+class Information:
+    """Gram matrices of a plan's columns, (P, P).
 
-    def value(self, gram: Array) -> float:
-        """Return it for the information of recordings, motion and prior together, (P, P)."""
+    Parameters
+    ----------
+    plan : ColumnPlan
+    noise : mapping of drive to NoiseSpectrum
+        Other drives tell nothing.
+    """
+
+    plan: ColumnPlan
+    noise: Mapping[int, NoiseSpectrum]
+
+    def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
+        """Return what recordings tell, and what is known of the base columns beforehand."""
+        white = {}
+        for d, (index, rows) in self.plan.on_recordings(design).items():
+            if d in self.noise:
+                series = regression.series[d]
+                factor = series.spread(np.sqrt(regression.weights(fit, d)))
+                white[d] = index, series.transform(rows) * factor
+        return self._gram(white) + self.prior()
+
+    def prior(self) -> Array:
+        """Return what is known of the base columns beforehand."""
+        known = np.zeros(self.plan.size)
+        known[:len(self.plan.base)] = [column.precision for column in self.plan.base]
+        return np.diag(known)
+
+    def of_motion(self, columns: Columns, duration: float) -> Array:
+        """Return what a motion of some duration [s] would tell, however densely it is sampled."""
+        return self._gram({d: (index, whitened(rows, self.noise[d], duration))
+                           for d, (index, rows) in columns.items() if d in self.noise})
+
+    def _gram(self, white: Columns) -> Array:
+        gram = np.zeros((self.plan.size, self.plan.size))
+        for index, rows in white.values():
+            gram[np.ix_(index, index)] += rows @ rows.T
+        return gram
+
+
+def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:
+    """Return the DCT of rows of a motion, (p, n), per standard deviation of the noise.
+
+    Fewer samples than the noise has count for as many, as long as they follow the motion.
+    """
+    count = rows.shape[-1]
+    density = noise.power(np.arange(count) / (2 * duration)) * count * noise.period / duration
+    white: Array = fft.dct(rows, norm='ortho', axis=-1) / np.sqrt(density)
+    return white
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ excitation).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,43 +30,6 @@ from pprs_dynamics.physics.three_pprs.joint_series import resting_series
 
 FREEDOMS = 6  # x, y, z [m]; turns about z, then y, then x [rad]
 CONDITIONS = 3  # on each series, for rest at its ends
-GRID = 200  # times at which a series' peak is taken
-
-
-@dataclass(frozen=True)
-class FourierFamily:
-    """All rest-to-rest series of given harmonics; `size` free parameters.
-
-    Parameters
-    ----------
-    duration : float
-        [s]
-    harmonics : (6, K) int array
-        Of each degree of freedom, K of at least 2, different and at least 1.
-    centre : 3 floats
-        Where the platform starts and ends, unturned [m].
-    """
-
-    duration: float
-    harmonics: np.typing.NDArray[np.int_]
-    centre: tuple[float, float, float]
-
-    @property
-    def size(self) -> int:
-        """Number of free parameters."""
-        return FREEDOMS * (2 * int(self.harmonics.shape[1]) - CONDITIONS)
-
-    def path(self, parameters: Array) -> FourierPath:
-        """Return the path of parameters, (size,): lengths [m], then angles [rad].
-
-        Each is about the excursion of one series that satisfies the conditions.
-        """
-        rows = np.reshape(parameters, (FREEDOMS, -1))
-        coefficients = np.stack([resting_series(tuple(row.tolist())) @ own
-                                 for row, own in zip(self.harmonics, rows, strict=True)])
-        K = self.harmonics.shape[1]
-        return FourierPath(self.duration, self.harmonics, coefficients[:, :K],
-                           coefficients[:, K:], self.centre)
 
 
 @dataclass(frozen=True)
@@ -78,17 +41,38 @@ class FourierPath:
     duration : float
         [s]
     harmonics : (6, K) int array
-    cosines, sines : (6, K) arrays
-        a_k and b_k [m, rad].
+        Of each degree of freedom, K of at least 2, different and at least 1.
     centre : 3 floats
-        [m]
+        Where the platform starts and ends, unturned [m].
+    parameters : (size,) array
+        Lengths [m], then angles [rad]: each is about the excursion of one series that satisfies
+        the conditions.
     """
 
     duration: float
     harmonics: np.typing.NDArray[np.int_]
-    cosines: Array
-    sines: Array
     centre: tuple[float, float, float]
+    parameters: Array
+
+    @classmethod
+    def at_rest(cls, duration: float, harmonics: np.typing.NDArray[np.int_],
+                centre: tuple[float, float, float]) -> FourierPath:
+        """Return the path that stays at the centre."""
+        size = FREEDOMS * (2 * int(harmonics.shape[1]) - CONDITIONS)
+        return cls(duration, harmonics, centre, np.zeros(size))
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return len(self.parameters)
+
+    def with_parameters(self, parameters: Array) -> FourierPath:
+        """Return the path of the same harmonics with other parameters, (size,)."""
+        return replace(self, parameters=parameters)
+
+    def scaled(self, factor: float) -> FourierPath:
+        """Return the same motion with all excursions times a factor."""
+        return self.with_parameters(factor * self.parameters)
 
     def motion(self, time: Array) -> PlatformMotion:
         """Return the motion at times [s], with exact velocities and accelerations."""
@@ -108,16 +92,14 @@ class FourierPath:
         return PlatformMotion(value[:3].T + self.centre, _quaternions(psi, theta, phi),
                               rate[:3].T, omega, gain[:3].T, epsilon, time)
 
-    def scaled(self, factor: float) -> FourierPath:
-        """Return the same motion with all excursions times a factor."""
-        return FourierPath(self.duration, self.harmonics, factor * self.cosines,
-                           factor * self.sines, self.centre)
-
     def _coordinates(self, t: Array) -> tuple[Array, Array, Array]:
         """Return coordinates from the centre and their derivatives, (6, N) each."""
+        rows = np.reshape(self.parameters, (FREEDOMS, -1))
+        coefficients = np.stack([resting_series(tuple(row.tolist())) @ own
+                                 for row, own in zip(self.harmonics, rows, strict=True)])
+        a, b = np.split(coefficients[:, :, None], 2, axis=1)
         omega = 2 * np.pi / self.duration * self.harmonics[:, :, None]
         c, s = np.cos(omega * t), np.sin(omega * t)
-        a, b = self.cosines[:, :, None], self.sines[:, :, None]
         return (np.sum(a * (c - 1) + b * s, axis=1), np.sum(omega * (b * c - a * s), axis=1),
                 -np.sum(omega ** 2 * (a * c + b * s), axis=1))
 

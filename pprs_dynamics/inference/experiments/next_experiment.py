@@ -17,13 +17,16 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
-from pprs_dynamics.inference.experiments.arm_search import ArmSearch
 from pprs_dynamics.inference.experiments.columns import FittedTerm
-from pprs_dynamics.inference.experiments.commissioning import commissioning
 from pprs_dynamics.inference.experiments.criteria import Contest, Precision
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
-from pprs_dynamics.inference.experiments.question import Question, precision_of, question_of
-from pprs_dynamics.inference.experiments.trajectory_search import Found, TrajectorySearch
+from pprs_dynamics.inference.experiments.question import (
+    Question,
+    commissioning,
+    precision_of,
+    question_of,
+)
+from pprs_dynamics.inference.experiments.trajectory_search import ArmSearch, Found, TrajectorySearch
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording

@@ -14,26 +14,53 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm, reversal_shapes
 from pprs_dynamics.inference.experiments.criteria import (
     Contest,
-    Criterion,
     Explanation,
+    Information,
     Precision,
     Separation,
     free_of,
 )
-from pprs_dynamics.inference.experiments.information import Information
-from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.base_columns import (
+    BaseColumn,
+    ModelNumber,
+    PresentCoefficient,
+    PresentShape,
+    ReversalShape,
+)
+from pprs_dynamics.inference.regression.design import FREE, Design
+from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.regression.sensitivities import PASSIVE_WIDTHS, model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.measurement.motion.treatment import BLOCK_DURATION
+from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
+# Effects that most machines have, or that are most often entered wrongly.
+ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_offset',
+             'drive_spring', 'drive_inertia')
+IN_STRUCTURE = ('payload_mass', 'payload_offset', 'platform_inertia', 'external_wrench',
+                'base_tilt', 'platform_drag', 'rod_mass', 'revolute_friction',
+                'spherical_friction')
+# How well the numbers of a new robot are known where its file does not say.
+TOLERANCE = 0.1
+NUMBERS = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts', 'masses.rods',
+           'friction.drives.viscous', 'friction.drives.coulomb', 'friction.revolute.viscous',
+           'friction.revolute.coulomb', 'friction.spherical.viscous',
+           'friction.spherical.coulomb')
+TYPICAL = DriveRange(20.0, BLOCK_DURATION, 0.2, 0.2)  # for shapes of effects
 Part = tuple[FittedTerm, Array]
 """A term, and the coefficients that it has in one explanation."""
 
@@ -49,7 +76,9 @@ class Question:
     noise : mapping of drive to NoiseSpectrum
     known : (P, P) array
         What recordings and tolerances tell already.
-    criterion : Criterion
+    criterion : Separation or Precision
+        Objective of a design, to be maximised, of the information of recordings, motion and prior
+        together, (P, P).
     contests : tuple of Contest
         For 'separate'.
     subjects : tuple of Explanation
@@ -62,7 +91,7 @@ class Question:
     plan: ColumnPlan
     noise: Mapping[int, NoiseSpectrum]
     known: Array
-    criterion: Criterion
+    criterion: Separation | Precision
     contests: tuple[Contest, ...]
     subjects: tuple[Explanation, ...]
     noise_floor: float
@@ -72,10 +101,23 @@ class Question:
         """Around which all is linear."""
         return self.plan.model
 
-    @property
-    def information(self) -> Information:
-        """Gram matrices of the plan."""
-        return Information(self.plan, self.noise)
+    def grams(self, forces: Forces, time: Array, duration: float, block: int = 1) -> list[Array]:
+        """Return what motions of some duration, one after the other, would tell, (P, P) each.
+
+        Parameters
+        ----------
+        forces, time, block
+            See `ColumnPlan.on_motions`.
+        duration : float
+            Of each motion [s].
+        """
+        information = Information(self.plan, self.noise)
+        return [information.of_motion(columns, duration)
+                for columns in self.plan.on_motions(forces, time, block)]
+
+    def worth(self, gram: Array) -> float:
+        """Return the value of a motion beside what is known already."""
+        return self.criterion.value(self.known + gram)
 
     def with_contests(self, contests: Sequence[Contest]) -> Question:
         """Return the question of some of its contests only."""
@@ -200,8 +242,9 @@ def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision
     return Precision(free_of(subjects), tuple(range(len(plan.base))), scales)
 
 
-def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan, criterion: Criterion,
-           contests: Sequence[Contest], subjects: Sequence[Explanation]) -> Question:
+def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan,
+           criterion: Separation | Precision, contests: Sequence[Contest],
+           subjects: Sequence[Explanation]) -> Question:
     """Return a question under the noise of a set."""
     regression, fit = fits.regression, found.fit
     noise = regression.noise(fit)
@@ -284,3 +327,65 @@ def _holds(larger: Sequence[FittedTerm], smaller: FittedTerm, design: Design) ->
         if np.sum(rest ** 2) > HELD * np.sum(own ** 2):
             return False
     return True
+
+
+def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: float) -> Question:
+    """Return the question of a robot that nothing, or little, is known of.
+
+    It is of the model's own numbers, and of the effects that are common.
+
+    Parameters
+    ----------
+    model : DriveModel
+    recordings : sequence of Recording
+        What is there already; may be none.
+    noise : float
+        Standard deviation of means of the effort over 0.01 s [N], where nothing is recorded.
+    """
+    if not model_numbers(model):
+        tolerances = {f'tolerances.{key}': TOLERANCE for key in NUMBERS
+                      if np.any(model.values[key])}
+        model = DriveModel.from_parameters({**model.values, **tolerances})
+    present = {effect.name for effect in model.effects}
+    terms = []
+    for name, effect in catalogue().items():
+        if name in present or name not in ON_DRIVES + IN_STRUCTURE:
+            continue
+        if issubclass(effect, DriveEffect):
+            trials = effect.trials(TYPICAL)
+            terms += [FittedTerm.at_scale(effect, drive, trials[len(trials) // 3])
+                      for drive in range(len(DRIVES))]
+        else:
+            terms.append(FittedTerm.at_scale(effect, None, {}))
+    samples = round(TYPICAL.duration / BLOCK_DURATION)
+    if recordings:
+        design = Design.of(model, recordings)
+        regression = Regression(design.residuals, design.base)
+        # What the model does not explain counts as noise as long as nothing else is known.
+        fit = regression.fit(())
+        plan, spectra = ColumnPlan.of_design(design, terms), regression.noise(fit)
+        known = Information(plan, spectra).of_recordings(design, regression, fit)
+        noise = max(regression.noise_floor(fit, d) for d in regression.drives)
+    else:
+        white = NoiseSpectrum(np.zeros(0), np.array([noise ** 2]), BLOCK_DURATION)
+        plan = ColumnPlan(model, model, base_without_recordings(model), tuple(terms))
+        spectra = dict.fromkeys(range(len(DRIVES)), white)
+        known = Information(plan, spectra).prior()
+    subjects = subjects_of(plan, Prices(len(catalogue()), len(DRIVES), samples, DECISIONS))
+    scales = np.concatenate([np.ones(len(plan.numbers)), *(term.scales for term in terms)])
+    criterion = Precision((*plan.numbers, *free_of(subjects)), plan.others, scales)
+    return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise)
+
+
+def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:
+    """Return what is fitted on any recording of a model, as columns without rows."""
+    base: list[BaseColumn] = [ModelNumber({}, 1.0, number) for number in model_numbers(model)]
+    base += reversal_shapes(range(len(DRIVES)))
+    base += [ReversalShape({}, 1.0, None, number) for number in range(len(PASSIVE_WIDTHS))]
+    for effect in model.effects:
+        if isinstance(effect, CatalogueEffect):
+            for drive in effect.drives if isinstance(effect, DriveEffect) else (None,):
+                base += [PresentCoefficient({}, FREE, type(effect), drive, c)
+                         for c in effect.coefficients]
+                base += [PresentShape({}, FREE, type(effect), drive, p) for p in effect.shape]
+    return tuple(base)

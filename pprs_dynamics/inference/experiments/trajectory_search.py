@@ -3,9 +3,9 @@
 
 """The search for the motion that tells most, within what the robot may do.
 
-Random series, each blown up until it meets a limit, are compared first; the best of several
-kinds are improved by sequential quadratic programming with the limits as constraints, and what
-comes out is checked at the rate at which it is played.
+Of a 3-PPRS random series, each blown up until it meets a limit, are compared first; the best of
+several kinds are improved by sequential quadratic programming with the limits as constraints, and
+what comes out is checked at the rate at which it is played. Of an arm see `arm_motions`.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.experiments.arm_motions import ArmLimits, ArmMotions, best_motion
 from pprs_dynamics.inference.experiments.climbing import climb
 from pprs_dynamics.inference.experiments.criteria import Contest, misfits_of
 from pprs_dynamics.inference.experiments.fourier_path import (
     FREEDOMS,
-    FourierFamily,
     FourierPath,
     joined_motion,
 )
@@ -49,6 +49,9 @@ SMALLER, SMALLEST = 0.25, 0.1
 OTHER_SPECTRUM = 0.2  # difference of ln of the highest harmonic
 OUTSIDE = 2.0  # use of limits where the mechanism cannot follow
 FINE_RATE = 500.0  # [Hz], at which limits are checked
+# Slow motion tells of friction, fast of inertia; above 1 Hz an arm shakes what it stands on.
+OF_ARM = (4, 8, 16)  # highest harmonics of the duration
+SMALLEST_OF_ARM = 0.2  # of the largest motion of a joint: small motion tells of hysteresis
 
 
 class NoMotionError(PprsError, ValueError):
@@ -78,31 +81,16 @@ class Found:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A random motion.
+    """A random motion, what it would tell, nearly, (P, P), and its value."""
 
-    Parameters
-    ----------
-    family : FourierFamily
-    parameters : (p,) array
-    gram : (P, P) array
-        What it would tell, nearly.
-    value : float
-    """
-
-    family: FourierFamily
-    parameters: Array
+    path: FourierPath
     gram: Array
     value: float
 
     @property
-    def path(self) -> FourierPath:
-        """The motion."""
-        return self.family.path(self.parameters)
-
-    @property
     def top(self) -> int:
         """Highest harmonic."""
-        return int(self.family.harmonics.max())
+        return int(self.path.harmonics.max())
 
 
 class TrajectorySearch:
@@ -144,7 +132,8 @@ class TrajectorySearch:
         hopeful = self._hopeful(drawn)
         if 0 < len(hopeful) < len(self.question.contests):
             self.question = self.question.with_contests(hopeful)
-            drawn = self._ranked([replace(draw, value=self._worth(draw.gram)) for draw in drawn])
+            drawn = self._ranked([replace(one, value=self.question.worth(one.gram))
+                                  for one in drawn])
         starts = self._kinds(drawn)
         done = [0]
 
@@ -174,23 +163,20 @@ class TrajectorySearch:
         rng = np.random.default_rng(self.seed)
         fitted = []
         for k in range(draws):
-            family, x, share = self._draw(rng)
-            fitted.append((family, share * self._to_limits(family, x)))
+            path, share = self._draw(rng)
+            fitted.append(self._to_limits(path).scaled(share))
             progress(0.5 * (k + 1) / draws)
         drawn: list[Drawn] = []
         for k in range(0, draws, BATCH):
             some = fitted[k:k + BATCH]
-            grams, _ = self._grams([family.path(x) for family, x in some])
-            drawn += [Drawn(family, x, gram, self._worth(gram))
-                      for (family, x), gram in zip(some, grams, strict=True)]
+            grams, _ = self._grams(some)
+            drawn += [Drawn(path, gram, self.question.worth(gram))
+                      for path, gram in zip(some, grams, strict=True)]
             progress(0.5 + 0.5 * len(drawn) / draws)
         return self._ranked(drawn)
 
     def _ranked(self, drawn: list[Drawn]) -> list[Drawn]:
         return sorted(drawn, key=lambda one: -one.value)
-
-    def _worth(self, gram: Array) -> float:
-        return self.question.criterion.value(self.question.known + gram)
 
     def assess(self, path: FourierPath) -> Found:
         """Return a motion at full rate, made smaller where it exceeds a limit there."""
@@ -198,11 +184,9 @@ class TrajectorySearch:
         forces = self._forces([path], self._fine)
         uses = self.limits.uses(self.question.model, forces, len(self._fine))[0].tolist()
         question = self.question
-        block = block_length(1 / FINE_RATE)
-        columns = question.plan.on_motions(forces, self._fine, block)[0]
-        gram = question.information.of_motion(columns, self.duration)
+        gram, = question.grams(forces, self._fine, self.duration, block_length(1 / FINE_RATE))
         return Found(path, gram, dict(zip(limit_names(question.model), uses, strict=True)),
-                     self._worth(gram))
+                     question.worth(gram))
 
     def _kinds(self, drawn: list[Drawn]) -> list[Drawn]:
         """Return the best, and the best of others whose spectrum is another."""
@@ -213,33 +197,32 @@ class TrajectorySearch:
                 chosen.append(one)
         return chosen
 
-    def _draw(self, rng: np.random.Generator) -> tuple[FourierFamily, Array, float]:
+    def _draw(self, rng: np.random.Generator) -> tuple[FourierPath, float]:
+        """Return a motion of some size, and the share of the limits that it is to use."""
         highest = int(np.exp(rng.uniform(np.log(min(SLOWEST_TOP, self.top)),
                                          np.log(self.top + 1))))
         highest = min(max(highest, HARMONICS), self.top)
         harmonics = np.stack([np.sort(1 + rng.choice(highest, HARMONICS, replace=False))
                               for _ in range(FREEDOMS)])
-        family = FourierFamily(self.duration, harmonics, self.centre)
-        x = rng.normal(size=(FREEDOMS, family.size // FREEDOMS))
+        path = FourierPath.at_rest(self.duration, harmonics, self.centre)
+        x = rng.normal(size=(FREEDOMS, path.size // FREEDOMS))
         x *= np.exp(rng.normal(scale=0.7, size=FREEDOMS))[:, None]
         x /= np.abs(x).max()
         x[:3] *= REACH
         x[3:] *= TURN
         share = float(np.exp(rng.uniform(np.log(SMALLEST), 0))) if rng.random() < SMALLER else 1.0
-        return family, x.ravel(), share
+        return path.with_parameters(x.ravel()), share
 
-    def _to_limits(self, family: FourierFamily, x: Array,
-                   scales: tuple[float, float] = SCALES) -> Array:
-        """Return the parameters times the largest factor that the limits allow."""
+    def _to_limits(self, path: FourierPath, scales: tuple[float, float] = SCALES) -> FourierPath:
+        """Return the motion times the largest factor that the limits allow."""
         low, high = np.log(scales)
         for _ in range(HALVINGS):
             middle = (low + high) / 2
-            if self._worst(family.path(np.exp(middle) * x), self._time) <= 1:
+            if self._worst(path.scaled(np.exp(middle)), self._time) <= 1:
                 low = middle
             else:
                 high = middle
-        factor: float = np.exp(low)
-        return factor * x
+        return path.scaled(np.exp(low))
 
     def _allowed(self, path: FourierPath) -> FourierPath:
         """Return the path, made smaller until it keeps the limits at full rate."""
@@ -263,27 +246,29 @@ class TrajectorySearch:
         """Return what several paths would tell, and their uses of the limits."""
         question = self.question
         forces = self._forces(paths, self._time)
-        grams = [question.information.of_motion(columns, self.duration)
-                 for columns in question.plan.on_motions(forces, self._time)]
-        return grams, self.limits.uses(self.question.model, forces, len(self._time))
+        return (question.grams(forces, self._time, self.duration),
+                self.limits.uses(question.model, forces, len(self._time)))
 
     def _improve(self, start: Drawn) -> FourierPath:
         """Return the path after a few steps of sequential quadratic programming."""
-        family = start.family
+        path = start.path
         # Lengths and angles, of like size.
-        unit = np.repeat((REACH, TURN), family.size // 2)
+        unit = np.repeat((REACH, TURN), path.size // 2)
+
+        def moved(z: Array) -> FourierPath:
+            return path.with_parameters(unit * z)
 
         def evaluated(rows: Array) -> tuple[Array, Array]:
             values, rooms = [], []
             for k in range(0, len(rows), BATCH):
-                grams, uses = self._grams([family.path(unit * row) for row in rows[k:k + BATCH]])
-                values += [self._worth(gram) for gram in grams]
+                grams, uses = self._grams([moved(row) for row in rows[k:k + BATCH]])
+                values += [self.question.worth(gram) for gram in grams]
                 rooms.append(1 - uses)
             return np.array(values), np.concatenate(rooms)
 
-        best = climb(start.parameters / unit, evaluated,
-                     lambda z: self._to_limits(family, unit * z, NEARBY) / unit)
-        return family.path(unit * best)
+        best = climb(path.parameters / unit, evaluated,
+                     lambda z: self._to_limits(moved(z), NEARBY).parameters / unit)
+        return moved(best)
 
     def _centre(self) -> tuple[float, float, float]:
         """Return the home pose, or the middle of the lifts' strokes where home leaves no room."""
@@ -292,19 +277,21 @@ class TrajectorySearch:
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
         middle = sum(limits.lift_stroke) / 2 + geometry.elbow_sign * geometry.rod_length * float(
             np.sqrt(max(1 - lean ** 2, 0.0)))
-        for centre in (HOME, (0.0, 0.0, middle)):
-            family = FourierFamily(self.duration, np.tile((1, 2), (FREEDOMS, 1)), centre)
-            if self._worst(family.path(np.zeros(family.size)), self._time_at_rest()) <= 1:
+        middle_pose = (0.0, 0.0, middle)
+        for centre in (HOME, middle_pose):
+            if self._worst(self._standing(centre), self._time_at_rest()) <= 1:
                 return centre
         raise NoMotionError(f'no motion is allowed: standing at {HOME} m or {middle:.4g} m high '
-                            f'the robot is beyond {self._first_limit(middle)} already; the '
+                            f'the robot is beyond {self._first_limit(middle_pose)} already; the '
                             'limits, with their margin, must leave room')
 
-    def _first_limit(self, height: float) -> str:
-        family = FourierFamily(self.duration, np.tile((1, 2), (FREEDOMS, 1)), (0.0, 0.0, height))
+    def _standing(self, centre: tuple[float, float, float]) -> FourierPath:
+        return FourierPath.at_rest(self.duration, np.tile((1, 2), (FREEDOMS, 1)), centre)
+
+    def _first_limit(self, centre: tuple[float, float, float]) -> str:
         time = self._time_at_rest()
         try:
-            forces = self._forces([family.path(np.zeros(family.size))], time)
+            forces = self._forces([self._standing(centre)], time)
         except PprsError as error:
             return str(error)
         uses = self.limits.uses(self.question.model, forces, len(time))[0]
@@ -317,3 +304,35 @@ class TrajectorySearch:
 def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> DriveForces:
     """Return the forces that drives must apply along paths, one after the other."""
     return model.drive_forces(joined_motion(paths, time))
+
+
+class ArmSearch:
+    """Searches for a motion of an arm that answers a question of its recordings.
+
+    Parameters
+    ----------
+    question : Question
+    limits : ArmLimits
+    duration : float
+        [s]
+    seed : int
+    """
+
+    def __init__(self, question: Question, limits: ArmLimits, duration: float, seed: int) -> None:
+        self.question, self.seed = question, seed
+        self.motions = ArmMotions(question.model, limits, duration)
+
+    def run(self, progress: Callable[[float], None] = lambda share: None) -> Found:
+        """Return the best motion found."""
+        best = best_motion(
+            self.motions, lambda series: self.question.worth(self._gram(series)), self.seed, OF_ARM,
+            SMALLEST_OF_ARM, progress)
+        gram = self._gram(best)
+        return Found(best, gram, self.motions.uses(best), self.question.worth(gram))
+
+    def _gram(self, series: JointSeries) -> Array:
+        question, duration = self.question, self.motions.duration
+        samples = SAMPLES_PER_PERIOD * series.harmonics
+        time: Array = np.arange(samples, dtype=float) * (duration / samples)
+        forces = question.model.drive_forces(series.motion(time))
+        return question.grams(forces, time, duration)[0]

@@ -11,13 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_columns import columns_of
-from pprs_dynamics.inference.fit.arm_fit import ArmFit, fit_arm
-from pprs_dynamics.inference.fit.open_numbers import fit_open_numbers
+from pprs_dynamics.inference.fit.arm_fit import ArmFit, columns_of, fit_arm
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.estimates import calibrations
+from pprs_dynamics.inference.search.fitted_model import fitted_model
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -159,9 +163,13 @@ def _fitted(model: ForceModel, recordings: Sequence[Recording],
     if isinstance(model, ArmModel):
         fit = fit_arm(model, columns_of(model, recordings))
         return fit.model, _numbers(model, fit), _told(model, fit)
-    after, calibrated = fit_open_numbers(model, recordings)
-    return after, tuple(FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
-                        for one in calibrated), ()
+    # As in a diagnosis without any effect: the tolerance is the prior, and how friction turns over
+    # is left free.
+    fits = FittedSets(Design.of(model, recordings), DECISIONS)
+    fits, found = relinearised(fits, fits.evaluate(()))
+    return fitted_model(fits, found), tuple(
+        FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
+        for one in calibrations(fits, found, {})), ()
 
 
 def _numbers(model: ArmModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
@@ -191,3 +199,63 @@ def _told(model: ArmModel, fit: ArmFit) -> tuple[str, ...]:
         told.append(f'efforts are currents times {model.block}.gain: a gain that is wrong by '
                     '1 % makes all numbers wrong by 1 %')
     return tuple(told)
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A base model fitted again, taken or not.
+
+    Parameters
+    ----------
+    fit : BaseFit
+    taken : bool
+        Whether the error on data that took no part in the fit falls.
+    reason : str
+    """
+
+    fit: BaseFit
+    taken: bool
+    reason: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the refit for JSON."""
+        return {**self.fit.to_dict(), 'taken': self.taken, 'reason': self.reason}
+
+
+def refit_base(model: ForceModel, recordings: Sequence[Recording],
+               validate: Sequence[Recording] = (),
+               progress: Callable[[float], None] | None = None) -> Refit:
+    """Return the base model fitted again beside its effects, which stay as they are.
+
+    A base model that was fitted without them holds a part of what they explain: its friction that
+    of loads and temperatures, its links that of a cable.
+
+    Parameters
+    ----------
+    model : ForceModel
+        With effects.
+    recordings : sequence of Recording
+        To fit to.
+    validate : sequence of Recording, optional
+        On which the error must fall; else each recording, or half of the only one, is predicted
+        from the others.
+    progress : callable, optional
+
+    Raises
+    ------
+    FitError
+        Where the model has nothing that can be fitted.
+    PprsError
+        As `measure_residuals`.
+    """
+    found = fit_base(model, recordings, validate, progress)
+    before = errors_of(model, validate) if validate else found.before
+    drives = [drive for drive in before if drive in found.held_out]
+    # Drives of different sizes and units count alike.
+    ratio = root_mean_square([
+        found.held_out[drive] / max(before[drive], 1e-300) for drive in drives])
+    where = ('the validation recordings' if validate else 'its halves, each predicted from the '
+             'other,' if found.held_out_on == HALVES else 'recordings predicted from the others')
+    change = f'the error on {where} is {ratio:.3g} of that before, over all drives'
+    return Refit(found, ratio < 1, f'{change}: base model fitted again' if ratio < 1 else
+                 f'{change}, must fall: the base model stays as it was')

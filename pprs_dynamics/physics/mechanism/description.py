@@ -163,6 +163,21 @@ def from_pseudo_inertia(P: Array) -> Array:
                      trace - P[1, 1], -P[0, 2], -P[1, 2], trace - P[2, 2]])
 
 
+def principal_inertia(parameters: Array) -> tuple[float, Array, Array, Array]:
+    """Return mass, centre, principal moments about it and their axes as columns, of a body (10,).
+
+    The axes are right-handed.
+    """
+    mass = float(parameters[0])
+    centre = parameters[1:4] / mass
+    xx, xy, yy, xz, yz, zz = parameters[4:]
+    about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+             - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
+    moments, axes = np.linalg.eigh(about)
+    axes[:, 0] *= np.linalg.det(axes)
+    return mass, centre, moments, axes
+
+
 def body_at(mass: float, centre: tuple[float, ...], inertia: Array) -> Array:
     """Return the parameters (10,) of a body with an inertia (3, 3) about its centre of mass."""
     c = np.array(centre, dtype=float)

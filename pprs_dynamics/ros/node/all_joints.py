@@ -12,7 +12,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.simulation.export.tree_positions import TreePositions
+from pprs_dynamics.simulation.export.exported_robot import TreePositions
 
 
 class AllJoints:

@@ -31,6 +31,7 @@ from pprs_dynamics.physics.mechanism.description import (
     Joint,
     Loop,
     body_at,
+    principal_inertia,
     rotation_of,
 )
 from pprs_dynamics.physics.mechanism.linkage import survey
@@ -39,11 +40,13 @@ from pprs_dynamics.physics.mechanism.structure import build_structure
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import AXIS, Robot
 from pprs_dynamics.simulation.export.expressed import (
     STANDARD_GRAVITY,
     URDF,
     Expressed,
+    express,
 )
 
 HOME_HEIGHT = 0.5  # [m], of the 3-PPRS' platform
@@ -176,21 +179,14 @@ def _bodies(mechanism: Mechanism) -> Iterator[Body]:
 
 def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     """Return mass, centre, principal moments and their axes."""
-    mass = float(parameters[0])
-    if not mass > 0:
+    if not parameters[0] > 0:
         return LEAST, np.zeros(3), np.full(3, LEAST), np.eye(3)
-    centre = parameters[1:4] / mass
-    xx, xy, yy, xz, yz, zz = parameters[4:]
-    about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-             - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))
-    moments, axes = np.linalg.eigh(about)
+    mass, centre, moments, axes = principal_inertia(parameters)
     slack = SOUND * max(float(np.abs(parameters[4:]).max()), LEAST)
     if moments[0] < -slack or moments[0] + moments[1] < moments[2] - slack:
         raise ModelError(f'inertia of {name}', tuple(float(value) for value in moments),
                          'be principal moments of a real body, of which none is negative and each '
                          'two sum to at least the third: no simulator takes another')
-    axes = axes.copy()
-    axes[:, 0] *= np.linalg.det(axes)
     moments = np.maximum(moments, LEAST)
     # What rounding left of the triangle's rule, which simulators take to the letter.
     moments[2] = min(moments[2], moments[0] + moments[1])
@@ -277,3 +273,42 @@ def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
     bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
     return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
                      robot.gravity)
+
+
+class TreePositions:
+    """The joints of a model's URDF; free bodies, which are no joints of a message, are left out.
+
+    Parameters
+    ----------
+    model : ForceModel
+
+    Attributes
+    ----------
+    names : tuple of J str
+
+    Raises
+    ------
+    ModelError
+        As `export_robot`.
+    """
+
+    def __init__(self, model: ForceModel) -> None:
+        robot = export_robot(express(model, URDF), URDF)
+        self._mechanism = robot.mechanism
+        joints = [body for body in robot.bodies if body.kind != FREE]
+        self.names = tuple(body.joint for body in joints)
+        self._rows = np.array([body.row for body in joints])
+
+    def at(self, position: Array) -> Array:
+        """Return the positions [rad, m], (J,), for those of the drives, (D,).
+
+        Raises
+        ------
+        WorkspaceError, SingularityError
+            See `Mechanism.at`.
+        """
+        given = np.array(position, dtype=float)[None]
+        still = np.zeros_like(given)
+        q = self._mechanism.at(given, still, still).motion.q[0]
+        t, rows = self._mechanism.structure.tables, self._rows
+        return t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows]

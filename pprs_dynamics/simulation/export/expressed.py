@@ -9,26 +9,19 @@ friction turns over at once there: with `sgn` for tanh(v / width).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect, LinkageFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import (
-    JointCoefficients,
-    PassiveFriction,
-    WholeMechanismFriction,
-)
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
+from pprs_dynamics.physics.effects.laws.passive_friction import WholeMechanismFriction
 from pprs_dynamics.physics.effects.laws.revolute_friction import RevoluteFriction
 from pprs_dynamics.physics.effects.laws.revolute_stiffness import RevoluteStiffness
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
@@ -38,12 +31,13 @@ from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import Model
+from pprs_dynamics.physics.model.model_file import Model, build_model
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
 DAMPING, FRICTION, ARMATURE, STIFFNESS = 'damping', 'frictionloss', 'armature', 'stiffness'
 SPRINGREF = 'springref'
+ACTIVE = 'effects.active'
 # What joints of a format have.
 HELD = {URDF: {DAMPING, FRICTION}, MJCF: {DAMPING, FRICTION, ARMATURE, STIFFNESS, SPRINGREF}}
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # what is assumed of a format that does not say
@@ -86,11 +80,13 @@ class Expressed:
 class _Sorting:
     """Sorts what a model has into what a format holds and what it does not."""
 
-    def __init__(self, kind: str, loops: frozenset[str]) -> None:
-        self.held, self.loops = HELD[kind], loops
+    def __init__(self, model: ForceModel, kind: str) -> None:
+        self.model, self.kind, self.held = model, kind, HELD[kind]
+        self.loops = [loop.name for loop in model.robot.structure.loops] if isinstance(
+            model, ArmModel) else []
         self.joints: dict[str, dict[str, float]] = {}
         self.left: list[str] = []
-        self.effects: list[Effect] = []
+        self.values = dict(model.values)
 
     def take(self, joints: Mapping[str, Mapping[str, float]]) -> bool:
         """Add numbers to joints; False, with nothing added, where the format cannot hold them."""
@@ -107,24 +103,31 @@ class _Sorting:
         self.joints = after
         return True
 
-    def keep(self, key: str, joints: Mapping[str, Mapping[str, float]]) -> bool:
-        """Take numbers of the model file, or note their key."""
-        taken = self.take(joints)
-        if not taken:
-            self.left.append(key)
-        return taken
+    def keep(self, key: str, joints: Sequence[str], number: str) -> None:
+        """Take the numbers of a key of the model file as joints have them, or drop them."""
+        spread = np.broadcast_to(np.asarray(self.values[key], dtype=float), len(joints)).tolist()
+        if not self.take({name: {number: value}
+                          for name, value in zip(joints, spread, strict=True)}):
+            self.drop(key)
 
-    def drop(self, key: str, value: Any) -> None:
-        """Note a key whose number is not zero."""
-        if np.any(value):
+    def drop(self, key: str) -> None:
+        """Set the numbers of a key to 0, and note it where they were not."""
+        if np.any(self.values[key]):
+            self.exchange(key, np.multiply(self.values[key], 0.0).tolist())
+
+    def exchange(self, key: str, value: Any) -> None:
+        """Give a key another value, and note it where that changes anything."""
+        if self.values[key] != value:
+            self.values[key] = value
             self.left.append(key)
 
     def add(self, effect: Effect) -> None:
         """Sort an added effect."""
-        if self._holds(effect):
-            self.effects.append(effect)
-        else:
+        if not self._holds(effect):
             self.left.append(effect.name)
+            self.values = {key: value for key, value in self.values.items()
+                           if not key.startswith(f'effects.{effect.name}.')}
+            self.values[ACTIVE] = [name for name in self.values[ACTIVE] if name != effect.name]
 
     def _holds(self, effect: Effect) -> bool:
         if type(effect) in OF_DRIVES:
@@ -139,9 +142,15 @@ class _Sorting:
                               for hinge in HINGES})
         if isinstance(effect, JointFrictionEffect):
             return self._holds_friction(effect.values)
-        # A change of bodies and no force beside them.
+        # A change of bodies and no force beside them; in URDF, which has none, not of gravity.
         return isinstance(effect, BodyEffect) and (
-            type(effect).load is BodyEffect.load and type(effect).apply is BodyEffect.apply)
+            type(effect).load is BodyEffect.load and type(effect).apply is BodyEffect.apply) and (
+                self.kind == MJCF or not self._turns_gravity(effect))
+
+    def _turns_gravity(self, effect: BodyEffect) -> bool:
+        assert isinstance(self.model, (DriveModel, ArmModel))
+        robot = self.model.robot
+        return bool(np.any(np.subtract(effect.changed(robot).gravity, robot.gravity)))
 
     def _holds_friction(self, values: Mapping[str, float]) -> bool:
         """Sort friction of passive joints, by `<joint>.<parameter>`: all of it or none."""
@@ -163,132 +172,66 @@ def express(model: ForceModel, kind: str) -> Expressed:
     model : ForceModel
     kind : {'urdf', 'mjcf'}
     """
-    sorting = _Sorting(kind, frozenset(
-        loop.name for loop in model.robot.structure.loops) if isinstance(
-            model, ArmModel) else frozenset())
-    own: tuple[Effect, ...]
-    changed: Model
+    sorting = _Sorting(model, kind)
     if isinstance(model, DriveModel):
-        own, changed = _of_platform(model, sorting)
+        _sort_platform(model, sorting)
     elif isinstance(model, ArmModel):
-        own, changed = _of_arm(model, sorting)
+        _sort_arm(model, sorting)
     else:
-        assert isinstance(model, AxisModel)
-        own, changed = _of_axis(model, sorting)
-    first = len(own)
+        _sort_drive_friction(model, sorting, 'axis')
     for effect in model.effects:
-        if isinstance(effect, (ActiveFriction, PassiveFriction, AxisFriction, AxisOffset,
-                               LinkageFriction)):
-            continue
-        sorting.add(effect)
-    reduced: Model = replace(changed, effects=(*own, *sorting.effects),
-                             reversal=Reversal(AT_ONCE, AT_ONCE))
+        if effect.name in model.values.get(ACTIVE, ()):
+            sorting.add(effect)
     if kind == URDF:
-        reduced = _under_standard_gravity(reduced, sorting, first)
-        sorting.left += _loops(model)
+        _under_standard_gravity(model, sorting)
+        sorting.left += ['ball_2', 'ball_3'] if isinstance(model, DriveModel) else sorting.loops
+    reduced: Any = replace(build_model(sorting.values, model.source),
+                           reversal=Reversal(AT_ONCE, AT_ONCE))
     return Expressed(reduced, {name: {key: value for key, value in numbers.items() if value}
                                for name, numbers in sorting.joints.items()},
                      tuple(sorting.left))
 
 
-def _by_joint(drives: tuple[str, ...], key: str, values: object) -> dict[str, dict[str, float]]:
-    spread = np.broadcast_to(np.asarray(values, dtype=float), len(drives)).tolist()
-    return {name: {key: value} for name, value in zip(drives, spread, strict=True)}
-
-
-def _of_platform(model: DriveModel, sorting: _Sorting) -> tuple[tuple[Effect, ...], DriveModel]:
-    """Return the paper's friction without its loads, and the model by its exact equations."""
-    values = model.values
-    zero = (0.0,) * 6
-    damped = sorting.keep('friction.drives.viscous', _by_joint(
-        model.drives, DAMPING, values['friction.drives.viscous']))
-    hinged = sorting.keep('friction.revolute.viscous', _by_joint(
-        HINGES, DAMPING, values['friction.revolute.viscous']))
-    sorting.drop('friction.drives.coulomb', values['friction.drives.coulomb'])
+def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
+    """Sort the paper's friction, whose loads no format has, and take the exact equations."""
+    sorting.keep('friction.drives.viscous', model.drives, DAMPING)
+    sorting.keep('friction.revolute.viscous', HINGES, DAMPING)
+    sorting.drop('friction.drives.coulomb')
     for joint in ('revolute', 'spherical'):
-        sorting.drop(f'friction.{joint}.coulomb', values[f'friction.{joint}.coulomb']
-                     * values[f'friction.{joint}.diameter'])
-    sorting.drop('friction.spherical.viscous', values['friction.spherical.viscous'])
-    if values['friction.approach'] != WholeMechanismFriction.approach:
-        sorting.left.append('friction.approach')
-    if model.equations != 'corrected':
-        sorting.left.append('equations')
-    hinges = values['friction.revolute.viscous'] if hinged else 0.0
-    return ((ActiveFriction(values['friction.drives.viscous'] if damped else zero, zero),
-             WholeMechanismFriction(JointCoefficients(hinges, 0.0, 0.0),
-                                    JointCoefficients(0.0, 0.0, 0.0), False)),
-            replace(model, equations='corrected'))
+        if model.values[f'friction.{joint}.diameter']:
+            sorting.drop(f'friction.{joint}.coulomb')
+    sorting.drop('friction.spherical.viscous')
+    sorting.exchange('friction.approach', WholeMechanismFriction.approach)
+    sorting.exchange('equations', 'corrected')
 
 
-def _of_axis(model: AxisModel, sorting: _Sorting) -> tuple[tuple[Effect, ...], AxisModel]:
-    sorting.drop('axis.offset', model.values['axis.offset'])
-    return (_drive_friction(model, sorting, 'axis'),), model
+def _sort_drive_friction(model: ForceModel, sorting: _Sorting, block: str) -> None:
+    sorting.keep(f'{block}.viscous', model.drives, DAMPING)
+    sorting.keep(f'{block}.coulomb', model.drives, FRICTION)
+    sorting.drop(f'{block}.offset')
 
 
-def _of_arm(model: ArmModel, sorting: _Sorting) -> tuple[tuple[Effect, ...], ArmModel]:
-    """Return the friction of the drives and of passive joints that no load changes."""
-    own: list[Effect] = [_drive_friction(model, sorting, 'friction')]
-    sorting.drop('friction.offset', model.values['friction.offset'])
-    robot = model.robot
-    if not sorting.keep(f'{model.block}.armature', _by_joint(
-            model.drives, ARMATURE, robot.armature)):
-        robot = replace(robot, armature=np.zeros_like(robot.armature))
-    for effect in model.effects:
-        if isinstance(effect, LinkageFriction):
-            own.append(_passive(effect, sorting))
-    return tuple(own), replace(model, robot=robot)
+def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
+    """Sort rotors and friction, also of passive joints; of these no loads."""
+    _sort_drive_friction(model, sorting, 'friction')
+    sorting.keep(f'{model.block}.armature', model.drives, ARMATURE)
+    for key in model.values:
+        name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
+        if not key.startswith('friction.joints.') or parameter == 'radius':
+            continue
+        if name in sorting.loops or parameter not in OF_PASSIVE:
+            sorting.drop(key)
+        else:
+            sorting.keep(key, (name,), OF_PASSIVE[parameter])
 
 
-def _drive_friction(model: ForceModel, sorting: _Sorting, block: str) -> AxisFriction:
-    kept: dict[str, object] = {}
-    for key, number in (('viscous', DAMPING), ('coulomb', FRICTION)):
-        value = model.values[f'{block}.{key}']
-        taken = sorting.keep(f'{block}.{key}', _by_joint(model.drives, number, value))
-        kept[key] = value if taken else 0.0
-    return AxisFriction(**kept)  # type: ignore[arg-type]
-
-
-def _passive(effect: LinkageFriction, sorting: _Sorting) -> LinkageFriction:
-    kept: dict[str, dict[str, float]] = {}
-    for name, numbers in effect.blocks.items():
-        kept[name] = {}
-        for key, value in numbers.items():
-            number = OF_PASSIVE.get(key)
-            if key == 'radius' or not value:
-                continue
-            if name not in sorting.loops and number and sorting.take({name: {number: value}}):
-                kept[name][key] = value
-            else:
-                sorting.left.append(f'friction.joints.{name}.{key}')
-    return LinkageFriction(effect.structure, kept)
-
-
-def _under_standard_gravity(model: Model, sorting: _Sorting, first: int) -> Model:
-    """Return the model in the gravity that is assumed where a file has none."""
-    effects = model.effects
-    for effect in effects[first:]:
-        if isinstance(effect, BodyEffect) and isinstance(model, (DriveModel, ArmModel)):
-            turned: Array = np.subtract(effect.changed(model.robot).gravity, model.robot.gravity)
-            if np.any(turned):
-                sorting.left.append(effect.name)
-                effects = tuple(each for each in effects if each is not effect)
-    model = replace(model, effects=effects)
+def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
+    """Take the gravity that is assumed where a file has none."""
     if isinstance(model, AxisModel):
         # The axis is put at a slope that gives its share of it.
         most = -STANDARD_GRAVITY[2]
-        if abs(model.gravity) > most:
-            sorting.left.append('axis.gravity')
-        return replace(model, gravity=min(max(model.gravity, -most), most))
-    if tuple(model.robot.gravity) != STANDARD_GRAVITY:
-        sorting.left.append('gravity' if isinstance(model, DriveModel)
-                            else f'{model.block}.gravity')
-    robot: Any = replace(model.robot, gravity=STANDARD_GRAVITY)
-    return replace(model, robot=robot)
-
-
-def _loops(model: ForceModel) -> list[str]:
-    """Return the loops that a tree lacks."""
-    if isinstance(model, DriveModel):
-        return ['ball_2', 'ball_3']
-    return [loop.name for loop in model.robot.structure.loops] if isinstance(
-        model, ArmModel) else []
+        sorting.exchange('axis.gravity', min(max(model.gravity, -most), most))
+    elif isinstance(model, ArmModel):
+        sorting.exchange(f'{model.block}.gravity', STANDARD_GRAVITY)
+    else:
+        sorting.exchange('gravity', STANDARD_GRAVITY)

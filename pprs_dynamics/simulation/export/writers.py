@@ -16,6 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.simulation.engine_state import couplings
 from pprs_dynamics.simulation.export.exported_robot import (
     FREE,
     HINGE,
@@ -193,15 +194,6 @@ def _points(loop: Loop, size: float) -> list[tuple[str, float]]:
         return [(loop.name, 0.0), (f'{loop.name}_axis', size / 10)]
     raise ModelError(f'robot.loops.{loop.name}.type', loop.kind,
                      'be spherical, revolute or fixed: MuJoCo closes no other loops')
-
-
-def couplings(structure: Structure) -> list[tuple[str, str, float, float]]:
-    """Return coupled joints: name, the free joint that each follows, ratio and offset."""
-    t, joints = structure.tables, structure.description.joints
-    leaders = {int(t.coordinate[row]): name for name, row in structure.rows.items()
-               if joints[name].mimic is None}
-    return [(name, leaders[int(t.coordinate[row])], float(t.ratio[row]), float(t.offset[row]))
-            for name, row in structure.rows.items() if joints[name].mimic is not None]
 
 
 def _urdf(robot: ExportedRobot) -> Element:
