@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -119,16 +119,6 @@ class FittedTerm:
         return rows
 
 
-class _WholeColumns(NamedTuple):
-    """Columns of motions one after the other, (K, N, D) each; see `Sensitivities.columns`."""
-
-    numbers: Array
-    drive_widths: Array
-    joint_widths: Array
-    structure: Mapping[type[StructureEffect], Array]
-    homing: Array
-
-
 @dataclass(frozen=True)
 class ColumnPlan:
     """Which columns are wanted, and how they are computed.
@@ -197,11 +187,10 @@ class ColumnPlan:
         """
         samples = len(time)
         found = self._whole_columns(forces, samples)
-        shared = dict(zip(self.numbers, found.numbers, strict=True))
+        shared = dict(zip(self.numbers, found[NUMBERS], strict=True))
         for k, one in enumerate(self.base):
             if isinstance(one, ReversalShape):
-                shared[k] = (found.joint_widths if one.drive is None
-                             else found.drive_widths)[one.number]
+                shared[k] = found[OF_JOINTS if one.drive is None else OF_DRIVES][one.number]
         treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
         result = []
         for start in range(0, len(forces.total), samples):
@@ -212,32 +201,36 @@ class ColumnPlan:
 
             design = replace(
                 self._motion_design(forces, part, time, treat, block), structure=tuple(
-                    Term(effect, None, {}, {d: treat(rows[:, part, d].T).T
+                    Term(effect, None, {}, {d: treat(found[effect.name][:, part, d].T).T
                                             for d in range(len(self.model.drives))})
-                    for effect, rows in found.structure.items()),
-                homing=tuple(by_drive(column[part]) for column in found.homing))
+                    for effect in self._wanted if issubclass(effect, StructureEffect)),
+                homing=tuple(by_drive(column[part]) for column in found.get(HOMING, ())))
             base = [self._present(one, design) if isinstance(
                         one, (PresentCoefficient, PresentShape))
                     else _felt(one, by_drive(shared[k][part])) for k, one in enumerate(self.base)]
             result.append(self._by_drive(base, design))
         return result
 
-    def _whole_columns(self, forces: Any, samples: int) -> _WholeColumns:
-        """Return the columns of all motions at full rate that do not need one motion alone."""
-        wanted = {one.effect for one in (*self.terms, *self.base) if isinstance(
+    @property
+    def _wanted(self) -> set[type[CatalogueEffect]]:
+        """Effects that columns are of."""
+        return {one.effect for one in (*self.terms, *self.base) if isinstance(
             one, (FittedTerm, PresentCoefficient, PresentShape))}
-        structure = tuple(effect for effect in wanted if issubclass(effect, StructureEffect))
-        shifts = any(effect.shifts_positions() for effect in wanted)
-        none = np.zeros((0, *forces.total.shape))
+
+    def _whole_columns(self, forces: Any, samples: int) -> dict[str, Array]:
+        """Return the columns of all motions at full rate that do not need one motion alone.
+
+        By name as `Sensitivities.columns`, those of an effect by its own, whether it is in the
+        model or not.
+        """
         sensitivities = sensitivities_of(self.model, self.given)
         known = {effect.name for effect in self.given.effects}
-        sensitivities.searched = tuple(one for one in structure if one.name not in known)
+        sensitivities.searched = tuple(effect for effect in self._wanted if issubclass(
+            effect, StructureEffect) and effect.name not in known)
+        shifts = any(effect.shifts_positions() for effect in self._wanted)
         sensitivities.homing_stride = max(1, samples // HOMING_SAMPLES) if shifts else 0
-        columns = sensitivities.columns(forces)
-        return _WholeColumns(
-            columns[NUMBERS], columns[OF_DRIVES], columns.get(OF_JOINTS, none),
-            {effect: columns[(PRESENT if effect.name in known else '') + effect.name]
-             for effect in structure}, columns.get(HOMING, none))
+        return {name.removeprefix(PRESENT): column
+                for name, column in sensitivities.columns(forces).items()}
 
     def _present(self, column: PresentCoefficient | PresentShape, design: Design) -> Rows:
         """Return the column of what the given model has already on one motion."""
