@@ -76,7 +76,7 @@ def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> N
     bags.mkdir()
     write_hidden(bags / 'plain.csv', 4, 8.0)
     for seed, name in ((1, 'first.mcap'), (2, '../other.mcap')):
-        samples = read_recording(write_hidden(folder / 'spare.csv', seed, 8.0)).samples
+        samples = read_recording(write_hidden(folder / 'spare.csv', seed, 8.0))
         write_bag(bags / name, {'/left/joint_states': samples, '/right/joint_states': samples})
     with workbench(bags, '--topic', '/right/joint_states', '--validate', folder / 'other.mcap',
                    folder=folder) as bench:

@@ -69,8 +69,8 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
         Whether the command to go on with is told; not where it runs already.
     """
     return stacked(*(_parts if details else _brief)(diagnosis, words),
-                 *(_following(words) if next_step else ()),
-                 *(() if details else (ELSEWHERE,)))
+                   *(_following(words) if next_step else ()),
+                   *(() if details else (ELSEWHERE,)))
 
 
 def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:

@@ -47,14 +47,15 @@ def plotjuggler_layout(drives: Sequence[str]) -> str:
 
 def foxglove_layout(drives: Sequence[str]) -> str:
     """Return a layout with a plot of measured, model and residual for each drive."""
-    panels = {f'Plot!pprs{index}': {
-        'foxglovePanelTitle': drive, 'showLegend': True, 'legendDisplay': 'floating',
-        'isSynced': True, 'xAxisVal': 'timestamp', 'showXAxisLabels': True,
-        'showYAxisLabels': True,
-        'paths': [{'value': f'{topic}.effort[{index}]', 'enabled': True,
-                   'timestampMethod': 'headerStamp', 'label': topic.strip('/'),
-                   'color': colour} for topic, colour in COLOURS.items()]}
-        for index, drive in enumerate(drives)}
+    panels = {}
+    for index, drive in enumerate(drives):
+        panels[f'Plot!pprs{index}'] = {
+            'foxglovePanelTitle': drive, 'showLegend': True, 'legendDisplay': 'floating',
+            'isSynced': True, 'xAxisVal': 'timestamp', 'showXAxisLabels': True,
+            'showYAxisLabels': True,
+            'paths': [{'value': f'{topic}.effort[{index}]', 'enabled': True,
+                       'timestampMethod': 'headerStamp', 'label': topic.strip('/'),
+                       'color': colour} for topic, colour in COLOURS.items()]}
     return json.dumps({
         'configById': panels, 'globalVariables': {}, 'userNodes': {},
         'playbackConfig': {'speed': 1}, 'layout': _stacked(list(panels))}, indent=1) + '\n'

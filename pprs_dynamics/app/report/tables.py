@@ -57,6 +57,6 @@ def _span(bounds: tuple[float, float] | None) -> str:
 
 def simulation_view(samples: int, rate: float, hidden: int, notes: Iterable[Note]) -> Any:
     """Return what a simulation made and what happened on the way; not what was hidden."""
-    return stacked(*(f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}'
-                   for note in notes),
-                 f'{samples} samples at {rate:g} Hz, {hidden} hidden effect{"s" * (hidden != 1)}')
+    told = [f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}' for note in notes]
+    return stacked(*told, f'{samples} samples at {rate:g} Hz, {hidden} hidden effect'
+                   f'{"s" * (hidden != 1)}')

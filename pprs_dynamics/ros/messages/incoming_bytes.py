@@ -117,8 +117,6 @@ _WALKS: dict[type, Callable[[Walk], object]] = {
     MultiDOFJointTrajectory: _trajectory, JointTrajectory: _joint_trajectory,
     JointState: _joint_state, Float64MultiArray: _array, String: Walk.text}
 
-
-
 NUMBERS = 19  # position, quaternion, two twists
 
 # What stands between stamp and points for each frame that means `base` (none, and its name), by

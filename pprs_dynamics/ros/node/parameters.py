@@ -78,7 +78,9 @@ class NodeParameter(Key):
         if self.size is not None and value is None:
             return ()  # as ROS 2 tells an empty list
         if isinstance(self.default, int):
-            if type(value) is not type(self.default):
+            # true is a whole number to Python.
+            if (not isinstance(value, type(self.default))
+                    or isinstance(value, bool) != isinstance(self.default, bool)):
                 raise ModelError(self.name, value, self.rule)
             if not self.lower <= value <= self.upper:
                 raise ModelError(self.name, value, self.rule)
