@@ -247,7 +247,7 @@ class Design:
                    shape: Mapping[str, float]) -> Array:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
-            return self._treated(lambda recording: np.concatenate([np.stack(effect.sensor_columns(
+            return self.treated(lambda recording: np.concatenate([np.stack(effect.sensor_columns(
                 self.sensed(recording.effort[None, part, drive], recording.time[part], drive,
                             effect)[0], recording.time[part], **shape))
                 for part in recording.segments], axis=1))
@@ -267,9 +267,10 @@ class Design:
             whole = rows(recording)
             return np.concatenate([self.sensed(whole[:, part], recording.time[part], drive)
                                    for part in recording.segments], axis=1)
-        return self._treated(behind_sensor)
+        return self.treated(behind_sensor)
 
-    def _treated(self, rows: Callable[[FullRate], Array]) -> Array:
+    def treated(self, rows: Callable[[FullRate], Array]) -> Array:
+        """Return rows (k, N) of every recording, treated, one after the other, (k, M)."""
         return np.concatenate([recording.treat(rows(recording).T).T
                                for recording in self.recordings], axis=1)
 

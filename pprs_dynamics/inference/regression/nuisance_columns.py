@@ -5,7 +5,8 @@
 
 Friction turns over at reversals in a width that nobody knows, and real effects depart from the
 catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Each gives a column
-whose coefficient has unit prior.
+whose coefficient has unit prior. They are as the drive feels them: behind its sensor they would
+follow a delay that is none, and make good what it does to the forces.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
         return np.stack(reversal_columns(
             (forward - backward) / 2, samples.velocity, samples.direction, width))
 
-    return design.shown(d, rows)
+    return design.treated(rows)
 
 
 def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
@@ -76,7 +77,7 @@ def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
         return np.reshape([coefficients @ np.stack(one) for one in found],
                           (len(found), len(recording.time)))
 
-    return design.shown(d, rows)
+    return design.treated(rows)
 
 
 def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dict[int, Array]:
