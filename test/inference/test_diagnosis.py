@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden.recordings import Case, make_case
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, simulate
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
@@ -316,6 +316,13 @@ def test_a_search_goes_on_from_a_set_that_holds_around_itself() -> None:
     names = ('external_wrench', 'time_delay', 'force_ripple')
     found, _ = case('pairs', *names, seed=741, snr=0.0)
     assert sorted(one.name for one in found.effects) == sorted(names)
+
+
+def test_what_reversals_leave_of_another_form_is_no_delay() -> None:
+    """The recording of the README: exponential Stribeck friction, sampled at 500 Hz."""
+    found = diagnose(MODEL, [simulate(MODEL, 'stribeck_friction', seed=2).recording])
+    assert [(one.name, one.drives) for one in found.effects] == [
+        ('stribeck_friction', ('slide_1',))]
 
 
 def test_wide_reversals_are_widths_and_no_further_friction() -> None:
