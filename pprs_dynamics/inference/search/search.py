@@ -23,7 +23,6 @@ from pprs_dynamics.inference.search.candidates import (
     Component,
     EffectCandidate,
     UnknownCandidate,
-    bends,
 )
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
 from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
@@ -109,10 +108,7 @@ class Search:
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._try(self._replacements(self.best))
             self._simplify(self.best)
-            if self.best.cost > before - LEAST_IMPROVEMENT:
-                return
-            if self.is_beyond_point:
-                self._try(self._other_bending(self.best))
+            if self.best.cost > before - LEAST_IMPROVEMENT or self.is_beyond_point:
                 return
 
     # Moves
@@ -163,18 +159,6 @@ class Search:
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
                     found += [(*base.candidates, pattern) for pattern in patterns]
         return found
-
-    def _other_bending(self, best: CandidateSet) -> Iterable[Candidates]:
-        """Yield sets in which another effect that bends the columns stands for one that does.
-
-        Several add nearly constant forces: around the wrong one, all would be computed in vain.
-        """
-        for candidate in best.effects:
-            if candidate.effect.bends_columns:
-                rest = best.without(candidate)
-                for candidates in self.scan.proposals(self.fits.at_noise_of(best, rest)):
-                    if any(bends(one) for one in candidates if one not in rest):
-                        yield candidates
 
     def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 ) -> CandidateSet | None:
