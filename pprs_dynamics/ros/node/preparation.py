@@ -34,10 +34,11 @@ def prepare_beside(node: Node, model: DriveModel | ArmModel) -> threading.Thread
     Returns
     -------
     Thread or None
-        Alive while it lasts; None where nothing is compiled, as of an arm.
+        Alive while it lasts; None for a mechanism of a URDF, whose kernels are ready when this
+        returns: compiled for some 25 s the first time after an installation.
     """
     if isinstance(model, ArmModel):
-        prepare(model)  # Pinocchio's data serve one thread at a time
+        prepare(model)  # uncompiled, one sample takes some 10 ms: no answer for a stream
         return None
     # Made anew there: buffers of a model serve one thread at a time.
     thread = threading.Thread(target=_prepare, args=(node.get_logger(), dict(model.values)),
