@@ -311,6 +311,13 @@ def test_what_shows_beside_others_alone_is_confirmed() -> None:
     assert tilt.error_after > tilt.error_before
 
 
+def test_a_search_goes_on_from_a_set_that_holds_around_itself() -> None:
+    """The first search takes the wrench for zeros; around these it finds the truth, far away."""
+    names = ('external_wrench', 'time_delay', 'force_ripple')
+    found, _ = case('pairs', *names, seed=741, snr=0.0)
+    assert sorted(one.name for one in found.effects) == sorted(names)
+
+
 def test_wide_reversals_are_widths_and_no_further_friction() -> None:
     model, recording, truth = make_case(Case('effects', ('homing_error',), 5, 1.0, 0.9))
     found = diagnose(model, [recording])

@@ -67,7 +67,7 @@ def _around_fitted(
 
     `first_step` returns the set around which to expand where effects bend the columns that did
     not yet; `rival` is the cost that each search has to reach for another one. A search whose
-    set is far from where its columns hold is not gone on from.
+    set is far from where its columns hold is gone on from only if the set costs less around itself.
     """
     search, best = first, at_first
     costs: dict[Hashable, float] = {}
@@ -92,10 +92,11 @@ def _around_fitted(
         starts = [one.candidates for one in dict.fromkeys((kept, best))]
         search.release()
         design, before, accepted = last.design, search.fits.design.point, best.candidates
+        reached = moved.total
         del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
         search = around(design, number)
         best = search.run(*starts)
-        if _is_far(search.fits, best):
+        if _is_far(search.fits, best) and not _holds_around_itself(search.fits, best, reached):
             if before is None:
                 return first, at_first
             search = around(first.fits.design.around(before), number)  # the one before, again
@@ -182,6 +183,16 @@ def _is_far(fits: FittedSets, best: CandidateSet) -> bool:
     left, promised = (_rms_by_drive(fits, error) for error in (
         fits.regression.residuals.measured - forces, linear_residual(fits, kept)))
     return bool(np.any(left > fits.decisions.left_ratio * promised))
+
+
+def _holds_around_itself(fits: FittedSets, best: CandidateSet, cost: float) -> bool:
+    """Return whether a set costs less, and holds, where columns are computed around it."""
+    kept, _ = beyond_lack_of_fit(fits, best)
+    try:
+        last, moved = linearised(fits, kept)
+    except PprsError:
+        return False
+    return moved.total < cost and not _is_far(last, moved)
 
 
 def _rms_by_drive(fits: FittedSets, error: Array) -> Array:
