@@ -6,12 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ConvergenceError
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
@@ -49,96 +48,63 @@ class FollowedMotion(NamedTuple):
         return notes
 
 
-class Kinematics(Protocol):
-    """Which drives there are, and what follows from their motion."""
-
-    @property
-    def drives(self) -> tuple[str, ...]:
-        """Names, in order."""
-
-    def follow(self, time: Array, drives: DriveMotion,
-               progress: Progress | None = None) -> FollowedMotion:
-        """Return the motion that belongs to the drives'; times (N,) [s]."""
-
-
-def kinematics_of(model: ForceModel | Geometry) -> Kinematics:
-    """Return the kinematics of a model of any kind, or of a 3-PPRS's geometry."""
-    if isinstance(model, (AxisModel, ArmModel)):
-        return JointKinematics(model.drives)
-    if isinstance(model, DriveModel):
-        return PlatformKinematics(model.robot.geometry)
-    assert isinstance(model, Geometry)
-    return PlatformKinematics(model)
-
-
-class JointKinematics:
-    """A single axis or an arm: its motion is the drives'.
+def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
+           progress: Progress | None = None) -> FollowedMotion:
+    """Return the motion that belongs to the drives': of an axis and an arm it is the same.
 
     Parameters
     ----------
-    drives : tuple of str
+    model : ForceModel or Geometry
+        Of any kind, or the geometry of a 3-PPRS.
+    time : (N,) array
+        [s].
+    drives : DriveMotion
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+
+    Raises
+    ------
+    ConvergenceError
+        Where drive positions do not close the mechanism.
     """
-
-    def __init__(self, drives: tuple[str, ...]) -> None:
-        self.drives = drives
-
-    def follow(self, time: Array, drives: DriveMotion,
-               progress: Progress | None = None) -> FollowedMotion:
-        """Return the drives' motion."""
+    if isinstance(model, (AxisModel, ArmModel)):
         return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
                               np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
+    geometry = model.robot.geometry if isinstance(model, DriveModel) else model
+    assert isinstance(geometry, Geometry)
+    return _follow_platform(geometry, time, drives, progress)
 
 
-class PlatformKinematics:
-    """The 3-PPRS: forward kinematics, chunk by chunk.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    """
-
-    drives = DRIVES
-
-    def __init__(self, geometry: Geometry) -> None:
-        self.geometry = geometry
-
-    def follow(self, time: Array, drives: DriveMotion,
-               progress: Progress | None = None) -> FollowedMotion:
-        """Return the platform's motion.
-
-        Raises
-        ------
-        ConvergenceError
-            Where drive positions do not close the mechanism.
-        """
-        count = len(time)
-        arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
-        near = np.zeros(count, dtype=bool)
-        for segment in drives.segments:
-            seed = None
-            for start in range(segment.start, segment.stop, CHUNK):
-                rows = slice(start, min(start + CHUNK, segment.stop))
-                try:
-                    found = solve_forward_motion(
-                        self.geometry, drives.position[rows], drives.velocity[rows],
-                        drives.acceleration[rows], seed)
-                except ConvergenceError as error:
-                    sample = start + error.sample
-                    raise ConvergenceError(
-                        int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
-                        error.rule) from None
-                part = found.motion
-                for array, values in zip(arrays, (
-                        part.position, part.orientation, part.linear_velocity,
-                        part.angular_velocity, part.linear_acceleration,
-                        part.angular_acceleration), strict=True):
-                    array[rows] = values
-                near[rows] = found.near_branch
-                seed = part[-1:]
-                if progress is not None:
-                    progress(rows.stop, count)
-        motion = PlatformMotion(*arrays)
-        return FollowedMotion(motion, near, _jumps(motion, time, drives.segments))
+def _follow_platform(geometry: Geometry, time: Array, drives: DriveMotion,
+                     progress: Progress | None) -> FollowedMotion:
+    """Return the platform's motion by forward kinematics, chunk by chunk."""
+    count = len(time)
+    arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
+    near = np.zeros(count, dtype=bool)
+    for segment in drives.segments:
+        seed = None
+        for start in range(segment.start, segment.stop, CHUNK):
+            rows = slice(start, min(start + CHUNK, segment.stop))
+            try:
+                found = solve_forward_motion(
+                    geometry, drives.position[rows], drives.velocity[rows],
+                    drives.acceleration[rows], seed)
+            except ConvergenceError as error:
+                sample = start + error.sample
+                raise ConvergenceError(
+                    int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
+                    error.rule) from None
+            part = found.motion
+            for array, values in zip(arrays, (
+                    part.position, part.orientation, part.linear_velocity, part.angular_velocity,
+                    part.linear_acceleration, part.angular_acceleration), strict=True):
+                array[rows] = values
+            near[rows] = found.near_branch
+            seed = part[-1:]
+            if progress is not None:
+                progress(rows.stop, count)
+    motion = PlatformMotion(*arrays)
+    return FollowedMotion(motion, near, _jumps(motion, time, drives.segments))
 
 
 def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np.ndarray:

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.inference.residuals.followed_motion import CHUNK, Motion, kinematics_of
+from pprs_dynamics.inference.residuals.followed_motion import CHUNK, Motion, follow
 from pprs_dynamics.measurement.files.samples import Progress
-from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
@@ -56,30 +56,19 @@ class Chunk:
 
 
 @dataclass(frozen=True)
-class Reconstruction:
-    """N samples of motion and effort in one or more segments, and M blocks of them.
+class Reconstruction(DriveMotion):
+    """Motion of the drives and what they move, with effort; N samples, and M blocks of them.
 
     Parameters
     ----------
     time : (N,) array
         [s].
-    position, velocity, acceleration : (N, D) arrays
-        Of the drives, smoothed [m, m/s, m/s^2].
     motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
         As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
-    index : (N,) int array
-        The samples' places in the recording.
-    segments : tuple of slice
-        Of the N samples.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
-    smoothing : Smoothing
-    block : int
-        Samples per block, in the longest segment.
-    from_recorded : (2, D) bool array
-        Drives whose velocity, and those whose acceleration, come from recorded velocities.
     near_branch : (N,) bool array
         See `ForwardKinematics`.
     jumps : (J,) int array
@@ -88,30 +77,19 @@ class Reconstruction:
         By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
         Samples of the recording's segments that are not here: edges and short segments.
-    notes : tuple of str
-        What was done and found, in words.
     start : float
         Time of the recording's first sample, which may be dropped here [s].
     """
 
     time: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
     motion: Motion
     effort: Array
-    index: np.ndarray
-    segments: tuple[slice, ...]
     treat: Treatment
-    smoothing: Smoothing
-    block: int
-    from_recorded: np.ndarray
     near_branch: np.ndarray
     jumps: np.ndarray
-    dropped: int
-    notes: tuple[str, ...]
-    start: float
     gain: Array
+    dropped: int
+    start: float
 
     def __len__(self) -> int:
         return len(self.time)
@@ -166,11 +144,11 @@ def reconstruct(
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    kinematics = kinematics_of(model)
-    if tuple(recording.drives) != kinematics.drives:
-        order = ', in this order' if len(kinematics.drives) > 1 else ''
+    names = model.drives if isinstance(model, ForceModel) else DRIVES
+    if tuple(recording.drives) != names:
+        order = ', in this order' if len(names) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
-                          f'be {", ".join(kinematics.drives)}{order}', 'shape')
+                          f'be {", ".join(names)}{order}', 'shape')
     if isinstance(model, ForceModel):
         unit = 'rad' if all(one.turns for one in model.units) else 'm'
         drives = smooth_drives(recording, window, model.blocks_per_period, unit)
@@ -180,7 +158,7 @@ def reconstruct(
         drives = replace(drives, position=drives.position - model.position_error)
     time, total = recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
-    followed = kinematics.follow(time, drives, progress)
+    followed = follow(model, time, drives, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
@@ -188,15 +166,15 @@ def reconstruct(
     rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
     if np.any(rests):
         shares = (f'{name} {share:.0%}' for name, share in zip(
-            kinematics.drives, rests.mean(axis=0), strict=True) if share >= 0.005)
+            names, rests.mean(axis=0), strict=True) if share >= 0.005)
         notes.append('efforts of drives that stand do not count, static friction holds any: '
                      + (', '.join(shares) or 'less than 0.5% of the time'))
+    drives = replace(drives, notes=tuple(notes))
     return Reconstruction(
-        time, drives.position, drives.velocity, drives.acceleration, followed.motion,
-        effort, drives.index, drives.segments,
-        Treatment(drives.block_starts, total), drives.smoothing, drives.block,
-        drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
-        float(recording.time[0]), _applied_gain(recording))
+        **vars(drives), time=time, motion=followed.motion, effort=effort,
+        treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
+        jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
+        start=float(recording.time[0]))
 
 
 def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Reconstruction:
@@ -217,12 +195,10 @@ def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Recons
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    drives = DriveMotion(found.position - shift, found.velocity, found.acceleration, found.index,
-                         found.segments, found.treat.starts, found.block, found.smoothing,
-                         found.from_recorded, ())
-    followed = kinematics_of(model).follow(found.time, drives)
-    return replace(found, position=drives.position, motion=followed.motion,
-                   near_branch=followed.near_branch, jumps=followed.jumps)
+    moved = replace(found, position=found.position - shift)
+    followed = follow(model, found.time, moved)
+    return replace(moved, motion=followed.motion, near_branch=followed.near_branch,
+                   jumps=followed.jumps)
 
 
 def _applied_gain(recording: Recording) -> Array:
