@@ -22,7 +22,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
@@ -41,7 +40,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.ranking import Ranking, select
-from pprs_dynamics.inference.search.relinearisation import SettledSet, settled
+from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -91,8 +90,6 @@ class Diagnosis:
     held_out_on : {'blocks', 'validation'}
     selection : Ranking, optional
         All that was tried, for looking closer.
-    chosen : CandidateSet, optional
-        What was adopted of them.
     """
 
     verdict: str
@@ -117,7 +114,6 @@ class Diagnosis:
     above_noise: Mapping[str, float] = field(default_factory=dict)
     held_out_on: str = 'blocks'
     selection: Ranking | None = field(default=None, repr=False, compare=False)
-    chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
@@ -167,55 +163,35 @@ def diagnose(
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
-    ranking = select(model, recordings, decisions, lambda share: report(0.9 * share))
-    diagnosis = _Answer(ranking, validate, decisions).diagnosis()
+    answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
+                     validate, decisions)
+    unconfirmed: list[FoundEffect] = []
+    while weak := [one for one in answer.effects if not one.is_confirmed]:
+        unconfirmed.append(min(weak, key=lambda one: one.evidence))
+        gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
+        answer = _Answer(answer.ranking.less(gone), validate, decisions)
+    diagnosis = answer.diagnosis(tuple(unconfirmed))
     report(1.0)
     return diagnosis
 
 
 class _Answer:
-    """Turns a ranking into an answer."""
+    """What is to be said of a ranking."""
 
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
-        self.drives = ranking.last.design.drives
+        self.fits, self.best, self.kept = ranking.last, ranking.best, ranking.kept
+        self.design = self.fits.design
+        self.drives = self.design.drives
+        self.final = settled(self.fits, self.kept)
+        self.remaining = ranking.first.design.residuals.measured - exact_forces(
+            self.design, self.final.model)
+        self.effects = self._effects()
 
-    @property
-    def fits(self) -> FittedSets:
-        """Around the model that is adopted."""
-        return self.ranking.last
-
-    @property
-    def design(self) -> Design:
-        """Of these."""
-        return self.fits.design
-
-    @property
-    def best(self) -> CandidateSet:
-        """That of lowest cost."""
-        return self.ranking.best
-
-    @property
-    def kept(self) -> CandidateSet:
-        """What is adopted."""
-        return self.ranking.kept
-
-    def diagnosis(self) -> Diagnosis:
-        first = self.ranking.first.design
-        unconfirmed: list[FoundEffect] = []
-        while True:
-            final = settled(self.fits, self.kept)
-            adopted = final.model
-            remaining = first.residuals.measured - exact_forces(self.design, adopted)
-            effects = self._effects(final, adopted, remaining)
-            weak = [one for one in effects if not one.is_confirmed]
-            if not weak:
-                break
-            least = min(weak, key=lambda one: one.evidence)
-            unconfirmed.append(least)
-            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)])
-        fits, regression = self.fits, self.fits.regression
+    def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
+        first, final, effects = self.ranking.first.design, self.final, self.effects
+        regression = self.fits.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}
@@ -223,32 +199,33 @@ class _Answer:
         depends = self._depends_on(noise)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
         # Where nothing was found, what is left is the noise.
-        above = self._above_noise(remaining, floors) if effects or unconfirmed else {}
+        above = self._above_noise(floors) if effects or unconfirmed else {}
         verdict = ('unknown' if depends or above else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
         return Diagnosis(
-            verdict, tuple(effects), sets, tuple(unconfirmed), self._candidates(),
+            verdict, tuple(effects), sets, unconfirmed, self._candidates(),
             self._suspects(), depends, tuple(map(self._within_model_error,
                                                  self.ranking.remainders)), self._sets(),
-            tuple(moved), find_cautions(fits, self.best, effects), first.notes,
-            first.given, adopted, first.residuals, remaining, noise, floors,
+            tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
+            first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above,
-            'validation' if self.validate else 'blocks', self.ranking, self.kept)
+            'validation' if self.validate else 'blocks', self.ranking)
 
-    def _effects(self, final: SettledSet, adopted: ForceModel, remaining: Array,
-                 ) -> list[FoundEffect]:
+    def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
         fits, ordered, steps = self.fits, self.ranking.order, self.ranking.path
+        final = self.final
         if not ordered:
             return []
         errors = [root_mean_square(self.ranking.first.design.residuals.error),
-                  *(linear_error(fits, step) for step in steps[1:-1]), root_mean_square(remaining)]
+                  *(linear_error(fits, step) for step in steps[1:-1]),
+                  root_mean_square(self.remaining)]
         if self.validate:
-            given = self.ranking.first.design.given
-            models = [given, *(settled(fits, one).model for one in steps[1:-1]), adopted]
-            held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
+            models = [self.ranking.first.design.given,
+                      *(settled(fits, one).model for one in steps[1:-1]), final.model]
+            held_out = [self._error_held_out(one) for one in models]
         else:
             # Nothing is fitted in the model as given: all of its error is held out.
             held_out = [errors[0], *(hold_out(fits, step).error for step in steps[1:])]
@@ -258,14 +235,18 @@ class _Answer:
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
+                final.fits.library.force(final.found, last, self.remaining.shape),
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                final.fits.library.force(final.found, last, remaining.shape), said.at_bound,
-                self.ranking.shares[k],
+                said.at_bound, self.ranking.shares[k],
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
         return found
+
+    def _error_held_out(self, model: ForceModel) -> float:
+        """Return the error of a model on the recordings that are not fitted [N]."""
+        return rms(measure_residuals(model, self.validate)[0])
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
@@ -288,13 +269,12 @@ class _Answer:
         if linear_error(self.fits, without) <= error:
             return False
         if self.validate:
-            model = settled(self.fits, without).model
-            return rms(measure_residuals(model, self.validate)[0]) > held_out
+            return self._error_held_out(settled(self.fits, without).model) > held_out
         return self._is_predicted(without, self.kept)
 
-    def _above_noise(self, remaining: Array, floors: Mapping[str, float]) -> dict[str, float]:
-        """Return the drives that keep an error (M, D) above their noise, as multiples of it."""
-        kept = {self.drives[d]: root_mean_square(remaining[:, d]) / max(
+    def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
+        """Return the drives that keep an error above their noise, as multiples of it."""
+        kept = {self.drives[d]: root_mean_square(self.remaining[:, d]) / max(
             floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
         return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio}
 

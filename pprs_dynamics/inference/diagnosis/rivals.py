@@ -6,62 +6,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms
 from pprs_dynamics.inference.search.candidates import CandidateSet
-from pprs_dynamics.inference.search.estimates import Estimate, estimate
+from pprs_dynamics.inference.search.estimates import estimate
 from pprs_dynamics.inference.search.fitted_model import fitted_model, linear_error, linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
-
-
-@dataclass(frozen=True)
-class RivalEffect:
-    """An effect that would explain the recordings about as well as an adopted one.
-
-    Parameters
-    ----------
-    of : str
-        The adopted effect.
-    effect : type of CatalogueEffect
-    drives : tuple of str or None
-    parameters : dict of str to Estimate
-    error_after : float
-        With it in place of the adopted one [N].
-    held_out_after : float
-        The same on held-out data [N]; NaN where it is no model that can be evaluated there.
-    cost : float
-        Of its set, above the best one's.
-    force, remaining : (M, D) array
-        What it contributes, and what its set leaves [N].
-    """
-
-    of: str
-    effect: type[CatalogueEffect]
-    drives: tuple[str, ...] | None
-    parameters: dict[str, Estimate]
-    error_after: float
-    held_out_after: float
-    cost: float
-    force: Array
-    remaining: Array
-
-    @property
-    def name(self) -> str:
-        """Name in the catalogue."""
-        return self.effect.name
-
-    @property
-    def places(self) -> tuple[tuple[str, ...], ...]:
-        """See `FoundEffect`."""
-        return self.effect.places_of(self.parameters)
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
@@ -90,11 +46,10 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
         candidate = next(c for c in best.effects if name in (c.name, c.claim))
         remaining = linear_residual(fits, best)
         found.append(RivalEffect(
-            of, candidate.effect, fits.design.named(candidate.drives),
+            candidate.effect, fits.design.named(candidate.drives),
             estimate(fits, best, candidate).parameters,
-            linear_error(fits, best), _held_out(fits, best, validate),
-            best.cost - selection.best.cost,
-            fits.library.force(best, candidate, remaining.shape), remaining))
+            fits.library.force(best, candidate, remaining.shape), of, linear_error(fits, best),
+            _held_out(fits, best, validate), best.cost - selection.best.cost, remaining))
     return tuple(found)
 
 

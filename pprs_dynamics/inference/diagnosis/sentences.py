@@ -12,8 +12,10 @@ from math import isnan
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import (
+    FittedEffect,
     FoundEffect,
     RankedEffect,
+    RivalEffect,
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
@@ -28,9 +30,12 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_drives,
     with_uncertainty,
 )
-from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
-from pprs_dynamics.inference.diagnosis.statements import Statement
-from pprs_dynamics.inference.diagnosis.unknown_words import describe_unexplained, place_on
+from pprs_dynamics.inference.diagnosis.statements import (
+    Statement,
+    describe_unexplained,
+    place_of,
+    place_on,
+)
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
@@ -145,6 +150,34 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
             for effect in diagnosis.effects for drive, parameter, one in _fitted(diagnosis, effect)]
 
 
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best."""
+    every = diagnosis.residuals.drives
+    return [(' and '.join(with_drives(_plain_name(name), drives, every)
+                          for name, drives in one.names) or 'nothing missing',
+             f'+{plain(one.cost, 2)}' if number else 'the best')
+            for number, one in enumerate(diagnosis.sets)]
+
+
+def runner_up(diagnosis: Diagnosis) -> str:
+    """Return how the second best set differs from the best, with its cost; '' for none."""
+    if len(diagnosis.sets) < 2:
+        return ''
+    best, second = (set(one.names) for one in diagnosis.sets[:2])
+    missing, instead = best - second, second - best
+    moved = {name for name, _ in missing} & {name for name, _ in instead}
+    if len(missing | instead) <= 2:
+        moved = set()  # one on other drives: both are told
+    left, put = (listed([with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
+                         for name, drives in one.names
+                         if (name, drives) in apart and name not in moved])
+                 for one, apart in zip(diagnosis.sets[:2], (missing, instead), strict=True))
+    words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
+             else f'without {left}' if left else '',
+             f'{listed(sorted(moved))} on other drives' if moved else '']
+    return ', '.join([*filter(None, words), f'cost +{plain(diagnosis.sets[1].cost, 2)}'])
+
+
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
     named = listed([_or_rivals(diagnosis, one) for one in held])
@@ -206,7 +239,7 @@ def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     return listed([title, *rivals], 'or') + several
 
 
-def _title(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
+def _title(diagnosis: Diagnosis, found: FittedEffect) -> str:
     """Return the effect and where it is, all links and joints that are alike among them."""
     places = listed([listed(names, 'or') for names in found.places])
     return (f'{found.name} on {places}' if places else
@@ -245,7 +278,7 @@ def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
         sentence(card.confirm), sentence(card.looks_like))
 
 
-def _parameters(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
+def _parameters(diagnosis: Diagnosis, found: FittedEffect) -> str:
     fitted = _fitted(diagnosis, found)
     drives = {drive for drive, _, _ in fitted}
     if len(drives) <= MOST_LISTED:
@@ -265,7 +298,7 @@ def _parameters(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
     return ', '.join(phrases)
 
 
-def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
+def _fitted(diagnosis: Diagnosis, found: FittedEffect,
             ) -> list[tuple[str, Parameter, Estimate]]:
     """Return drive ('' for none), parameter and estimate of what was not left at zero."""
     known = {parameter.name: parameter for parameter in found.effect.parameters}
@@ -385,3 +418,8 @@ def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
     return (f'{moved}, within its tolerance of {tolerance:.2g} ({tolerance:.0%}): calibrated, not '
             'an effect' if within else
             f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')
+
+
+def _plain_name(name: str) -> str:
+    unknown, comma, variable = name.partition(', ')
+    return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name

@@ -150,17 +150,16 @@ class WhatIf:
 
 def what_if(diagnosis: Diagnosis) -> WhatIf | None:
     """Return the system of all effects that a diagnosis tried; None where its searches are gone."""
-    if diagnosis.selection is None or diagnosis.chosen is None:
+    if diagnosis.selection is None:
         return None
-    return _System(diagnosis, diagnosis.selection, diagnosis.chosen).what_if()
+    return _System(diagnosis, diagnosis.selection).what_if()
 
 
 class _System:
     """Columns of all placements that were tried, in the last search."""
 
-    def __init__(self, diagnosis: Diagnosis, selection: Ranking, kept: CandidateSet) -> None:
-        self.diagnosis, self.kept = diagnosis, kept
-        self.fits = selection.last
+    def __init__(self, diagnosis: Diagnosis, selection: Ranking) -> None:
+        self.diagnosis, self.kept, self.fits = diagnosis, selection.kept, selection.last
         self.first_choice: dict[str, set[int | None]] = {}
         self.placements: dict[tuple[str, int | None], Component] = {}
         self.nuisance: dict[Component, tuple[Block, ...]] = {}
@@ -173,7 +172,7 @@ class _System:
                     if key not in self.placements:
                         self.placements[key] = placement
                         self.nuisance[placement] = found.nuisance.get(placement, ())
-        self.unknown = [block for candidate in kept.unknowns for block in candidate.blocks]
+        self.unknown = [block for candidate in self.kept.unknowns for block in candidate.blocks]
         blocks = [*self.unknown, *(block for one in self.placements.values()
                                    for block in self._blocks(one))]
         # Here fixed columns stand like others; a fit takes them with the coefficient 1.
