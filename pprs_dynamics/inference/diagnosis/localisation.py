@@ -18,11 +18,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
-from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.bins import MOST_SHARE
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.patterns import Pattern
@@ -124,15 +124,12 @@ def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
 
 
 def _search(residuals: Residuals, drive: int) -> DriveFindings:
-    measured = residuals.measured[:, drive]
-    known = np.isfinite(measured)
-    if known.sum() < LEAST_SAMPLES:
+    try:
+        regression = Regression(residuals, drives=(drive,))
+    except ResidualsError:
         return DriveFindings((), None)
-    regression = Regression(residuals, drives=(drive,))
-    if drive not in regression.series:
-        return DriveFindings((), None)
-    error = residuals.error[known, drive]
-    if np.abs(error).max() <= ROUNDING * np.abs(measured[known]).max():
+    error, measured = residuals.error[:, drive], residuals.measured[:, drive]
+    if np.nanmax(np.abs(error)) <= ROUNDING * np.nanmax(np.abs(measured)):
         return DriveFindings((), None)
     prices = replace(Prices.of(regression, DECISIONS), drives=len(residuals.drives))
     library = PatternLibrary(regression, prices, drive, with_plain_forms=True)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isnan
 
@@ -261,8 +261,7 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
     return Finding(
         title, f'{what}.', _why(diagnosis, found, is_first), sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like),
-        (*_ambiguous(diagnosis, found), *_negative(diagnosis, found),
-         *_alike(diagnosis, found), *_two_in_one(diagnosis, found), *_bound(found)))
+        tuple(_remarks(diagnosis, found)))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
@@ -324,22 +323,23 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
             f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
-def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    rivals = _rivals(diagnosis, found)
-    if not rivals:
-        return []
-    return [f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
-            'explain it about as well.']
+def _remarks(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
+    if rivals := _rivals(diagnosis, found):
+        yield (f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
+               'explain it about as well.')
+    yield from _negative(diagnosis, found)
+    for names in found.places:
+        if len(names) > 1:
+            yield (f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. '
+                   'The numbers are for the one that is named with them.')
+    if found.effect is AsymmetricFriction:
+        yield from _two_in_one(diagnosis, found)
+    if found.at_bound:
+        yield (f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of '
+               'what was tried: no finding but that it is there or beyond.')
 
 
-def _alike(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    return [f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. The '
-            'numbers are for the one that is named with them.'
-            for names in found.places if len(names) > 1]
-
-
-def _negative(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    remarks = []
+def _negative(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
     for drive, parameter, one in _fitted(diagnosis, found):
         lowest = found.effect.unphysical_below.get(parameter.name)
         if lowest is None or one.value >= lowest:
@@ -348,40 +348,26 @@ def _negative(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
         value = with_uncertainty(one.value, one.std, one.unit)
         kind = 'friction' if 'friction' in found.name else parameter.description
         sure = one.value + INTERVAL * one.std < lowest
-        remarks.append(
-            f'{place}: {parameter.description} is negative, {value}'
-            + ('' if sure else ', though zero is within its uncertainty')
-            + f'. There is no negative {kind}: either the model has too much of it already, or '
-            'something else looks like it.')
-    return remarks
+        doubt = '' if sure else ', though zero is within its uncertainty'
+        yield (f'{place}: {parameter.description} is negative, {value}{doubt}. There is no '
+               f'negative {kind}: either the model has too much of it already, or something else '
+               'looks like it.')
 
 
-def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    """Return how the dry part of asymmetric friction reads as two other effects."""
-    if found.effect is not AsymmetricFriction:
-        return []
+def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
+    """Tell how the dry part of asymmetric friction reads as two other effects."""
     forces: dict[str, dict[str, Estimate]] = {}
     for drive, parameter, one in _fitted(diagnosis, found):
         if parameter.name.startswith('force_'):
             forces.setdefault(drive, {})[parameter.name] = one
-    remarks = []
     for drive, both in forces.items():
         unit = diagnosis.residuals.units_of(drive).effort
         forward, backward = (both[key].value if key in both else 0.0
                              for key in ('force_forward', 'force_backward'))
-        remarks.append(
-            f'{drive}: the dry part is the same as coulomb_friction of '
-            f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
-            f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the one '
-            'from the two, a reading at rest can.')
-    return remarks
-
-
-def _bound(found: FoundEffect) -> list[str]:
-    if not found.at_bound:
-        return []
-    return [f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of what '
-            'was tried: no finding but that it is there or beyond.']
+        yield (f'{drive}: the dry part is the same as coulomb_friction of '
+               f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
+               f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the '
+               'one from the two, a reading at rest can.')
 
 
 def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:

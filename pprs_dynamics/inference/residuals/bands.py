@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,8 @@ class DriveSeries:
         Samples of the residuals that belong to a stretch.
     known : (n,) bool array
         Those that were measured.
+    stretches : list of slice
+        Parts of `index` without a gap.
     frequency : (n,) array
         Of the coefficients, ascending [Hz].
     counts : (B,) array
@@ -120,8 +123,8 @@ class DriveSeries:
         self.index = np.concatenate([np.arange(part.start, part.stop) for part in stretches]
                                     or [np.zeros(0, dtype=int)])
         self.known = np.isfinite(measured[self.index])
-        lengths = np.array([part.stop - part.start for part in stretches], dtype=int)
-        self._ends = np.cumsum(lengths)
+        lengths = [part.stop - part.start for part in stretches]
+        self.stretches = [slice(a, b) for a, b in pairwise(accumulate(lengths, initial=0))]
         frequency = np.concatenate([np.arange(n) / (2 * n * residuals.period) for n in lengths]
                                    or [np.zeros(0)])
         order = np.argsort(frequency, kind='stable')
@@ -141,12 +144,6 @@ class DriveSeries:
     def error(self) -> Array:
         """Measured minus model at `index`, gaps bridged [N]."""
         return bridged(np.nan_to_num(self.residuals.error[self.index, self.drive]), self.known)
-
-    @property
-    def stretches(self) -> list[slice]:
-        """Parts of `index` without a gap."""
-        starts = np.concatenate(([0], self._ends[:-1])) if len(self._ends) else self._ends
-        return [slice(int(a), int(b)) for a, b in zip(starts, self._ends, strict=True)]
 
     def transform(self, values: Array) -> Array:
         """Return DCT coefficients (..., n) by ascending frequency, of values (..., M or n)."""
