@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.errors import MotionError
+from pprs_dynamics.errors import MotionError, PprsError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
     RankedEffect,
     RankedSet,
+    RivalEffect,
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
@@ -35,7 +36,12 @@ from pprs_dynamics.inference.search.estimates import (
     calibrations,
     estimate,
 )
-from pprs_dynamics.inference.search.fitted_model import exact_forces, linear_error
+from pprs_dynamics.inference.search.fitted_model import (
+    exact_forces,
+    fitted_model,
+    linear_error,
+    linear_residual,
+)
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
@@ -295,8 +301,7 @@ class _Answer:
         for candidate in self.kept.unknowns:
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    self.drives[d], libraries[d], candidate, self.kept.fit.of(block),
-                    self._evidence(candidate), ()))
+                    libraries[d], candidate, self.kept.fit.of(block), self._evidence(candidate)))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
                        if one.amplitude > self._lack_of_fit(self.drives.index(name))]
@@ -343,3 +348,45 @@ class _Answer:
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+
+
+def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
+                  ) -> tuple[RivalEffect, ...]:
+    """Return each rival that a diagnosis names, from the best set that holds it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    validate : sequence of Recording, optional
+        Those of the diagnosis; without them held-out errors are taken on blocks.
+    """
+    selection = diagnosis.selection
+    if selection is None:
+        return ()
+    found = []
+    adopted = {c.name: c.claim for c in selection.kept.effects}
+    for of, name in ((names[0], name) for names in diagnosis.indistinguishable
+                     for name in names[1:]):
+        best = next((one for one in selection.sets
+                     if any(name in (c.name, c.claim) for c in one.effects)
+                     and adopted[of] not in {c.claim for c in one.effects}), None)
+        if best is None:
+            continue
+        fits = selection.fits_of(best)
+        candidate = next(c for c in best.effects if name in (c.name, c.claim))
+        remaining = linear_residual(fits, best)
+        found.append(RivalEffect(
+            candidate.effect, fits.design.named(candidate.drives),
+            estimate(fits, best, candidate).parameters,
+            fits.library.force(best, candidate, remaining.shape), of, linear_error(fits, best),
+            _held_out(fits, best, validate), best.cost - selection.best.cost, remaining))
+    return tuple(found)
+
+
+def _held_out(fits: FittedSets, found: CandidateSet, validate: Sequence[Recording]) -> float:
+    if not validate:
+        return hold_out(fits, found).error
+    try:
+        return rms(measure_residuals(fitted_model(fits, found), validate)[0])
+    except PprsError:
+        return float('nan')

@@ -140,16 +140,16 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
         winner = _best(library, fit, blocks, {one[0].family.variable for one in stated})
         if winner is None:
             break
-        candidate, found, evidence, rivals = winner
-        stated.append((candidate, found, evidence, rivals))
+        stated.append(winner)
+        candidate, found, _, _ = winner
         blocks += [*candidate.blocks, *_carried(library, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
-    statements = [word_statement(residuals.drives[drive], library, candidate,
-                                 found.of(candidate.parts[drive]), evidence, rivals)
+    statements = [word_statement(library, candidate, found.of(candidate.parts[drive]), evidence,
+                                 rivals)
                   for candidate, found, evidence, rivals in stated]
     scatter = _scatter(library, fit, {one[0].family.variable for one in stated})
     if scatter is not None:
-        statements.append(word_scatter(residuals.drives[drive], library, *scatter))
+        statements.append(word_scatter(library, *scatter))
     return DriveFindings(tuple(statements), regression.noise(fit)[drive])
 
 

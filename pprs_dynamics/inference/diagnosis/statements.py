@@ -131,25 +131,24 @@ class Statement:
 
 
 def word_statement(
-    drive: str, library: PatternLibrary, candidate: UnknownCandidate, coefficients: Array,
-    evidence: float, rivals: tuple[str, ...],
+    library: PatternLibrary, candidate: UnknownCandidate, coefficients: Array, evidence: float,
+    rivals: tuple[str, ...] = (),
 ) -> Statement:
     """Return the statement that a pattern makes.
 
     Parameters
     ----------
-    drive : str
     library : PatternLibrary
         Of the drive.
     candidate : UnknownCandidate
     coefficients : (1 or 2,) array
         Fitted [N].
     evidence : float
-    rivals : tuple of str
+    rivals : tuple of str, optional
         Variables that would do as well.
     """
     pattern, variable = candidate.pattern, candidate.family.variable
-    series = library.series
+    drive, series = library.residuals.drives[library.d], library.series
     known = series.known
     error = series.error[known]
     columns = candidate.rows[library.d][:, series.index][:, known]
@@ -185,9 +184,10 @@ def word_statement(
                      pattern.kind, amplitude, float(np.mean(shape ** 2)), rivals)
 
 
-def word_scatter(drive: str, library: PatternLibrary, variable: str, pattern: Pattern,
-                 column: Array, evidence: float) -> Statement:
+def word_scatter(library: PatternLibrary, variable: str, pattern: Pattern, column: Array,
+                 evidence: float) -> Statement:
     """Return the statement that the noise is larger in a range than elsewhere."""
+    drive = library.residuals.drives[library.d]
     known = library.series.known
     error = library.series.error[known]
     held = column[known] > 0.5
