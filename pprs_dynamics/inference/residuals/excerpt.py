@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.residuals.followed_motion import follow
+from pprs_dynamics.inference.residuals.reconstruction import follow
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.treatment import Treatment
