@@ -24,7 +24,7 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.residuals.residuals import Residuals, bridged, find_stretches
+from pprs_dynamics.inference.residuals.residuals import Residuals, bridged
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
 SINGLE_BANDS, BAND_RATIO = 12, 1.25
@@ -117,12 +117,11 @@ class DriveSeries:
 
     def __init__(self, residuals: Residuals, drive: int, bands: FrequencyBands) -> None:
         self.residuals, self.drive, self.bands = residuals, drive, bands
-        measured = residuals.measured[:, drive]
-        stretches = [_fast(part, np.isfinite(measured))
-                     for part in find_stretches(measured, residuals.segment)]
+        measured = np.isfinite(residuals.measured[:, drive])
+        stretches = [_fast(part, measured) for part in residuals.stretches(drive)]
         self.index = np.concatenate([np.arange(part.start, part.stop) for part in stretches]
                                     or [np.zeros(0, dtype=int)])
-        self.known = np.isfinite(measured[self.index])
+        self.known = measured[self.index]
         lengths = [part.stop - part.start for part in stretches]
         self.stretches = [slice(a, b) for a, b in pairwise(accumulate(lengths, initial=0))]
         frequency = np.concatenate([np.arange(n) / (2 * n * residuals.period) for n in lengths]
