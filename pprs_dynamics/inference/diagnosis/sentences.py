@@ -71,12 +71,17 @@ class Finding:
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A fitted parameter as people read it; `drive` is '' for none."""
+    """A fitted parameter of an effect; `drive` is '' for none."""
 
     effect: str
     drive: str
     parameter: Parameter
-    text: str
+    estimate: Estimate
+
+    @property
+    def text(self) -> str:
+        """Value with uncertainty and unit as people read it."""
+        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit)
 
 
 @dataclass(frozen=True)
@@ -145,9 +150,7 @@ def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
 
 def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
     """Return all that was fitted and not left at zero, in the order of adoption and of drives."""
-    return [FittedValue(effect.name, drive, parameter,
-                        with_uncertainty(one.value, one.std, one.unit))
-            for effect in diagnosis.effects for drive, parameter, one in _fitted(diagnosis, effect)]
+    return [one for effect in diagnosis.effects for one in _fitted(diagnosis, effect)]
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
@@ -279,35 +282,32 @@ def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
 
 def _parameters(diagnosis: Diagnosis, found: FittedEffect) -> str:
     fitted = _fitted(diagnosis, found)
-    drives = {drive for drive, _, _ in fitted}
+    drives = {one.drive for one in fitted}
     if len(drives) <= MOST_LISTED:
         return ', '.join(
-            f'{parameter.description} ({parameter.symbol}) '
-            + with_uncertainty(one.value, one.std, one.unit)
-            + (f' on {drive}' if len(drives) > 1 else '') for drive, parameter, one in fitted)
+            f'{one.parameter.description} ({one.parameter.symbol}) {one.text}'
+            + (f' on {one.drive}' if len(drives) > 1 else '') for one in fitted)
     phrases = []
     for parameter in found.effect.parameters:
-        mine = sorted(((one, drive) for drive, p, one in fitted if p is parameter),
-                      key=lambda pair: pair[0].value)
-        if not mine:
-            continue
-        ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
-        phrases.append(f'{parameter.description} ({parameter.symbol}) ' + ' to '.join(
-            f'{with_uncertainty(one.value, one.std, one.unit)} ({drive})' for one, drive in ends))
+        mine = sorted((one for one in fitted if one.parameter is parameter),
+                      key=lambda one: one.estimate.value)
+        if mine:
+            ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
+            phrases.append(f'{parameter.description} ({parameter.symbol}) '
+                           + ' to '.join(f'{one.text} ({one.drive})' for one in ends))
     return ', '.join(phrases)
 
 
-def _fitted(diagnosis: Diagnosis, found: FittedEffect,
-            ) -> list[tuple[str, Parameter, Estimate]]:
-    """Return drive ('' for none), parameter and estimate of what was not left at zero."""
+def _fitted(diagnosis: Diagnosis, found: FittedEffect) -> list[FittedValue]:
+    """Return what was fitted of an effect and not left at zero, in the order of drives."""
     known = {parameter.name: parameter for parameter in found.effect.parameters}
     order = ['', *diagnosis.residuals.drives]
-    rows = []
+    values = []
     for key, estimate in found.parameters.items():
         drive, name = found.effect.place_and_parameter(key)
         if estimate.value:
-            rows.append((drive, known[name], estimate))
-    return sorted(rows, key=lambda row: order.index(row[0]))
+            values.append(FittedValue(found.name, drive, known[name], estimate))
+    return sorted(values, key=lambda one: order.index(one.drive))
 
 
 def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
@@ -340,30 +340,28 @@ def _remarks(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
 
 
 def _negative(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
-    for drive, parameter, one in _fitted(diagnosis, found):
-        lowest = found.effect.unphysical_below.get(parameter.name)
-        if lowest is None or one.value >= lowest:
+    for one in _fitted(diagnosis, found):
+        value, what = one.estimate.value, one.parameter.description
+        lowest = found.effect.unphysical_below.get(one.parameter.name)
+        if lowest is None or value >= lowest:
             continue
-        place = f'{found.name}{f" on {drive}" if drive else ""}'
-        value = with_uncertainty(one.value, one.std, one.unit)
-        kind = 'friction' if 'friction' in found.name else parameter.description
-        sure = one.value + INTERVAL * one.std < lowest
-        doubt = '' if sure else ', though zero is within its uncertainty'
-        yield (f'{place}: {parameter.description} is negative, {value}{doubt}. There is no '
-               f'negative {kind}: either the model has too much of it already, or something else '
-               'looks like it.')
+        place = f'{found.name} on {one.drive}' if one.drive else found.name
+        kind = 'friction' if 'friction' in found.name else what
+        doubt = ('' if value + INTERVAL * one.estimate.std < lowest else
+                 ', though zero is within its uncertainty')
+        yield (f'{place}: {what} is negative, {one.text}{doubt}. There is no negative {kind}: '
+               'either the model has too much of it already, or something else looks like it.')
 
 
 def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
     """Tell how the dry part of asymmetric friction reads as two other effects."""
-    forces: dict[str, dict[str, Estimate]] = {}
-    for drive, parameter, one in _fitted(diagnosis, found):
-        if parameter.name.startswith('force_'):
-            forces.setdefault(drive, {})[parameter.name] = one
-    for drive, both in forces.items():
+    forces: dict[str, dict[str, float]] = {}
+    for one in _fitted(diagnosis, found):
+        if one.parameter.name.startswith('force_'):
+            forces.setdefault(one.drive, {})[one.parameter.name] = one.estimate.value
+    for drive, values in forces.items():
         unit = diagnosis.residuals.units_of(drive).effort
-        forward, backward = (both[key].value if key in both else 0.0
-                             for key in ('force_forward', 'force_backward'))
+        forward, backward = (values.get(f'force_{way}', 0.0) for way in ('forward', 'backward'))
         yield (f'{drive}: the dry part is the same as coulomb_friction of '
                f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
                f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the '
