@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +26,9 @@ MOTION = ('position', 'velocity', 'acceleration')
 PAUSE = 1.0
 
 
-class Variable(NamedTuple):
-    """Key of a variable in a table, beside the names of parts."""
+@dataclass(frozen=True)
+class Variable:
+    """Key of a variable in a table: no other key is equal to it, whatever name it has."""
 
     name: str
 
