@@ -36,7 +36,6 @@ from pprs_dynamics.physics.three_pprs.robot import Geometry
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
 
-
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
 Motion = PlatformMotion | JointMotion
 
