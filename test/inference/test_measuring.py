@@ -10,7 +10,12 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.regression.collecting import Column, stacked_columns
+from pprs_dynamics.inference.residuals.measuring import (
+    join_tables,
+    measure_residuals,
+    treated_table,
+)
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -74,3 +79,14 @@ def test_the_variables_are_those_of_the_motion() -> None:
         np.testing.assert_allclose(residuals.variables[name], expected, rtol=0, atol=tolerance,
                                    err_msg=name)
         assert np.ptp(expected) > 5 * tolerance
+
+
+def test_a_column_with_the_name_of_a_variable_takes_no_variables_place() -> None:
+    model, (recording, _) = DriveModel.load(), recorded(26, 0.0)
+    reconstruction = reconstruct(model, recording)
+    plain = join_tables(model, [treated_table(model, reconstruction)])
+    table = treated_table(model, reconstruction, None, lambda forces: {
+        Column(name): np.zeros((len(forces.total), 1, 1)) for name in plain.variables})
+    assert set(stacked_columns([table])) == set(plain.variables)
+    for name, values in join_tables(model, [table]).variables.items():
+        np.testing.assert_array_equal(values, plain.variables[name], err_msg=name)

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.inference.residuals import followed_motion
+from pprs_dynamics.inference.residuals import reconstruction
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces, with_zeros
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import (
@@ -230,8 +230,8 @@ def test_a_jump_between_two_chunks_is_told(monkeypatch):
             motion.position + np.array([0.01, 0, 0]), motion.orientation, motion.linear_velocity,
             motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
 
-    monkeypatch.setattr(followed_motion, 'solve_forward_motion', hopping)
-    monkeypatch.setattr(followed_motion, 'CHUNK', 3000)
+    monkeypatch.setattr(reconstruction, 'solve_forward_motion', hopping)
+    monkeypatch.setattr(reconstruction, 'CHUNK', 3000)
     found = reconstruct(geometry, recording_of(real))
     assert found.jumps.tolist() == [3000]
     assert any(f'first at {found.time[3000]:.6g} s' in note for note in found.notes)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import AxisModel
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose, rival_effects
 from pprs_dynamics.inference.diagnosis.quantities import in_unit
-from pprs_dynamics.inference.diagnosis.rivals import rival_effects
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_file import build_model

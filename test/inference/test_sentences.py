@@ -32,19 +32,16 @@ from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_
 from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.inference.diagnosis.error_steps import error_steps
-from pprs_dynamics.inference.diagnosis.found_effects import RankedSet
+from pprs_dynamics.inference.diagnosis.found_effects import RankedSet, RivalEffect
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
-from pprs_dynamics.inference.diagnosis.partial import partial_residual
+from pprs_dynamics.inference.diagnosis.partial_errors import error_steps, partial_residual
 from pprs_dynamics.inference.diagnosis.quantities import (
     change,
     name_drives,
     percent,
     with_uncertainty,
 )
-from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
+from pprs_dynamics.inference.diagnosis.sentences import runner_up, set_rows, word_diagnosis
 from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -374,8 +371,8 @@ def test_a_rival_on_another_link_is_named_with_it() -> None:
 
 def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:
     found = found_effect('external_wrench', None)
-    rival = RivalEffect('base_tilt', found.effect, None, found.parameters, 0.0521, 0.0533, 3.24,
-                        found.force, made_up_residuals().error)
+    rival = RivalEffect(found.effect, None, found.parameters, found.force, 'base_tilt', 0.0521,
+                        0.0533, 3.24, made_up_residuals().error)
     words = word_diagnosis(ambiguous(), rivals=(rival,))
     said, = words.rivals
     assert 'In place of base_tilt, external_wrench would explain' in said.what

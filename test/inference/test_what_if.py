@@ -148,8 +148,7 @@ def test_errors_and_evidence_of_ticked_effects_are_those_of_the_regression(
     diagnosis, _ = found
     assert diagnosis.selection is not None
     assert diagnosis.selection.first is diagnosis.selection.last
-    assert diagnosis.chosen is not None
-    kept = [(candidate, diagnosis.chosen) for candidate in diagnosis.chosen.effects]
+    kept = [(candidate, diagnosis.selection.kept) for candidate in diagnosis.selection.kept.effects]
     assert {candidate.name for candidate, _ in kept} == HIDDEN
     # In the shape in which it was found, where it was.
     others = {**alone(diagnosis), **{one[0].name: one for one in kept}}
@@ -236,4 +235,4 @@ def test_the_part_fits_phones_and_the_file_stays_small(see: Any, file: Path, wid
 def test_without_its_searches_a_diagnosis_has_no_what_if(
     found: tuple[Diagnosis, Recording],
 ) -> None:
-    assert what_if(replace(found[0], selection=None, chosen=None)) is None
+    assert what_if(replace(found[0], selection=None)) is None

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.diagnosis.rivals import rival_effects
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.diagnosis.what_if import what_if
 from pprs_dynamics.inference.residuals.measuring import measure_residuals

@@ -14,7 +14,7 @@ import numpy as np
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.comparison import Comparison
-from pprs_dynamics.inference.diagnosis.statements import WORDS, Statement, read_in
+from pprs_dynamics.inference.diagnosis.statements import Statement, in_words, read_in
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.profiles import Profile, error_profile, error_spectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -95,7 +95,7 @@ def against_variables(residuals: Residuals, comparison: Comparison) -> list[tupl
                                xaxis_title=axis_of(name, residuals)[1],
                                yaxis_title=f'mean error [{residuals.unit}]')
         figure.add_hline(y=0, line={'color': charts.MEASURED, 'width': 0.8})
-        figures.append((figure, f'Against {WORDS.get(name, name)}.'))
+        figures.append((figure, f'Against {in_words(name)}.'))
     return figures
 
 
@@ -194,12 +194,11 @@ def _power(unit: str) -> str:
 
 def axis_of(variable: str, residuals: Residuals, drive: str = '') -> tuple[float, str]:
     """Return factor from SI and label of an axis: of one drive, or of all."""
-    name, of, other = variable.partition(' of ')
-    chosen = other or drive
-    found = list(dict.fromkeys(read_in(name, residuals.units_of(one)) for one in (
+    chosen = variable.partition(' of ')[2] or drive
+    found = list(dict.fromkeys(read_in(variable, residuals.units_of(one)) for one in (
         (chosen,) if chosen else residuals.drives)))
     unit = ' or '.join(unit for _, unit in found)
-    return found[0][0], f'{WORDS.get(name, name)}{of}{other} [{unit}]'
+    return found[0][0], f'{in_words(variable)} [{unit}]'
 
 
 def over_workspace(residuals: Residuals) -> Any | None:

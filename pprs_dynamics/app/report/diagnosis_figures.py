@@ -23,9 +23,8 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, curve_variable
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.diagnosis.partial import partial_residual, remaining_residuals
-from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
+from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect
+from pprs_dynamics.inference.diagnosis.partial_errors import partial_residual, remaining_residuals
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
@@ -119,7 +118,7 @@ def add_contributions(page: Page, residuals: Residuals, forces: dict[str, Any], 
     page.figure(contributions(residuals, forces), caption, over_time=True)
 
 
-def effect_pictures(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
+def effect_pictures(diagnosis: Diagnosis, found: FittedEffect,
                     ) -> list[tuple[Any, str]]:
     """Return what one effect has to explain and what it makes of it, with captions.
 

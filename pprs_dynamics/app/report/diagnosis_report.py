@@ -17,7 +17,8 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
 from pprs_dynamics.app.report.what_if_part import add_what_if
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.inference.diagnosis.error_steps import ErrorStep, error_steps
+from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
+from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
 from pprs_dynamics.inference.diagnosis.quantities import (
     in_unit,
     listed,
@@ -25,15 +26,15 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     plain,
     with_drives,
 )
-from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     FittedValue,
     Sentences,
     fitted_values,
+    runner_up,
+    set_rows,
     unexplained_groups,
 )
-from pprs_dynamics.inference.diagnosis.set_words import runner_up, set_rows
 from pprs_dynamics.inference.diagnosis.what_if import WhatIf
 from pprs_dynamics.inference.residuals.residuals import Residuals
 

@@ -41,7 +41,7 @@ class DesignedMotion:
 
 def diagnosed(model: ForceModel, recordings: Sequence[Recording], progress: Progress) -> Diagnosis:
     """Return a diagnosis without its searches, which are large."""
-    return replace(diagnose(model, recordings, (), progress), selection=None, chosen=None)
+    return replace(diagnose(model, recordings, (), progress), selection=None)
 
 
 def designed(model: DriveModel | ArmModel, recordings: Sequence[Recording], duration: float,

@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-
-if TYPE_CHECKING:
-    from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 
 
 def find_cautions(
@@ -25,25 +22,25 @@ def find_cautions(
             *_unexcited(fits, best), *_bounds(effects))
 
 
-def _length(fits: FittedSets, best: CandidateSet) -> list[str]:
+def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
     design, regression = fits.design, fits.regression
     residuals = design.residuals
     duration = len(residuals) * residuals.period
     if duration < fits.decisions.short:
-        return [f'the recordings last {duration:.3g} s together: too short to tell effects from '
-                'slow noise; record at least 20 s']
+        yield (f'the recordings last {duration:.3g} s together: too short to tell effects from '
+               'slow noise; record at least 20 s')
+        return
     worth = {d: noise.effective_samples(int(regression.series[d].known.sum()))
              for d, noise in regression.noise(best.fit).items()}
     poor = [design.drives[d] for d, count in worth.items() if count < fits.decisions.few_samples]
     if poor:
         least = min(worth.values())
-        return [f'noise on {", ".join(poor)} is so slow that the recording is worth only '
-                f'{least:.0f} independent samples: constants and slow drifts cannot be told from '
-                'it; repeat the recording']
-    return []
+        yield (f'noise on {", ".join(poor)} is so slow that the recording is worth only '
+               f'{least:.0f} independent samples: constants and slow drifts cannot be told from '
+               'it; repeat the recording')
 
 
-def _motion(fits: FittedSets) -> list[str]:
+def _motion(fits: FittedSets) -> Iterator[str]:
     design = fits.design
     velocity = design.residuals.variables['velocity']
     still, one_way = [], []
@@ -54,17 +51,15 @@ def _motion(fits: FittedSets) -> list[str]:
             still.append(name)
         elif max((v[moving] > 0).mean(), (v[moving] < 0).mean()) > fits.decisions.one_way:
             one_way.append(name)
-    found = []
     if still:
-        found.append(f'{", ".join(still)} hardly move: friction there cannot be seen, and '
-                     'what holds a drive at rest looks like a constant force')
+        yield (f'{", ".join(still)} hardly move: friction there cannot be seen, and what holds a '
+               'drive at rest looks like a constant force')
     if one_way:
-        found.append(f'{", ".join(one_way)} move in one direction only: friction there looks '
-                     'like a constant force; record motion both ways')
-    return found
+        yield (f'{", ".join(one_way)} move in one direction only: friction there looks like a '
+               'constant force; record motion both ways')
 
 
-def _filtered(fits: FittedSets) -> list[str]:
+def _filtered(fits: FittedSets) -> Iterator[str]:
     """Look for efforts that hold no fast noise at all, at full rate."""
     design = fits.design
     found = []
@@ -79,15 +74,14 @@ def _filtered(fits: FittedSets) -> list[str]:
         # Third differences of white noise have ten times the variance of first ones.
         if np.mean(third ** 2) < fits.decisions.filtered * np.mean(first ** 2):
             found.append(name)
-    if not found:
-        return []
-    return [f'effort of {", ".join(found)} looks filtered: it holds no fast noise. A filter '
-            'delays and rounds what happens at reversals; switch it off, or look out for '
-            'time_delay and hysteresis that are the filter\'s']
+    if found:
+        yield (f'effort of {", ".join(found)} looks filtered: it holds no fast noise. A filter '
+               'delays and rounds what happens at reversals; switch it off, or look out for '
+               'time_delay and hysteresis that are the filter\'s')
 
 
-def _unexcited(fits: FittedSets, best: CandidateSet) -> list[str]:
-    """Return effects that this motion would not show even at a size that matters."""
+def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
+    """Name effects that this motion would not show even at a size that matters."""
     regression = fits.regression
     adopted = {candidate.name for candidate in best.effects}
     weak = []
@@ -102,12 +96,13 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> list[str]:
         if names:
             weak.append(term.effect.name if len(names) == len(present)
                         else f'{term.effect.name} ({", ".join(names)})')
-    if not weak:
-        return []
-    return [f'this motion hardly excites {", ".join(weak)}: it cannot tell whether '
-            f'{"it is" if len(weak) == 1 else "they are"} there']
+    if weak:
+        yield (f'this motion hardly excites {", ".join(weak)}: it cannot tell whether '
+               f'{"it is" if len(weak) == 1 else "they are"} there')
 
 
-def _bounds(effects: Sequence[FoundEffect]) -> list[str]:
-    return [f'{one.name}: {", ".join(one.at_bound)} stands at the edge of what was tried; its '
-            'value is not to be trusted' for one in effects if one.at_bound]
+def _bounds(effects: Sequence[FoundEffect]) -> Iterator[str]:
+    for one in effects:
+        if one.at_bound:
+            yield (f'{one.name}: {", ".join(one.at_bound)} stands at the edge of what was tried; '
+                   'its value is not to be trusted')

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.errors import MotionError
+from pprs_dynamics.errors import MotionError, PprsError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
     RankedEffect,
     RankedSet,
+    RivalEffect,
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
@@ -36,12 +36,17 @@ from pprs_dynamics.inference.search.estimates import (
     calibrations,
     estimate,
 )
-from pprs_dynamics.inference.search.fitted_model import exact_forces, linear_error
+from pprs_dynamics.inference.search.fitted_model import (
+    exact_forces,
+    fitted_model,
+    linear_error,
+    linear_residual,
+)
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.ranking import Ranking, select
-from pprs_dynamics.inference.search.relinearisation import SettledSet, settled
+from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -91,8 +96,6 @@ class Diagnosis:
     held_out_on : {'blocks', 'validation'}
     selection : Ranking, optional
         All that was tried, for looking closer.
-    chosen : CandidateSet, optional
-        What was adopted of them.
     """
 
     verdict: str
@@ -117,7 +120,6 @@ class Diagnosis:
     above_noise: Mapping[str, float] = field(default_factory=dict)
     held_out_on: str = 'blocks'
     selection: Ranking | None = field(default=None, repr=False, compare=False)
-    chosen: CandidateSet | None = field(default=None, repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
@@ -167,55 +169,35 @@ def diagnose(
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
-    ranking = select(model, recordings, decisions, lambda share: report(0.9 * share))
-    diagnosis = _Answer(ranking, validate, decisions).diagnosis()
+    answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
+                     validate, decisions)
+    unconfirmed: list[FoundEffect] = []
+    while weak := [one for one in answer.effects if not one.is_confirmed]:
+        unconfirmed.append(min(weak, key=lambda one: one.evidence))
+        gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
+        answer = _Answer(answer.ranking.less(gone), validate, decisions)
+    diagnosis = answer.diagnosis(tuple(unconfirmed))
     report(1.0)
     return diagnosis
 
 
 class _Answer:
-    """Turns a ranking into an answer."""
+    """What is to be said of a ranking."""
 
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
                  decisions: Decisions) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
-        self.drives = ranking.last.design.drives
+        self.fits, self.best, self.kept = ranking.last, ranking.best, ranking.kept
+        self.design = self.fits.design
+        self.drives = self.design.drives
+        self.final = settled(self.fits, self.kept)
+        self.remaining = ranking.first.design.residuals.measured - exact_forces(
+            self.design, self.final.model)
+        self.effects = self._effects()
 
-    @property
-    def fits(self) -> FittedSets:
-        """Around the model that is adopted."""
-        return self.ranking.last
-
-    @property
-    def design(self) -> Design:
-        """Of these."""
-        return self.fits.design
-
-    @property
-    def best(self) -> CandidateSet:
-        """That of lowest cost."""
-        return self.ranking.best
-
-    @property
-    def kept(self) -> CandidateSet:
-        """What is adopted."""
-        return self.ranking.kept
-
-    def diagnosis(self) -> Diagnosis:
-        first = self.ranking.first.design
-        unconfirmed: list[FoundEffect] = []
-        while True:
-            final = settled(self.fits, self.kept)
-            adopted = final.model
-            remaining = first.residuals.measured - exact_forces(self.design, adopted)
-            effects = self._effects(final, adopted, remaining)
-            weak = [one for one in effects if not one.is_confirmed]
-            if not weak:
-                break
-            least = min(weak, key=lambda one: one.evidence)
-            unconfirmed.append(least)
-            self.ranking = self.ranking.less(self.ranking.order[effects.index(least)])
-        fits, regression = self.fits, self.fits.regression
+    def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
+        first, final, effects = self.ranking.first.design, self.final, self.effects
+        regression = self.fits.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}
@@ -223,32 +205,33 @@ class _Answer:
         depends = self._depends_on(noise)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
         # Where nothing was found, what is left is the noise.
-        above = self._above_noise(remaining, floors) if effects or unconfirmed else {}
+        above = self._above_noise(floors) if effects or unconfirmed else {}
         verdict = ('unknown' if depends or above else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
         return Diagnosis(
-            verdict, tuple(effects), sets, tuple(unconfirmed), self._candidates(),
+            verdict, tuple(effects), sets, unconfirmed, self._candidates(),
             self._suspects(), depends, tuple(map(self._within_model_error,
                                                  self.ranking.remainders)), self._sets(),
-            tuple(moved), find_cautions(fits, self.best, effects), first.notes,
-            first.given, adopted, first.residuals, remaining, noise, floors,
+            tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
+            first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above,
-            'validation' if self.validate else 'blocks', self.ranking, self.kept)
+            'validation' if self.validate else 'blocks', self.ranking)
 
-    def _effects(self, final: SettledSet, adopted: ForceModel, remaining: Array,
-                 ) -> list[FoundEffect]:
+    def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
         fits, ordered, steps = self.fits, self.ranking.order, self.ranking.path
+        final = self.final
         if not ordered:
             return []
         errors = [root_mean_square(self.ranking.first.design.residuals.error),
-                  *(linear_error(fits, step) for step in steps[1:-1]), root_mean_square(remaining)]
+                  *(linear_error(fits, step) for step in steps[1:-1]),
+                  root_mean_square(self.remaining)]
         if self.validate:
-            given = self.ranking.first.design.given
-            models = [given, *(settled(fits, one).model for one in steps[1:-1]), adopted]
-            held_out = [rms(measure_residuals(one, self.validate)[0]) for one in models]
+            models = [self.ranking.first.design.given,
+                      *(settled(fits, one).model for one in steps[1:-1]), final.model]
+            held_out = [self._error_held_out(one) for one in models]
         else:
             # Nothing is fitted in the model as given: all of its error is held out.
             held_out = [errors[0], *(hold_out(fits, step).error for step in steps[1:])]
@@ -258,14 +241,18 @@ class _Answer:
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
+                final.fits.library.force(final.found, last, self.remaining.shape),
                 self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                final.fits.library.force(final.found, last, remaining.shape), said.at_bound,
-                self.ranking.shares[k],
+                said.at_bound, self.ranking.shares[k],
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
         return found
+
+    def _error_held_out(self, model: ForceModel) -> float:
+        """Return the error of a model on the recordings that are not fitted [N]."""
+        return rms(measure_residuals(model, self.validate)[0])
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
@@ -288,13 +275,12 @@ class _Answer:
         if linear_error(self.fits, without) <= error:
             return False
         if self.validate:
-            model = settled(self.fits, without).model
-            return rms(measure_residuals(model, self.validate)[0]) > held_out
+            return self._error_held_out(settled(self.fits, without).model) > held_out
         return self._is_predicted(without, self.kept)
 
-    def _above_noise(self, remaining: Array, floors: Mapping[str, float]) -> dict[str, float]:
-        """Return the drives that keep an error (M, D) above their noise, as multiples of it."""
-        kept = {self.drives[d]: root_mean_square(remaining[:, d]) / max(
+    def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
+        """Return the drives that keep an error above their noise, as multiples of it."""
+        kept = {self.drives[d]: root_mean_square(self.remaining[:, d]) / max(
             floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
         return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio}
 
@@ -315,8 +301,7 @@ class _Answer:
         for candidate in self.kept.unknowns:
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    self.drives[d], libraries[d], candidate, self.kept.fit.of(block),
-                    self._evidence(candidate), ()))
+                    libraries[d], candidate, self.kept.fit.of(block), self._evidence(candidate)))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
                        if one.amplitude > self._lack_of_fit(self.drives.index(name))]
@@ -363,3 +348,45 @@ class _Answer:
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+
+
+def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
+                  ) -> tuple[RivalEffect, ...]:
+    """Return each rival that a diagnosis names, from the best set that holds it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    validate : sequence of Recording, optional
+        Those of the diagnosis; without them held-out errors are taken on blocks.
+    """
+    selection = diagnosis.selection
+    if selection is None:
+        return ()
+    found = []
+    adopted = {c.name: c.claim for c in selection.kept.effects}
+    for of, name in ((names[0], name) for names in diagnosis.indistinguishable
+                     for name in names[1:]):
+        best = next((one for one in selection.sets
+                     if any(name in (c.name, c.claim) for c in one.effects)
+                     and adopted[of] not in {c.claim for c in one.effects}), None)
+        if best is None:
+            continue
+        fits = selection.fits_of(best)
+        candidate = next(c for c in best.effects if name in (c.name, c.claim))
+        remaining = linear_residual(fits, best)
+        found.append(RivalEffect(
+            candidate.effect, fits.design.named(candidate.drives),
+            estimate(fits, best, candidate).parameters,
+            fits.library.force(best, candidate, remaining.shape), of, linear_error(fits, best),
+            _held_out(fits, best, validate), best.cost - selection.best.cost, remaining))
+    return tuple(found)
+
+
+def _held_out(fits: FittedSets, found: CandidateSet, validate: Sequence[Recording]) -> float:
+    if not validate:
+        return hold_out(fits, found).error
+    try:
+        return rms(measure_residuals(fitted_model(fits, found), validate)[0])
+    except PprsError:
+        return float('nan')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parts of a diagnosis: effects that were found, ranked sets, and what is within model error."""
+"""Parts of a diagnosis: effects found and their rivals, ranked sets, what is within model error."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Drives = tuple[str, ...] | None
 
 
 @dataclass(frozen=True)
-class FoundEffect:
-    """An effect that the recordings call for.
+class FittedEffect:
+    """An effect with what a fit says of it.
 
     Parameters
     ----------
@@ -25,35 +25,14 @@ class FoundEffect:
     drives : tuple of str or None
         On which it sits; None for the structure.
     parameters : dict of str to Estimate
-    evidence : float
-        By which the cost of the best set rises without it.
-    error_before, error_after, held_out_before, held_out_after : float
-        [N], with the effects before it, and with it as well.
     force : (M, D) array
         What it contributes [N].
-    at_bound : tuple of str
-        Parameters whose value is none: at the edge of what was tried.
-    share : float
-        Of the error that it takes away, beside the effects before it: of the root mean square
-        over drives, each as a multiple of its noise.
-    is_confirmed : bool
-        Whether the error falls with it, and that on held-out data: either their rms, or for
-        certain that of each frequency in units of its noise. In the former slow noise and the
-        model's own numbers have a share.
     """
 
     effect: type[CatalogueEffect]
     drives: Drives
     parameters: dict[str, Estimate]
-    evidence: float
-    error_before: float
-    error_after: float
-    held_out_before: float
-    held_out_after: float
     force: Array
-    at_bound: tuple[str, ...] = ()
-    share: float = 0.0
-    is_confirmed: bool = True
 
     @property
     def name(self) -> str:
@@ -65,6 +44,37 @@ class FoundEffect:
         """Links or joints that it is on, each with those that no motion tells it from."""
         return self.effect.places_of(self.parameters)
 
+
+@dataclass(frozen=True)
+class FoundEffect(FittedEffect):
+    """An effect that the recordings call for.
+
+    Parameters
+    ----------
+    evidence : float
+        By which the cost of the best set rises without it.
+    error_before, error_after, held_out_before, held_out_after : float
+        [N], with the effects before it, and with it as well.
+    at_bound : tuple of str
+        Parameters whose value is none: at the edge of what was tried.
+    share : float
+        Of the error that it takes away, beside the effects before it: of the root mean square
+        over drives, each as a multiple of its noise.
+    is_confirmed : bool
+        Whether the error falls with it, and that on held-out data: either their rms, or for
+        certain that of each frequency in units of its noise. In the former slow noise and the
+        model's own numbers have a share.
+    """
+
+    evidence: float
+    error_before: float
+    error_after: float
+    held_out_before: float
+    held_out_after: float
+    at_bound: tuple[str, ...] = ()
+    share: float = 0.0
+    is_confirmed: bool = True
+
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
@@ -73,6 +83,31 @@ class FoundEffect:
                 'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
+
+
+@dataclass(frozen=True)
+class RivalEffect(FittedEffect):
+    """An effect that would explain the recordings about as well as an adopted one.
+
+    Parameters
+    ----------
+    of : str
+        The adopted effect.
+    error_after : float
+        With it in place of the adopted one [N].
+    held_out_after : float
+        The same on held-out data [N]; NaN where it is no model that can be evaluated there.
+    cost : float
+        Of its set, above the best one's.
+    remaining : (M, D) array
+        What its set leaves [N].
+    """
+
+    of: str
+    error_after: float
+    held_out_after: float
+    cost: float
+    remaining: Array
 
 
 @dataclass(frozen=True)

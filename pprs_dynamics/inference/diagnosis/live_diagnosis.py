@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -204,16 +205,16 @@ class LiveDiagnosis:
                         answer.to_dict(), answer.adopted,
                         without_found(self.model, answer), noise)
         holds = self._holds(recording, noise, live.certainty)
-        effects = [LiveEffect(found, None, False, _names(answer, found))
-                   for found in answer.effects]
-        known = [next((one for one in self.effects if one.is_same(effect)), None)
-                 for effect in effects]
-        began = (self._beginning(window) if holds and any(
-            one is not None and not one.confirmed for one in known) else None)
-        effects = [
-            effect if one is None or not (one.confirmed or holds)
-            else replace(effect, since=one.since if one.confirmed else began, confirmed=True)
-            for effect, one in zip(effects, known, strict=True)]
+        beginning = cache(lambda: self._beginning(window))
+        effects = []
+        for found in answer.effects:
+            effect = LiveEffect(found, None, False, _names(answer, found))
+            known = next((one for one in self.effects if one.is_same(effect)), None)
+            if known is not None and known.confirmed:
+                effect = replace(effect, since=known.since, confirmed=True)
+            elif known is not None and holds:
+                effect = replace(effect, since=beginning(), confirmed=True)
+            effects.append(effect)
         missed = [one for one in self.effects if one.confirmed
                   and not any(one.is_same(effect) for effect in effects)]
         # A window in which a change happens to be weak does not end it while it still helps.

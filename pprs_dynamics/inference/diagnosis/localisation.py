@@ -18,11 +18,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
-from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.bins import MOST_SHARE
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.patterns import Pattern
@@ -103,13 +103,13 @@ def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
 
     Against the same drive's fast noise, so that drives of different sizes are compared.
     """
-    slow = {name: noise.rms / noise.fast_rms for name, noise in noises.items()
-            if noise is not None and noise.fast_rms > 0}
+    known = {name: noise for name, noise in noises.items()
+             if noise is not None and noise.fast_rms > 0}
+    slow = {name: noise.rms / noise.fast_rms for name, noise in known.items()}
     found = {}
     for name, ratio in slow.items():
-        peers = [other for key, other in slow.items() if key != name]
-        noise = noises[name]
-        if len(peers) < 2 or noise is None:
+        peers, noise = [other for key, other in slow.items() if key != name], known[name]
+        if len(peers) < 2:
             continue
         usual = float(np.median(peers))
         if ratio > decisions.level_ratio * usual:
@@ -124,35 +124,30 @@ def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
 
 
 def _search(residuals: Residuals, drive: int) -> DriveFindings:
-    measured = residuals.measured[:, drive]
-    known = np.isfinite(measured)
-    if known.sum() < LEAST_SAMPLES:
+    try:
+        regression = Regression(residuals, drives=(drive,))
+    except ResidualsError:
         return DriveFindings((), None)
-    regression = Regression(residuals, drives=(drive,))
-    if drive not in regression.series:
-        return DriveFindings((), None)
-    error = residuals.error[known, drive]
-    if np.abs(error).max() <= ROUNDING * np.abs(measured[known]).max():
+    error, measured = residuals.error[:, drive], residuals.measured[:, drive]
+    if np.nanmax(np.abs(error)) <= ROUNDING * np.nanmax(np.abs(measured)):
         return DriveFindings((), None)
     prices = replace(Prices.of(regression, DECISIONS), drives=len(residuals.drives))
     library = PatternLibrary(regression, prices, drive, with_plain_forms=True)
     fit = regression.fit(())
-    stated: list[tuple[UnknownCandidate, JointFit, float, tuple[str, ...]]] = []
+    statements: list[Statement] = []
     blocks: list[Block] = []
-    while len(stated) < MOST_STATEMENTS:
-        winner = _best(library, fit, blocks, {one[0].family.variable for one in stated})
+    while len(statements) < MOST_STATEMENTS:
+        winner = _best(library, fit, blocks, {one.variable for one in statements})
         if winner is None:
             break
         candidate, found, evidence, rivals = winner
-        stated.append((candidate, found, evidence, rivals))
+        statements.append(word_statement(library, candidate, found.of(candidate.parts[drive]),
+                                         evidence, rivals))
         blocks += [*candidate.blocks, *_carried(library, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
-    statements = [word_statement(residuals.drives[drive], library, candidate,
-                                 found.of(candidate.parts[drive]), evidence, rivals)
-                  for candidate, found, evidence, rivals in stated]
-    scatter = _scatter(library, fit, {one[0].family.variable for one in stated})
+    scatter = _scatter(library, fit, {one.variable for one in statements})
     if scatter is not None:
-        statements.append(word_scatter(residuals.drives[drive], library, *scatter))
+        statements.append(scatter)
     return DriveFindings(tuple(statements), regression.noise(fit)[drive])
 
 
@@ -211,9 +206,8 @@ def _carried(library: PatternLibrary, winner: UnknownCandidate) -> list[Block]:
             if family.variable in variables and not family.paired]
 
 
-def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
-             ) -> tuple[str, Pattern, Array, float] | None:
-    """Return the range in which the noise is larger than elsewhere, if any stands out.
+def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statement | None:
+    """Return the statement of where the noise is larger than elsewhere, if any range stands out.
 
     Ranks of the sizes of innovations stand for them, so that noise need not be Gaussian.
     """
@@ -260,7 +254,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str],
     worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
     price = library.prices.of_pattern(1, 1, 1)
     score = worth * (gain + price) - price
-    return (variable, pattern, column, score) if score > 0 else None
+    return word_scatter(library, variable, pattern, column, score) if score > 0 else None
 
 
 def _ranks(values: Array) -> Array:

@@ -5,15 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import (
+    FittedEffect,
     FoundEffect,
     RankedEffect,
+    RivalEffect,
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
@@ -28,9 +30,12 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_drives,
     with_uncertainty,
 )
-from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
-from pprs_dynamics.inference.diagnosis.statements import Statement
-from pprs_dynamics.inference.diagnosis.unknown_words import describe_unexplained, place_on
+from pprs_dynamics.inference.diagnosis.statements import (
+    Statement,
+    describe_unexplained,
+    place_of,
+    place_on,
+)
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
@@ -66,12 +71,17 @@ class Finding:
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A fitted parameter as people read it; `drive` is '' for none."""
+    """A fitted parameter of an effect; `drive` is '' for none."""
 
     effect: str
     drive: str
     parameter: Parameter
-    text: str
+    estimate: Estimate
+
+    @property
+    def text(self) -> str:
+        """Value with uncertainty and unit as people read it."""
+        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit)
 
 
 @dataclass(frozen=True)
@@ -140,9 +150,35 @@ def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
 
 def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
     """Return all that was fitted and not left at zero, in the order of adoption and of drives."""
-    return [FittedValue(effect.name, drive, parameter,
-                        with_uncertainty(one.value, one.std, one.unit))
-            for effect in diagnosis.effects for drive, parameter, one in _fitted(diagnosis, effect)]
+    return [one for effect in diagnosis.effects for one in _fitted(diagnosis, effect)]
+
+
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best."""
+    every = diagnosis.residuals.drives
+    return [(' and '.join(with_drives(_plain_name(name), drives, every)
+                          for name, drives in one.names) or 'nothing missing',
+             f'+{plain(one.cost, 2)}' if number else 'the best')
+            for number, one in enumerate(diagnosis.sets)]
+
+
+def runner_up(diagnosis: Diagnosis) -> str:
+    """Return how the second best set differs from the best, with its cost; '' for none."""
+    if len(diagnosis.sets) < 2:
+        return ''
+    best, second = (set(one.names) for one in diagnosis.sets[:2])
+    missing, instead = best - second, second - best
+    moved = {name for name, _ in missing} & {name for name, _ in instead}
+    if len(missing | instead) <= 2:
+        moved = set()  # one on other drives: both are told
+    left, put = (listed([with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
+                         for name, drives in one.names
+                         if (name, drives) in apart and name not in moved])
+                 for one, apart in zip(diagnosis.sets[:2], (missing, instead), strict=True))
+    words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
+             else f'without {left}' if left else '',
+             f'{listed(sorted(moved))} on other drives' if moved else '']
+    return ', '.join([*filter(None, words), f'cost +{plain(diagnosis.sets[1].cost, 2)}'])
 
 
 def _headline(diagnosis: Diagnosis) -> str:
@@ -206,7 +242,7 @@ def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     return listed([title, *rivals], 'or') + several
 
 
-def _title(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
+def _title(diagnosis: Diagnosis, found: FittedEffect) -> str:
     """Return the effect and where it is, all links and joints that are alike among them."""
     places = listed([listed(names, 'or') for names in found.places])
     return (f'{found.name} on {places}' if places else
@@ -228,8 +264,7 @@ def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding
     return Finding(
         title, f'{what}.', _why(diagnosis, found, is_first), sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like),
-        (*_ambiguous(diagnosis, found), *_negative(diagnosis, found),
-         *_alike(diagnosis, found), *_two_in_one(diagnosis, found), *_bound(found)))
+        tuple(_remarks(diagnosis, found)))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
@@ -245,37 +280,34 @@ def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
         sentence(card.confirm), sentence(card.looks_like))
 
 
-def _parameters(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> str:
+def _parameters(diagnosis: Diagnosis, found: FittedEffect) -> str:
     fitted = _fitted(diagnosis, found)
-    drives = {drive for drive, _, _ in fitted}
+    drives = {one.drive for one in fitted}
     if len(drives) <= MOST_LISTED:
         return ', '.join(
-            f'{parameter.description} ({parameter.symbol}) '
-            + with_uncertainty(one.value, one.std, one.unit)
-            + (f' on {drive}' if len(drives) > 1 else '') for drive, parameter, one in fitted)
+            f'{one.parameter.description} ({one.parameter.symbol}) {one.text}'
+            + (f' on {one.drive}' if len(drives) > 1 else '') for one in fitted)
     phrases = []
     for parameter in found.effect.parameters:
-        mine = sorted(((one, drive) for drive, p, one in fitted if p is parameter),
-                      key=lambda pair: pair[0].value)
-        if not mine:
-            continue
-        ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
-        phrases.append(f'{parameter.description} ({parameter.symbol}) ' + ' to '.join(
-            f'{with_uncertainty(one.value, one.std, one.unit)} ({drive})' for one, drive in ends))
+        mine = sorted((one for one in fitted if one.parameter is parameter),
+                      key=lambda one: one.estimate.value)
+        if mine:
+            ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
+            phrases.append(f'{parameter.description} ({parameter.symbol}) '
+                           + ' to '.join(f'{one.text} ({one.drive})' for one in ends))
     return ', '.join(phrases)
 
 
-def _fitted(diagnosis: Diagnosis, found: FoundEffect | RivalEffect,
-            ) -> list[tuple[str, Parameter, Estimate]]:
-    """Return drive ('' for none), parameter and estimate of what was not left at zero."""
+def _fitted(diagnosis: Diagnosis, found: FittedEffect) -> list[FittedValue]:
+    """Return what was fitted of an effect and not left at zero, in the order of drives."""
     known = {parameter.name: parameter for parameter in found.effect.parameters}
     order = ['', *diagnosis.residuals.drives]
-    rows = []
+    values = []
     for key, estimate in found.parameters.items():
         drive, name = found.effect.place_and_parameter(key)
         if estimate.value:
-            rows.append((drive, known[name], estimate))
-    return sorted(rows, key=lambda row: order.index(row[0]))
+            values.append(FittedValue(found.name, drive, known[name], estimate))
+    return sorted(values, key=lambda one: order.index(one.drive))
 
 
 def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
@@ -291,64 +323,49 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
             f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
 
 
-def _ambiguous(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    rivals = _rivals(diagnosis, found)
-    if not rivals:
-        return []
-    return [f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
-            'explain it about as well.']
+def _remarks(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
+    if rivals := _rivals(diagnosis, found):
+        yield (f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
+               'explain it about as well.')
+    yield from _negative(diagnosis, found)
+    for names in found.places:
+        if len(names) > 1:
+            yield (f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. '
+                   'The numbers are for the one that is named with them.')
+    if found.effect is AsymmetricFriction:
+        yield from _two_in_one(diagnosis, found)
+    if found.at_bound:
+        yield (f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of '
+               'what was tried: no finding but that it is there or beyond.')
 
 
-def _alike(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    return [f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. The '
-            'numbers are for the one that is named with them.'
-            for names in found.places if len(names) > 1]
-
-
-def _negative(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    remarks = []
-    for drive, parameter, one in _fitted(diagnosis, found):
-        lowest = found.effect.unphysical_below.get(parameter.name)
-        if lowest is None or one.value >= lowest:
+def _negative(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
+    for one in _fitted(diagnosis, found):
+        value, what = one.estimate.value, one.parameter.description
+        lowest = found.effect.unphysical_below.get(one.parameter.name)
+        if lowest is None or value >= lowest:
             continue
-        place = f'{found.name}{f" on {drive}" if drive else ""}'
-        value = with_uncertainty(one.value, one.std, one.unit)
-        kind = 'friction' if 'friction' in found.name else parameter.description
-        sure = one.value + INTERVAL * one.std < lowest
-        remarks.append(
-            f'{place}: {parameter.description} is negative, {value}'
-            + ('' if sure else ', though zero is within its uncertainty')
-            + f'. There is no negative {kind}: either the model has too much of it already, or '
-            'something else looks like it.')
-    return remarks
+        place = f'{found.name} on {one.drive}' if one.drive else found.name
+        kind = 'friction' if 'friction' in found.name else what
+        doubt = ('' if value + INTERVAL * one.estimate.std < lowest else
+                 ', though zero is within its uncertainty')
+        yield (f'{place}: {what} is negative, {one.text}{doubt}. There is no negative {kind}: '
+               'either the model has too much of it already, or something else looks like it.')
 
 
-def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> list[str]:
-    """Return how the dry part of asymmetric friction reads as two other effects."""
-    if found.effect is not AsymmetricFriction:
-        return []
-    forces: dict[str, dict[str, Estimate]] = {}
-    for drive, parameter, one in _fitted(diagnosis, found):
-        if parameter.name.startswith('force_'):
-            forces.setdefault(drive, {})[parameter.name] = one
-    remarks = []
-    for drive, both in forces.items():
+def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
+    """Tell how the dry part of asymmetric friction reads as two other effects."""
+    forces: dict[str, dict[str, float]] = {}
+    for one in _fitted(diagnosis, found):
+        if one.parameter.name.startswith('force_'):
+            forces.setdefault(one.drive, {})[one.parameter.name] = one.estimate.value
+    for drive, values in forces.items():
         unit = diagnosis.residuals.units_of(drive).effort
-        forward, backward = (both[key].value if key in both else 0.0
-                             for key in ('force_forward', 'force_backward'))
-        remarks.append(
-            f'{drive}: the dry part is the same as coulomb_friction of '
-            f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
-            f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the one '
-            'from the two, a reading at rest can.')
-    return remarks
-
-
-def _bound(found: FoundEffect) -> list[str]:
-    if not found.at_bound:
-        return []
-    return [f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of what '
-            'was tried: no finding but that it is there or beyond.']
+        forward, backward = (values.get(f'force_{way}', 0.0) for way in ('forward', 'backward'))
+        yield (f'{drive}: the dry part is the same as coulomb_friction of '
+               f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
+               f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the '
+               'one from the two, a reading at rest can.')
 
 
 def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:
@@ -385,3 +402,8 @@ def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
     return (f'{moved}, within its tolerance of {tolerance:.2g} ({tolerance:.0%}): calibrated, not '
             'an effect' if within else
             f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')
+
+
+def _plain_name(name: str) -> str:
+    unknown, comma, variable = name.partition(', ')
+    return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Statements of where a drive's error lies, with their shares and their sentence."""
+"""Where a drive's error lies, in numbers and words, and what to look at if it stays unknown."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
-from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.inference.diagnosis.quantities import listed, sentence
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import PatternLibrary
@@ -27,9 +28,51 @@ UNITS = {
 }
 TURNING = {'position': (180 / np.pi, 'deg'), 'velocity': (1.0, 'rad/s'),
            'acceleration': (1.0, 'rad/s²'), 'load': (1.0, 'N m')}
-WORDS = {'load': 'load', 'rod_angle': 'rod angle', 'platform_x': 'platform x',
-         'platform_y': 'platform y', 'platform_z': 'platform z', 'platform_tilt': 'platform tilt',
-         'platform_turn': 'platform turn'}
+# What it could come from, and how to look, by what the error depends on.
+LEADS = {
+    'position': ('a dent, dirt or a joint in the guide or screw, something that catches or '
+                 'touches there',
+                 'creep over that place both ways: it must stay put; look and feel along the '
+                 'guide'),
+    'velocity': ('friction of another form than the catalogue\'s, a controller or amplifier that '
+                 'behaves otherwise at that speed',
+                 'run the drive alone at several constant speeds around there'),
+    'direction': ('play, or friction of another form that differs by direction',
+                  'approach one position from both sides and compare efforts and encoders'),
+    'acceleration': ('play or compliance between drive and load, a saturated amplifier',
+                     'repeat the motion at half the speed: what follows acceleration falls to a '
+                     'quarter'),
+    'load': ('a guide or nut that gives or jams under load',
+             'repeat with a known weight more on the platform'),
+    'rod_angle': ('something that touches or binds in a passive joint at that angle',
+                  'swing the uncoupled rod by hand through that angle'),
+    'time': ('something that happened once: a load taken up or put down, a touch, a loose part, a '
+             'sensor that jumped',
+             'repeat the recording: what comes at the same time belongs to the motion, what does '
+             'not happened once'),
+    'frequency': ('a vibration of the structure, a controller on the edge of stability, a '
+                  'neighbouring machine or the mains',
+                  'record at rest, and with other gains: a machine nearby does not care, the '
+                  'controller does'),
+    'platform': ('something that pulls at the platform or touches it in part of the workspace: a '
+                 'hose, a cable, a workpiece',
+                 'take away whatever touches the platform and repeat'),
+    'drive': ('a coupling of the two drives: a shared cable chain or supply, a bending frame, '
+              'cross-talk between sensors',
+              'move that drive alone, with this one held still'),
+}
+SHAPES = {
+    'offset': 'a constant', 'range': 'a shift within a range',
+    'directed_range': 'a shift against or along the motion, within a range',
+    'growth': 'a curve from end to end',
+    'directed_growth': 'a curve from end to end that turns over with the direction of motion',
+    'one_way': 'a curve for one direction only', 'friction': 'a step where the motion reverses',
+    'fading': 'a step where the motion reverses, which fades with speed',
+    'fast': 'a curve that shows at speed',
+    'scatter': 'scatter larger than elsewhere, with no shift',
+    'bump': 'a bump', 'level': 'a slow drift without a pattern',
+    'ripple': 'a wave', 'line': 'a vibration at one frequency',
+}
 
 
 def read_in(variable: str, units: DriveUnits) -> tuple[float, str]:
@@ -88,25 +131,24 @@ class Statement:
 
 
 def word_statement(
-    drive: str, library: PatternLibrary, candidate: UnknownCandidate, coefficients: Array,
-    evidence: float, rivals: tuple[str, ...],
+    library: PatternLibrary, candidate: UnknownCandidate, coefficients: Array, evidence: float,
+    rivals: tuple[str, ...] = (),
 ) -> Statement:
     """Return the statement that a pattern makes.
 
     Parameters
     ----------
-    drive : str
     library : PatternLibrary
         Of the drive.
     candidate : UnknownCandidate
     coefficients : (1 or 2,) array
         Fitted [N].
     evidence : float
-    rivals : tuple of str
+    rivals : tuple of str, optional
         Variables that would do as well.
     """
     pattern, variable = candidate.pattern, candidate.family.variable
-    series = library.series
+    drive, series = library.residuals.drives[library.d], library.series
     known = series.known
     error = series.error[known]
     columns = candidate.rows[library.d][:, series.index][:, known]
@@ -134,24 +176,25 @@ def word_statement(
         # The mean error there, which the table and a plot show; the coefficient is what this
         # pattern has beside the others that overlap it.
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
-    sentence = _sentence(variable, pattern, library, signed, amplitude, share, time, shape)
+    said = _sentence(variable, pattern, library, signed, amplitude, share, time, shape)
     if rivals:
-        sentence += (f'; {listed([_words(name) for name in rivals], "or")} would explain it about '
-                     'as well')
-    return Statement(drive, variable, limits, share, time, f'{drive}: {sentence}', evidence,
+        others = listed([in_words(name) for name in rivals], 'or')
+        said += f'; {others} would explain it about as well'
+    return Statement(drive, variable, limits, share, time, f'{drive}: {said}', evidence,
                      pattern.kind, amplitude, float(np.mean(shape ** 2)), rivals)
 
 
-def word_scatter(drive: str, library: PatternLibrary, variable: str, pattern: Pattern,
-                 column: Array, evidence: float) -> Statement:
+def word_scatter(library: PatternLibrary, variable: str, pattern: Pattern, column: Array,
+                 evidence: float) -> Statement:
     """Return the statement that the noise is larger in a range than elsewhere."""
+    drive = library.residuals.drives[library.d]
     known = library.series.known
     error = library.series.error[known]
     held = column[known] > 0.5
     total = max(float(error @ error), 1e-300)
     share, time = float(error[held] @ error[held]) / total, float(held.mean())
-    sentence = _sentence(variable, pattern, library, 0.0, 0.0, share, time, np.zeros(0))
-    return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {sentence}',
+    said = _sentence(variable, pattern, library, 0.0, 0.0, share, time, np.zeros(0))
+    return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {said}',
                      evidence, 'scatter', 0.0, total / len(error) * max(share - time, 0.0))
 
 
@@ -159,7 +202,7 @@ def _sentence(
     variable: str, pattern: Pattern, library: PatternLibrary, signed: float, amplitude: float,
     share: float, time: float, shape: Array,
 ) -> str:
-    kind, word = pattern.kind, _words(variable)
+    kind, word = pattern.kind, in_words(variable)
     residuals = library.residuals
     units = residuals.units_of(residuals.drives[library.d])
     effort = units.effort
@@ -199,7 +242,7 @@ def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
         return 'in the positive direction' if low >= 0 else 'in the negative direction'
     of = variable.partition(' of ')[2] or library.residuals.drives[library.d]
     factor, unit = read_in(variable, library.residuals.units_of(of))
-    word = _words(variable)
+    word = in_words(variable)
     values = library.values(variable)
     speed = pattern.kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')
     if variable.startswith('velocity') and (speed or np.isclose(-low, high)):
@@ -224,6 +267,44 @@ def _ends(
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
 
 
-def _words(variable: str) -> str:
+def describe_unexplained(
+    group: Sequence[Statement], beside_effects: bool,
+) -> tuple[str, str, str, str, str]:
+    """Return title, what, why, cause and how to confirm, of one pattern on one or more drives."""
+    first = group[0]
+    drives = listed([one.drive for one in group])
+    texts = '; '.join(one.text if len(group) > 1 else one.text.removeprefix(f'{one.drive}: ')
+                      for one in group)
+    left = 'what the effects found leave' if beside_effects else 'the error'
+    what = (f'Something on {drives} that no effect of the catalogue explains, '
+            f'{place_of(first.variable)}. Its shape is '
+            f'{SHAPES.get(first.kind, "drawn in the report")}: in {left}, {texts}.')
+    evidence = max(one.evidence for one in group)
+    why = ('Its noise is compared with that of the other drives, which move alike.'
+           if first.kind == 'level' else
+           f'Noise like this one does not do that (evidence {evidence:.0f}, where 0 is '
+           'the threshold), and every effect of the catalogue explains it worse.')
+    cause, confirm = LEADS[_lead(first.variable)]
+    return f'unknown {place_on(group)}', what, why, sentence(cause), sentence(confirm)
+
+
+def place_on(group: Sequence[Statement]) -> str:
+    """Return on which drives and depending on what a pattern lies."""
+    return f'on {listed([one.drive for one in group])}, {place_of(group[0].variable)}'
+
+
+def place_of(variable: str) -> str:
+    """Return in words what an error depends on."""
+    return 'at one frequency' if variable == 'frequency' else f'depending on {in_words(variable)}'
+
+
+def in_words(variable: str) -> str:
+    """Return what people call a variable, also one of another drive."""
     name, of, other = variable.partition(' of ')
-    return WORDS.get(name, name) + of + other
+    return name.replace('_', ' ') + of + other
+
+
+def _lead(variable: str) -> str:
+    if ' of ' in variable:
+        return 'drive'
+    return 'platform' if variable.startswith('platform') else variable

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from math import inf, log
 
 import numpy as np
@@ -150,20 +151,19 @@ class WhatIf:
 
 def what_if(diagnosis: Diagnosis) -> WhatIf | None:
     """Return the system of all effects that a diagnosis tried; None where its searches are gone."""
-    if diagnosis.selection is None or diagnosis.chosen is None:
+    if diagnosis.selection is None:
         return None
-    return _System(diagnosis, diagnosis.selection, diagnosis.chosen).what_if()
+    return _System(diagnosis, diagnosis.selection).what_if()
 
 
 class _System:
     """Columns of all placements that were tried, in the last search."""
 
-    def __init__(self, diagnosis: Diagnosis, selection: Ranking, kept: CandidateSet) -> None:
-        self.diagnosis, self.kept = diagnosis, kept
-        self.fits = selection.last
+    def __init__(self, diagnosis: Diagnosis, selection: Ranking) -> None:
+        self.diagnosis, self.kept, self.fits = diagnosis, selection.kept, selection.last
         self.first_choice: dict[str, set[int | None]] = {}
         self.placements: dict[tuple[str, int | None], Component] = {}
-        self.nuisance: dict[Component, tuple[Block, ...]] = {}
+        self.blocks: dict[Component, tuple[Block, ...]] = {}
         for candidates, found in self._tried(selection):
             for candidate in candidates:
                 drives = {one.drive for one in candidate.components}
@@ -172,10 +172,10 @@ class _System:
                     key = (candidate.name, placement.drive)
                     if key not in self.placements:
                         self.placements[key] = placement
-                        self.nuisance[placement] = found.nuisance.get(placement, ())
-        self.unknown = [block for candidate in kept.unknowns for block in candidate.blocks]
-        blocks = [*self.unknown, *(block for one in self.placements.values()
-                                   for block in self._blocks(one))]
+                        self.blocks[placement] = (self.fits.library.block(placement),
+                                                  *found.nuisance.get(placement, ()))
+        self.unknown = [block for candidate in self.kept.unknowns for block in candidate.blocks]
+        blocks = [*self.unknown, *chain.from_iterable(self.blocks.values())]
         # Here fixed columns stand like others; a fit takes them with the coefficient 1.
         standing = [block if block.mean is None else replace(block, precision=np.eye(1))
                     for block in blocks]
@@ -198,25 +198,14 @@ class _System:
     def _tried(self, selection: Ranking,
                ) -> Iterable[tuple[tuple[EffectCandidate, ...], CandidateSet]]:
         """Yield the effects of sets, and the sets, those that matter most first."""
-        def by_cost(sets: Iterable[CandidateSet]) -> list[CandidateSet]:
-            return sorted(sets, key=lambda one: one.total)
-
-        def effects(candidates: Iterable[object]) -> tuple[EffectCandidate, ...]:
-            return tuple(one for one in candidates if isinstance(one, EffectCandidate))
-
-        order = [one.name for one in self.diagnosis.effects]
-        yield tuple(sorted(self.kept.effects, key=lambda one: order.index(one.name))), self.kept
-        for one in by_cost(selection.of_first):
-            if len(one.candidates) == 1:
+        alone = [one for one in selection.of_first if len(one.candidates) == 1]
+        yield selection.order, self.kept
+        for sets in (alone, selection.of_last):
+            for one in sorted(sets, key=lambda one: one.total):
                 yield one.effects, one
-        for one in by_cost(selection.of_last):
-            yield one.effects, one
         # Where no set has an effect, a scan beside what was found says in which shape and where.
         for proposal in Scan(self.fits).proposals(self.kept, least=-inf):
-            yield effects(proposal), self.kept
-
-    def _blocks(self, placement: Component) -> list[Block]:
-        return [self.fits.library.block(placement), *self.nuisance[placement]]
+            yield tuple(one for one in proposal if isinstance(one, EffectCandidate)), self.kept
 
     def what_if(self) -> WhatIf:
         """Return what a page needs of it."""
@@ -238,7 +227,7 @@ class _System:
 
     def _optional(self, placement: Component) -> OptionalPlacement:
         effect, d = placement.effect, placement.drive
-        own = self._blocks(placement)
+        own = self.blocks[placement]
         free = [block for block in own if block.mean is None]
         bounds = effect.unphysical_below
         return OptionalPlacement(

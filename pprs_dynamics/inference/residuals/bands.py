@@ -17,13 +17,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.residuals.residuals import Residuals, bridged, find_stretches
+from pprs_dynamics.inference.residuals.residuals import Residuals, bridged
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
 SINGLE_BANDS, BAND_RATIO = 12, 1.25
@@ -106,6 +107,8 @@ class DriveSeries:
         Samples of the residuals that belong to a stretch.
     known : (n,) bool array
         Those that were measured.
+    stretches : list of slice
+        Parts of `index` without a gap.
     frequency : (n,) array
         Of the coefficients, ascending [Hz].
     counts : (B,) array
@@ -114,14 +117,13 @@ class DriveSeries:
 
     def __init__(self, residuals: Residuals, drive: int, bands: FrequencyBands) -> None:
         self.residuals, self.drive, self.bands = residuals, drive, bands
-        measured = residuals.measured[:, drive]
-        stretches = [_fast(part, np.isfinite(measured))
-                     for part in find_stretches(measured, residuals.segment)]
+        measured = np.isfinite(residuals.measured[:, drive])
+        stretches = [_fast(part, measured) for part in residuals.stretches(drive)]
         self.index = np.concatenate([np.arange(part.start, part.stop) for part in stretches]
                                     or [np.zeros(0, dtype=int)])
-        self.known = np.isfinite(measured[self.index])
-        lengths = np.array([part.stop - part.start for part in stretches], dtype=int)
-        self._ends = np.cumsum(lengths)
+        self.known = measured[self.index]
+        lengths = [part.stop - part.start for part in stretches]
+        self.stretches = [slice(a, b) for a, b in pairwise(accumulate(lengths, initial=0))]
         frequency = np.concatenate([np.arange(n) / (2 * n * residuals.period) for n in lengths]
                                    or [np.zeros(0)])
         order = np.argsort(frequency, kind='stable')
@@ -141,12 +143,6 @@ class DriveSeries:
     def error(self) -> Array:
         """Measured minus model at `index`, gaps bridged [N]."""
         return bridged(np.nan_to_num(self.residuals.error[self.index, self.drive]), self.known)
-
-    @property
-    def stretches(self) -> list[slice]:
-        """Parts of `index` without a gap."""
-        starts = np.concatenate(([0], self._ends[:-1])) if len(self._ends) else self._ends
-        return [slice(int(a), int(b)) for a, b in zip(starts, self._ends, strict=True)]
 
     def transform(self, values: Array) -> Array:
         """Return DCT coefficients (..., n) by ascending frequency, of values (..., M or n)."""

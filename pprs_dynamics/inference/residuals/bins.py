@@ -23,6 +23,11 @@ def bin_edges(values: Array, bins: int) -> Array:
     return populated_edges(values, edges)
 
 
+def bin_of(values: Array, edges: Array) -> np.typing.NDArray[np.intp]:
+    """Return in which bin between edges (B + 1,) each value lies; beyond them in the next."""
+    return np.clip(np.searchsorted(edges, values, side='right') - 1, 0, len(edges) - 2)
+
+
 def populated_edges(values: Array, edges: Array) -> Array:
     """Return edges (B + 1,) without those between which too few values (N,) lie."""
     kept = [edges[0]]

@@ -10,13 +10,13 @@ several times better than what its names and units say, that is said. Nothing is
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.drives import DRIVES, DriveUnits
 from pprs_dynamics.inference.residuals.excerpt import (
     Excerpt,
     excerpt_of,
@@ -65,6 +65,11 @@ NEARLY = 0.2  # by how much a factor may be off, relatively
 class Mistake(Defect):
     """A finding about what a recording's numbers mean."""
 
+    @classmethod
+    def of(cls, kind: str, drives: Sequence[str], group: Sequence[int], what: str) -> Mistake:
+        """Return a mistake of some of the drives."""
+        return cls(kind, len(group), what, (), tuple(drives[k] for k in group))
+
     @property
     def action(self) -> str:
         """What was done about it, as a clause."""
@@ -106,7 +111,7 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     best = _Search(model, excerpts).best()
     found: list[Defect] = []
     if best is not None:
-        found += [*_of_time(best), *_of_reading(model, best), *_of_efforts(model, best)]
+        found += _of_fit(model.drives, model.units, best)
     told = {finding.kind for finding in found}
     if not told & {POSITION_UNIT, 'drive_order'}:
         found += _of_strokes(model, recording)
@@ -219,15 +224,13 @@ def _misfit(effort: Array, forces: Array) -> Array:
     for drives that tell nothing.
     """
     known = np.isfinite(effort) & np.isfinite(forces)
-    whole = _unlike(np.where(known, effort, 0.0), np.where(known, forces, 0.0))
-    with np.errstate(invalid='ignore'):
-        count = np.maximum(known.sum(axis=0), 1)
-        swings = [np.where(known, values - np.where(known, values, 0.0).sum(axis=0) / count, 0.0)
-                  for values in (effort, forces)]
-    sizes = [np.sqrt(np.sum(np.where(known, values, 0.0) ** 2, axis=0))
-             for values in (effort, forces)]
+    count = np.maximum(known.sum(axis=0), 1)
+    whole = [np.where(known, values, 0.0) for values in (effort, forces)]
+    swings = [np.where(known, values - values.sum(axis=0) / count, 0.0) for values in whole]
+    sizes = [np.sqrt(np.sum(values ** 2, axis=0)) for values in whole]
     swing = np.sqrt(np.sum(swings[1] ** 2, axis=0))
-    found = np.where(swing > WEAK * sizes[1], (whole + _unlike(*swings)) / 2, whole)
+    unlike = _unlike(*whole)
+    found = np.where(swing > WEAK * sizes[1], (unlike + _unlike(*swings)) / 2, unlike)
     weak = np.all([size <= WEAK * size.max() for size in sizes], axis=0)
     found[weak | ~known.any(axis=0)] = np.nan
     return found
@@ -248,34 +251,27 @@ def _time_units(recording: Recording) -> list[float]:
             if step > SLOW_STEP and SHORTEST_STEP <= step * unit <= SLOW_STEP]
 
 
-def _of_time(fit: _Fit) -> Iterator[Defect]:
+def _of_fit(drives: tuple[str, ...], units: Sequence[DriveUnits], fit: _Fit) -> Iterator[Mistake]:
+    """Yield the mistakes of times, of what is read otherwise, and of efforts."""
     if fit.time_unit != 1.0:
         yield Mistake('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as seconds '
                       f'they make the motion {1 / fit.time_unit:.0f} times too slow for its '
                       'efforts')
-
-
-def _of_reading(model: ForceModel, fit: _Fit) -> Iterator[Defect]:
     if fit.reading.kind:
-        yield Mistake(fit.reading.kind, len(fit.reading.drives), fit.reading.what, (),
-                      tuple(model.drives[k] for k in fit.reading.drives))
-
-
-def _of_efforts(model: ForceModel, fit: _Fit) -> Iterator[Defect]:
-    drives = model.drives
+        yield Mistake.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what)
     for factor in EFFORT_FACTORS[1:]:
         group = tuple(np.flatnonzero(fit.factors == factor).tolist())
         if not group:
             continue
         prefix = EFFORT_PREFIXES.get(abs(factor))
         unit = None if prefix is None else ' or '.join(dict.fromkeys(
-            prefix + model.units[k].effort for k in group))
+            prefix + units[k].effort for k in group))
         times = 'minus' if factor == -1.0 else f'{factor:g} times'
         guess = '' if unit is None else f', as if it were in {unit}'
         other = ' (or its position is negated)' if len(drives) == 1 and factor < 0 else ''
-        yield Mistake('effort_sign' if unit is None else 'effort_unit', len(group),
-                      f'the effort of {named(drives, group)} looks like {times} what the model '
-                      f'says{guess}{other}', (), tuple(drives[k] for k in group))
+        yield Mistake.of('effort_sign' if unit is None else 'effort_unit', drives, group,
+                         f'the effort of {named(drives, group)} looks like {times} what the model '
+                         f'says{guess}{other}')
 
 
 def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
@@ -290,10 +286,9 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     unit = next((name for unit, name in LENGTHS.items()
                  if np.all(reach[list(far)] * unit <= np.maximum(-lower, upper)[list(far)])), '')
     drives = recording.drives
-    yield Mistake(POSITION_UNIT, len(far),
-                  f'the positions of {named(drives, far)} reach {reach.max():.4g} m, far out of '
-                  'the stroke' + f', as if they were in {unit}' * bool(unit), (),
-                  tuple(drives[k] for k in far))
+    yield Mistake.of(POSITION_UNIT, drives, far,
+                     f'the positions of {named(drives, far)} reach {reach.max():.4g} m, far out of '
+                     'the stroke' + f', as if they were in {unit}' * bool(unit))
 
 
 def _of_velocities(recording: Recording, excerpt: Excerpt | None) -> Iterator[Defect]:
@@ -312,8 +307,7 @@ def _of_velocities(recording: Recording, excerpt: Excerpt | None) -> Iterator[De
                 if abs(factor / wrong - 1) <= NEARLY:
                     groups.setdefault(wrong, []).append(drive)
     for factor, group in groups.items():
-        drives = tuple(recording.drives[k] for k in group)
         times = 'minus' if factor == -1.0 else f'{factor:g} times'
-        yield Mistake('velocity', len(group), 'the recorded velocity of '
-                      f'{named(recording.drives, tuple(group))} is {times} the derivative of the '
-                      'position', (), drives)
+        yield Mistake.of('velocity', recording.drives, group, 'the recorded velocity of '
+                         f'{named(recording.drives, tuple(group))} is {times} the derivative of '
+                         'the position')

@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.residuals.followed_motion import kinematics_of
+from pprs_dynamics.inference.residuals.reconstruction import follow
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.treatment import Treatment
@@ -97,7 +97,7 @@ def forces_on(model: ForceModel, motion: DriveMotion, time: Array) -> Array | No
     found = np.empty_like(motion.position)
     with np.errstate(all='ignore'):
         try:
-            followed = kinematics_of(model).follow(time, moved).motion
+            followed = follow(model, time, moved).motion
             for part in motion.segments:
                 state = model.initial_state()
                 stretch = followed[part].with_time(time[part])

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
@@ -138,14 +138,10 @@ class LiveComparison:
 
     def running_error(self) -> Array:
         """Return the root of the mean squared residual of the last span, (D,); NaN: none."""
-        none = np.full(len(self._model.drives), np.nan)
         if not self._recent:
-            return none
-        squares = np.stack([error for _, error in self._recent]) ** 2
-        known = np.isfinite(squares)
-        total, count = np.where(known, squares, 0.0).sum(axis=0), known.sum(axis=0)
-        rms: Array = np.sqrt(np.divide(total, count, out=none, where=count > 0))
-        return rms
+            return np.full(len(self._model.drives), np.nan)
+        errors = np.stack([error for _, error in self._recent])
+        return np.array([root_mean_square(of_drive) for of_drive in errors.T])
 
     def _learn(self, time: float) -> None:
         if self._stamps and not time > self._stamps[-1]:

@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +26,11 @@ MOTION = ('position', 'velocity', 'acceleration')
 PAUSE = 1.0
 
 
-class Variable(NamedTuple):
-    """Key of a variable in a table, beside the names of parts: of each drive, or shared by all."""
+@dataclass(frozen=True)
+class Variable:
+    """Key of a variable in a table: no other key is equal to it, whatever name it has."""
 
     name: str
-    is_shared: bool = False
 
 
 def measure_residuals(
@@ -92,14 +93,14 @@ def treated_table(
         Gives further quantities to be treated, see `treated_forces`.
     """
     def variables(forces: Any) -> dict[Variable, Array]:
-        return {Variable(name, values.ndim == 1): values.reshape(len(values), -1)
+        return {Variable(name): values
                 for name, values in model.variables(forces.mechanism).items()}
 
     treat = reconstruction.treat
     table = treated_forces(model, reconstruction, progress,
                            lambda forces: {**variables(forces), **more(forces)})
     table['measured'] = treat(reconstruction.effort)
-    table['time'] = treat(reconstruction.time[:, None])[:, 0]
+    table['time'] = treat(reconstruction.time)
     for name in MOTION:
         table[Variable(name)] = treat(getattr(reconstruction, name))
     edges = [segment.start for segment in reconstruction.segments]
@@ -116,10 +117,8 @@ def join_tables(model: ForceModel, tables: list[dict[Any, Array]]) -> Residuals:
         start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
     joined = (tables[0] if len(tables) == 1 else
               {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
-    variables = {name: joined.pop(Variable(name)) for name in MOTION}
-    for key in [key for key in joined if isinstance(key, Variable)]:
-        values = joined.pop(key)
-        variables[key.name] = values[:, 0] if key.is_shared else values
+    names = [*MOTION, *(key.name for key in joined if isinstance(key, Variable))]
+    variables = {name: joined.pop(Variable(name)) for name in dict.fromkeys(names)}
     time, segment = joined.pop('time'), joined.pop('segment').astype(int)
     measured, total = joined.pop('measured'), joined.pop('total')
     steps = np.diff(time)[np.diff(segment) == 0]

@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.inference.residuals.bins import BINS, bin_edges
+from pprs_dynamics.inference.residuals.bins import BINS, bin_edges, bin_of
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
@@ -71,7 +71,7 @@ def error_profile(
         return None
     edges = bin_edges(values, bins)
     count = len(edges) - 1
-    place = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, count - 1)
+    place = bin_of(values, edges)
     known = np.isfinite(error)
     mean, spread, rms = (np.full(count, np.nan) for _ in range(3))
     samples = np.zeros(count, dtype=int)

@@ -11,25 +11,54 @@ sides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MotionError
-from pprs_dynamics.inference.residuals.followed_motion import CHUNK, Motion, kinematics_of
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.measurement.files.samples import Progress
-from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.axis_model import AxisModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
 from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
+
+CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
+Motion = PlatformMotion | JointMotion
+
+
+class FollowedMotion(NamedTuple):
+    """Motion of N samples without times, nearness to another branch (N,), and jumps (J,)."""
+
+    motion: Motion
+    near_branch: np.ndarray
+    jumps: np.ndarray
+
+    def notes(self, time: Array) -> list[str]:
+        """Return what was found, in words; time (N,) [s]."""
+        notes = []
+        if np.any(self.near_branch):
+            notes.append(
+                f'{int(self.near_branch.sum())} samples lie near another solution of the forward '
+                'kinematics, where small errors of positions matter most')
+        if len(self.jumps):
+            notes.append(f'the pose jumps at {len(self.jumps)} places, first at '
+                         f'{time[self.jumps[0]]:.6g} s: forward kinematics may have left its '
+                         'branch')
+        return notes
 
 
 @dataclass(frozen=True)
@@ -56,30 +85,19 @@ class Chunk:
 
 
 @dataclass(frozen=True)
-class Reconstruction:
-    """N samples of motion and effort in one or more segments, and M blocks of them.
+class Reconstruction(DriveMotion):
+    """Motion of the drives and what they move, with effort; N samples, and M blocks of them.
 
     Parameters
     ----------
     time : (N,) array
         [s].
-    position, velocity, acceleration : (N, D) arrays
-        Of the drives, smoothed [m, m/s, m/s^2].
     motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
         As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
-    index : (N,) int array
-        The samples' places in the recording.
-    segments : tuple of slice
-        Of the N samples.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
-    smoothing : Smoothing
-    block : int
-        Samples per block, in the longest segment.
-    from_recorded : (2, D) bool array
-        Drives whose velocity, and those whose acceleration, come from recorded velocities.
     near_branch : (N,) bool array
         See `ForwardKinematics`.
     jumps : (J,) int array
@@ -88,30 +106,19 @@ class Reconstruction:
         By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
         Samples of the recording's segments that are not here: edges and short segments.
-    notes : tuple of str
-        What was done and found, in words.
     start : float
         Time of the recording's first sample, which may be dropped here [s].
     """
 
     time: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
     motion: Motion
     effort: Array
-    index: np.ndarray
-    segments: tuple[slice, ...]
     treat: Treatment
-    smoothing: Smoothing
-    block: int
-    from_recorded: np.ndarray
     near_branch: np.ndarray
     jumps: np.ndarray
-    dropped: int
-    notes: tuple[str, ...]
-    start: float
     gain: Array
+    dropped: int
+    start: float
 
     def __len__(self) -> int:
         return len(self.time)
@@ -142,6 +149,76 @@ class Reconstruction:
                 first = last
 
 
+def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
+           progress: Progress | None = None) -> FollowedMotion:
+    """Return the motion that belongs to the drives': of an axis and an arm it is the same.
+
+    Parameters
+    ----------
+    model : ForceModel or Geometry
+        Of any kind, or the geometry of a 3-PPRS.
+    time : (N,) array
+        [s].
+    drives : DriveMotion
+    progress : callable, optional
+        Called with (samples done, all) now and then.
+
+    Raises
+    ------
+    ConvergenceError
+        Where drive positions do not close the mechanism.
+    """
+    if isinstance(model, (AxisModel, ArmModel)):
+        return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
+                              np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
+    geometry = model.robot.geometry if isinstance(model, DriveModel) else model
+    assert isinstance(geometry, Geometry)
+    return _follow_platform(geometry, time, drives, progress)
+
+
+def _follow_platform(geometry: Geometry, time: Array, drives: DriveMotion,
+                     progress: Progress | None) -> FollowedMotion:
+    """Return the platform's motion by forward kinematics, chunk by chunk."""
+    count = len(time)
+    arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
+    near = np.zeros(count, dtype=bool)
+    for segment in drives.segments:
+        seed = None
+        for start in range(segment.start, segment.stop, CHUNK):
+            rows = slice(start, min(start + CHUNK, segment.stop))
+            try:
+                found = solve_forward_motion(
+                    geometry, drives.position[rows], drives.velocity[rows],
+                    drives.acceleration[rows], seed)
+            except ConvergenceError as error:
+                sample = start + error.sample
+                raise ConvergenceError(
+                    int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
+                    error.rule) from None
+            part = found.motion
+            for array, values in zip(arrays, (
+                    part.position, part.orientation, part.linear_velocity, part.angular_velocity,
+                    part.linear_acceleration, part.angular_acceleration), strict=True):
+                array[rows] = values
+            near[rows] = found.near_branch
+            seed = part[-1:]
+            if progress is not None:
+                progress(rows.stop, count)
+    motion = PlatformMotion(*arrays)
+    return FollowedMotion(motion, near, _jumps(motion, time, drives.segments))
+
+
+def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np.ndarray:
+    jumps = []
+    for segment in segments:
+        for start in range(segment.start, segment.stop, CHUNK):
+            first = max(start - 1, segment.start)  # the step from the last chunk counts too
+            rows = slice(first, min(start + CHUNK, segment.stop))
+            jump = find_pose_jumps(motion[rows].with_time(time[rows]))
+            jumps.append(first + np.flatnonzero(jump))
+    return np.concatenate(jumps)
+
+
 def reconstruct(
     model: ForceModel | Geometry, recording: Recording, progress: Progress | None = None,
     window: float | None = None,
@@ -166,11 +243,11 @@ def reconstruct(
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    kinematics = kinematics_of(model)
-    if tuple(recording.drives) != kinematics.drives:
-        order = ', in this order' if len(kinematics.drives) > 1 else ''
+    names = model.drives if isinstance(model, ForceModel) else DRIVES
+    if tuple(recording.drives) != names:
+        order = ', in this order' if len(names) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
-                          f'be {", ".join(kinematics.drives)}{order}', 'shape')
+                          f'be {", ".join(names)}{order}', 'shape')
     if isinstance(model, ForceModel):
         unit = 'rad' if all(one.turns for one in model.units) else 'm'
         drives = smooth_drives(recording, window, model.blocks_per_period, unit)
@@ -180,7 +257,7 @@ def reconstruct(
         drives = replace(drives, position=drives.position - model.position_error)
     time, total = recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
-    followed = kinematics.follow(time, drives, progress)
+    followed = follow(model, time, drives, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
@@ -188,15 +265,15 @@ def reconstruct(
     rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
     if np.any(rests):
         shares = (f'{name} {share:.0%}' for name, share in zip(
-            kinematics.drives, rests.mean(axis=0), strict=True) if share >= 0.005)
+            names, rests.mean(axis=0), strict=True) if share >= 0.005)
         notes.append('efforts of drives that stand do not count, static friction holds any: '
                      + (', '.join(shares) or 'less than 0.5% of the time'))
+    drives = replace(drives, notes=tuple(notes))
     return Reconstruction(
-        time, drives.position, drives.velocity, drives.acceleration, followed.motion,
-        effort, drives.index, drives.segments,
-        Treatment(drives.block_starts, total), drives.smoothing, drives.block,
-        drives.from_recorded, followed.near_branch, followed.jumps, dropped, tuple(notes),
-        float(recording.time[0]), _applied_gain(recording))
+        **vars(drives), time=time, motion=followed.motion, effort=effort,
+        treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
+        jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
+        start=float(recording.time[0]))
 
 
 def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Reconstruction:
@@ -217,12 +294,10 @@ def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Recons
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    drives = DriveMotion(found.position - shift, found.velocity, found.acceleration, found.index,
-                         found.segments, found.treat.starts, found.block, found.smoothing,
-                         found.from_recorded, ())
-    followed = kinematics_of(model).follow(found.time, drives)
-    return replace(found, position=drives.position, motion=followed.motion,
-                   near_branch=followed.near_branch, jumps=followed.jumps)
+    moved = replace(found, position=found.position - shift)
+    followed = follow(model, found.time, moved)
+    return replace(moved, motion=followed.motion, near_branch=followed.near_branch,
+                   jumps=followed.jumps)
 
 
 def _applied_gain(recording: Recording) -> Array:

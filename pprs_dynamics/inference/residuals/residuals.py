@@ -123,8 +123,19 @@ class Residuals:
         return array if array is None or array.ndim == 1 else array[:, drive]
 
     def stretches(self, drive: int) -> list[slice]:
-        """Return where the drive was measured without a gap longer than a bridge."""
-        return find_stretches(self.measured[:, drive], self.segment)
+        """Return where the drive was measured without a gap longer than a bridge.
+
+        Each stretch is of one segment, and starts and ends with a measurement.
+        """
+        stretches = []
+        for part in _runs(self.segment):
+            known = part.start + np.flatnonzero(np.isfinite(self.measured[part, drive]))
+            if len(known):
+                cuts = np.flatnonzero(np.diff(known) > LONGEST_BRIDGE + 1)
+                begins = np.concatenate(([known[0]], known[cuts + 1]))
+                ends = np.concatenate((known[cuts], [known[-1]])) + 1
+                stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
+        return stretches
 
     def thinned(self, samples: int) -> Residuals:
         """Return means over blocks of equal length, of at most about `samples` samples.
@@ -155,19 +166,6 @@ class Residuals:
             {name: mean(part) for name, part in self.parts.items()},
             {name: mean(array) for name, array in self.variables.items()}, self.period * factor,
             self.units)
-
-
-def find_stretches(values: Array, segment: np.typing.NDArray[np.int_]) -> list[slice]:
-    """Return stretches of one segment that start and end known, with only short gaps inside."""
-    stretches = []
-    for part in _runs(segment):
-        known = part.start + np.flatnonzero(np.isfinite(values[part]))
-        if len(known):
-            cuts = np.flatnonzero(np.diff(known) > LONGEST_BRIDGE + 1)
-            begins = np.concatenate(([known[0]], known[cuts + 1]))
-            ends = np.concatenate((known[cuts], [known[-1]])) + 1
-            stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
-    return stretches
 
 
 def bridged(values: Array, known: np.typing.NDArray[np.bool_]) -> Array:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What to draw of a finding: the error with one effect put back, along what tells most of it."""
+"""What to draw: the error as effects come in, and with one of them taken out again."""
 
 from __future__ import annotations
 
@@ -9,19 +9,68 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.diagnosis.rivals import RivalEffect
+from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect, RivalEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS
-from pprs_dynamics.inference.residuals.bins import bin_edges
+from pprs_dynamics.inference.residuals.bins import bin_edges, bin_of
 from pprs_dynamics.inference.residuals.profiles import Profile, error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
+# The model's own numbers that move without changing the error by this share are no step.
+LEAST_STEP = 1e-3
 FINE_BINS = 24
 # Of the variance of an effect, what means over bins of a variable must tell to draw it along it.
 TELLING = 0.5
 SPAN = 5.0  # [s], of what is drawn over time
+
+
+@dataclass(frozen=True)
+class ErrorStep:
+    """The error once something more is in the model.
+
+    Parameters
+    ----------
+    label : str
+        What came in.
+    overall : float
+        Root of the mean square over samples and drives [N].
+    drives : (D,) array
+        The same by drive [N]; NaN where nothing was measured.
+    """
+
+    label: str
+    overall: float
+    drives: Array
+
+
+def error_steps(diagnosis: Diagnosis, after: Residuals) -> tuple[ErrorStep, ...]:
+    """Return the steps, first the model as given, last the model with everything.
+
+    Both ends are what a comparison with these models gives. In between, parameters are those of
+    the last fit, so that a step shows what one effect does beside those before it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    after : Residuals
+        Of `diagnosis.adopted` on the same recordings.
+    """
+    effects = diagnosis.effects
+    missing = sum((one.force for one in effects), np.zeros_like(after.error))
+    steps = [_step('model as given', diagnosis.residuals.error)]
+    refitted = _step('its own numbers', after.error + missing)
+    if abs(refitted.overall / steps[0].overall - 1) > LEAST_STEP:
+        steps.append(refitted)
+    for one in effects:
+        missing = missing - one.force
+        steps.append(_step(one.name, after.error + missing))
+    return tuple(steps)
+
+
+def _step(label: str, error: Array) -> ErrorStep:
+    return ErrorStep(label, root_mean_square(error),
+                     np.array([root_mean_square(of_drive) for of_drive in error.T]))
 
 
 @dataclass(frozen=True)
@@ -52,7 +101,7 @@ class PartialResidual:
     span: slice
 
 
-def partial_residual(diagnosis: Diagnosis, found: FoundEffect | RivalEffect) -> PartialResidual:
+def partial_residual(diagnosis: Diagnosis, found: FittedEffect) -> PartialResidual:
     """Return what the recordings say of one effect when all others are in the model."""
     drive = int(np.argmax(np.sqrt(np.mean(found.force ** 2, axis=0))))
     force = found.force[:, drive]
@@ -89,16 +138,15 @@ def _most_telling(residuals: Residuals, drive: int, force: Array) -> tuple[str, 
         if values is None or name == 'time' or np.ptp(values) == 0 or variance == 0:
             continue
         edges = bin_edges(values, FINE_BINS)
-        place = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, len(edges) - 2)
         means = _means(force, values, edges)
-        share = float(np.nanvar(means[place])) / variance
+        share = float(np.nanvar(means[bin_of(values, edges)])) / variance
         if share > most:
             best, most = name, share
     return best, most
 
 
 def _means(force: Array, values: Array, edges: Array) -> Array:
-    place = np.clip(np.searchsorted(edges, values, side='right') - 1, 0, len(edges) - 2)
+    place = bin_of(values, edges)
     count = np.bincount(place, minlength=len(edges) - 1)
     total = np.bincount(place, force, minlength=len(edges) - 1)
     means: Array = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
