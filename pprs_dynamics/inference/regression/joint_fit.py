@@ -41,6 +41,7 @@ CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when a round changes the deviance by less; rounds are bounded.
 CONVERGED, MOST_ROUNDS = 0.01, 40
+NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
@@ -218,7 +219,7 @@ class Regression:
         for _ in range(MOST_ROUNDS - 1):
             before = solution.deviance
             amplitudes = shapes.fitted(amplitudes, solution.squares, self.counts,
-                                       solution.leverage)
+                                       solution.leverage, NOISE_STEPS)
             spectra = shapes.spectra(amplitudes)
             solution = system.solve(spectra, self.counts)
             if abs(before - solution.deviance) < CONVERGED:

@@ -97,7 +97,8 @@ class NoiseShapes:
         count = len(self.at_bands)
         return np.repeat(np.maximum(mean, LEAST_POWER)[..., None] / count, count, axis=-1)
 
-    def fitted(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array) -> Array:
+    def fitted(self, amplitudes: Array, squares: Array, counts: Array, leverage: Array,
+               steps: int = MOST_STEPS) -> Array:
         """Return the amplitudes that maximise the likelihood, (D, J + 1).
 
         Parameters
@@ -110,22 +111,25 @@ class NoiseShapes:
             Coefficients in the bands.
         leverage : (D, B) array
             Degrees of freedom that the regression spends there.
+        steps : int
+            At most: a regression that is fitted anew does not need the end of the way.
         """
         phi = self.at_bands[:, 1:]
         squares, free = squares[:, 1:], np.maximum(
             counts[:, 1:] - leverage[:, 1:], 0.02 * counts[:, 1:])
         least = LEAST_SHARE * squares.sum(axis=1) / np.maximum(free.sum(axis=1), 1) + LEAST_POWER
-        return _scored(amplitudes, squares, free, least[:, None], phi)
+        return _scored(amplitudes, squares, free, least[:, None], phi, steps)
 
 
-def _scored(amplitudes: Array, squares: Array, free: Array, least: Array, phi: Array) -> Array:
+def _scored(amplitudes: Array, squares: Array, free: Array, least: Array, phi: Array,
+            steps: int) -> Array:
     """Return the amplitudes of all drives that maximise the likelihood, (D, J + 1)."""
     from scipy.optimize import nnls  # here: commands that fit no noise start without it
 
     found = np.maximum(amplitudes, least)
     going = np.arange(len(found))  # drives that have not converged
     before = _deviance(found @ phi, squares, free)
-    for _ in range(MOST_STEPS):
+    for _ in range(steps):
         a, r2, f, low = found[going], squares[going], free[going], least[going]
         power = a @ phi
         # Scoring is a regression of the bands' mean squares on the shapes, whose weights follow
