@@ -12,12 +12,16 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent
-sys.path[:0] = [str(DOCS), str(DOCS.parent), str(DOCS.parent / 'test' / 'support')]
+sys.path[:0] = [str(DOCS), str(DOCS.parent)]
+
+import pprs_dynamics  # noqa: E402
+
+# rosdoc2 builds a copy of this folder that stands elsewhere.
+PROJECT = Path(pprs_dynamics.__file__).parents[1]
+sys.path.insert(0, str(PROJECT / 'test' / 'support'))
 
 import api_pages  # noqa: E402
 import effect_pages  # noqa: E402
-
-import pprs_dynamics  # noqa: E402
 
 project = 'pprs_dynamics'
 author = 'The pprs_dynamics founders'
@@ -29,6 +33,8 @@ exclude_patterns = ['*_text.md', 'example_effect/*.egg-info']
 html_theme = 'furo'
 html_title = f'pprs_dynamics {version}'
 html_static_path: list[str] = []
+# What rosdoc2 would load beside: myst_nb reads Markdown already.
+rosdoc2_settings = {'support_markdown': False, 'override_theme': False}
 
 # Headings get the anchors that a reader of the repository's pages sees, too.
 myst_heading_anchors = 3
@@ -47,7 +53,7 @@ autodoc_default_options = {'members': True, 'show-inheritance': True}
 suppress_warnings = ['ref.python']
 # ROS 2 need not be there: the nodes are read without it.
 autodoc_mock_imports = sorted({
-    name for file in (DOCS.parent / 'pprs_dynamics' / 'ros').rglob('*.py')
+    name for file in (PROJECT / 'pprs_dynamics' / 'ros').rglob('*.py')
     for name in re.findall(r'^ *(?:from|import) (rclpy|\w+_msgs|\w+_interfaces)\b',
                            file.read_text(encoding='utf-8'), re.M)})
 

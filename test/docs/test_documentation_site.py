@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
+from shutil import copy
 
 import pytest
 import yaml
@@ -55,3 +57,14 @@ def test_rosdoc2_builds_this_site() -> None:
     assert head == {'type': 'rosdoc2 config', 'version': 1}
     (builder,) = config['builders']
     assert (PROJECT / builder['sphinx']['sphinx_sourcedir'] / 'conf.py').is_file()
+
+
+def test_a_copy_of_the_pages_that_stands_elsewhere_is_configured_too(tmp_path: Path) -> None:
+    """As rosdoc2 does, which reads Markdown itself where it is not told that we do."""
+    for file in (PROJECT / 'docs').glob('*.py'):
+        copy(file, tmp_path)
+    code = "import runpy; print(runpy.run_path('conf.py')['rosdoc2_settings'])"
+    found = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, capture_output=True,
+                           text=True, env={**os.environ, 'PYTHONPATH': str(PROJECT)})
+    assert found.returncode == 0, found.stderr
+    assert yaml.safe_load(found.stdout)['support_markdown'] is False

@@ -31,6 +31,7 @@ from pprs_dynamics.physics.model.model_file import build_model
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
+HOMING_STRIDE = 5  # samples; columns of wrong zeros change slowly between reversals
 # Friction that turns over in another width than the model's is no effect: multiples of the
 # width whose differences span what is between 0.2 and 5 times the model's.
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
@@ -125,7 +126,7 @@ class Sensitivities(ABC):
             bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
-        self.homing_stride = 5
+        self.homing_stride = HOMING_STRIDE
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
