@@ -247,10 +247,13 @@ class Design:
                    shape: Mapping[str, float]) -> Array:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
-            return self.treated(lambda recording: np.concatenate([np.stack(effect.sensor_columns(
-                self.sensed(recording.effort[None, part, drive], recording.time[part], drive,
-                            effect)[0], recording.time[part], **shape))
-                for part in recording.segments], axis=1))
+            def seen(recording: FullRate, part: slice) -> Array:
+                time = recording.time[part]
+                effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
+                return np.stack(effect.sensor_columns(effort, time, **shape))
+
+            return self.treated(lambda recording: np.concatenate(
+                [seen(recording, part) for part in recording.segments], axis=1))
 
         def columns(recording: FullRate, part: slice) -> Array:
             memory = effect.drive_memory()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic, TypeVar
 
@@ -61,7 +62,7 @@ class ExplainsRefusals(Node):
         return super().set_parameters_atomically(parameter_list)
 
 
-class Followed(Generic[Checked]):
+class Followed(ABC, Generic[Checked]):
     """Parameters of a running node: what they mean is checked before they change, and then applied.
 
     Parameters
@@ -77,13 +78,13 @@ class Followed(Generic[Checked]):
         node.add_on_set_parameters_callback(self.check)
         node.add_post_set_parameters_callback(self._after_change)
 
+    @abstractmethod
     def _validated(self, changes: Iterable[Parameter]) -> Checked:
         """Return what the parameters mean with some of them changed, or raise PprsError."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _apply(self, checked: Checked, changes: Iterable[Parameter]) -> None:
         """Bring into force what was checked."""
-        raise NotImplementedError
 
     def check(self, changes: list[Parameter]) -> SetParametersResult:
         """Return whether the parameters would be valid with some of them changed, and why not."""
