@@ -144,6 +144,16 @@ class Equations:
                 if any(group.drive == drive for group, _ in by_effect[name])),
             values[name]) for name in order])
 
+    def best_single(self) -> list[int]:
+        """Return the columns of each effect at each place in the shape that fits best alone."""
+        gains = self.gains([], self.groups)
+        best: dict[tuple[str, str | None], tuple[float, Group]] = {}
+        for gain, group in zip(gains, self.groups, strict=True):
+            key = group.effect, group.drive
+            if gain > best.get(key, (-1.0, group))[0]:
+                best[key] = float(gain), group
+        return [k for _, group in best.values() for k in group.columns]
+
     def forward(self, most: int = 12) -> list[Group]:
         """Return groups in the order in which a greedy search takes them; one shape of each."""
         chosen: list[Group] = []

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.naming.entrants.equations import Equations, Group
+from benchmarks.naming.entrants.equations import Equations
 from benchmarks.naming.problems import Answer, Problem
 
 RELATIVE = 0.1  # relative standard deviation, to which a parameter counts as identified
@@ -22,13 +22,8 @@ RELATIVE = 0.1  # relative standard deviation, to which a parameter counts as id
 def relative_deviations(problem: Problem, limit: float = RELATIVE) -> Answer:
     """Return what is left when all whose relative deviation is larger are dropped, worst first."""
     equations = Equations(problem)
-    gains = equations.gains([], equations.groups)
-    best: dict[tuple[str, str | None], tuple[float, Group]] = {}
-    for gain, group in zip(gains, equations.groups, strict=True):
-        key = group.effect, group.drive
-        if gain > best.get(key, (-1.0, group))[0]:
-            best[key] = float(gain), group
-    chosen = [group for _, group in best.values()]
+    single = set(equations.best_single())
+    chosen = [group for group in equations.groups if set(group.columns) <= single]
     while chosen:
         columns = [k for group in chosen for k in group.columns]
         found, inverse, rest = equations.fit(columns)

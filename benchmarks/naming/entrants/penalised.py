@@ -54,15 +54,17 @@ def adaptive_group_lasso(problem: Problem, power: float = 1.0) -> Answer:
     kept = values > 1e-9 * values.max()
     root = np.sqrt(values[kept])
     n = len(equations.y)
-    rows = np.asfortranarray((root[:, None] * vectors[:, kept].T) / np.sqrt(n))
-    seen = (vectors[:, kept].T @ equations.right) / root / np.sqrt(n)
+    scale = np.sqrt(np.count_nonzero(kept) / n)
+    rows = np.asfortranarray(scale * root[:, None] * vectors[:, kept].T)
+    seen = scale * (vectors[:, kept].T @ equations.right) / root
     ridge = (vectors[:, kept] / (root ** 2 + 1e-3 * n)) @ (vectors[:, kept].T @ equations.right)
     groups = [list(group.columns) for group in equations.groups]
     sizes = np.array([np.linalg.norm(ridge[group]) / np.sqrt(len(group)) for group in groups])
     weights = np.sqrt([len(group) for group in groups]) / np.maximum(sizes, 1e-6) ** power
     top = max(np.linalg.norm(equations.right[group]) / n / weight
-              for group, weight in zip(groups, weights, strict=True)) * n / len(seen)
-    best, chosen = n * np.log(equations.total / n), []
+              for group, weight in zip(groups, weights, strict=True))
+    best = n * np.log(equations.total / n)
+    chosen: list[Group] = []
     solver = GroupLasso(groups, weights=weights, fit_intercept=False, warm_start=True, tol=1e-4,
                         max_epochs=2000)
     with warnings.catch_warnings():

@@ -36,8 +36,13 @@ def sindy(problem: Problem, optimiser: str = 'STLSQ', threshold: float = 0.1) ->
     equations = Equations(problem)
     made = {'STLSQ': lambda: pysindy.STLSQ(threshold=threshold),
             'SR3': lambda: pysindy.SR3(reg_weight_lam=threshold ** 2 / 2, max_iter=300),
-            'FROLS': lambda: pysindy.FROLS(max_iter=STEPS, kappa=threshold)}[optimiser]()
+            'FROLS': lambda: pysindy.FROLS(max_iter=STEPS)}[optimiser]()
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
-        made.fit(equations.X, equations.y[:, None])
-    return equations.answered(best_shapes(equations, np.ravel(made.coef_)))
+        # FROLS orthogonalises column by column and cannot have two that are alike: one shape each.
+        columns = (equations.best_single() if optimiser == 'FROLS'
+                   else list(range(equations.X.shape[1])))
+        made.fit(equations.X[:, columns], equations.y[:, None])
+    coefficients = np.zeros(equations.X.shape[1])
+    coefficients[columns] = np.ravel(made.coef_)
+    return equations.answered(best_shapes(equations, coefficients))
