@@ -49,15 +49,17 @@ def _add(columns: list[Column], rows: list[Array], design: Design, effect: type[
          d: int, drive: str, shape: Mapping[str, float]) -> None:
     term = design.term(effect, d, shape)
     # An effect that is all shape (a delay) has one column, and its coefficient is 1.
+    size = design.residuals.error.shape
     for k, coefficient in enumerate(term.names or ('present',)):
-        rows.append(_stacked({j: of[k] for j, of in term.rows.items()}, design.residuals.error.shape))
+        rows.append(_stacked({j: of[k] for j, of in term.rows.items()}, size))
         columns.append(Column(effect.name, coefficient, drive, tuple(sorted(shape.items()))))
 
 
 def _thinned(shapes: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
     if len(shapes) <= SHAPES:
         return list(shapes)
-    return [shapes[k] for k in np.unique(np.linspace(0, len(shapes) - 1, SHAPES).round().astype(int))]
+    spread = np.linspace(0, len(shapes) - 1, SHAPES).round().astype(int)
+    return [shapes[k] for k in np.unique(spread)]
 
 
 def _stacked(rows: Mapping[int, Array], shape: tuple[int, int]) -> Array:

@@ -47,7 +47,7 @@ def tables(scored: Mapping[str, Scored]) -> str:
         found, size = figures(scored[entrant]), set_size(scored[entrant])
         lines.append(f'| {entrant} | ' + ' | '.join(
             (*(str(found[name]) for name in names), str(found['intervals hold']),
-             f'{size:g}' if size else '–', f'{seconds(scored[entrant]):.1f}')) + ' |')
+             f'{size:g}' if size else '-', f'{seconds(scored[entrant]):.1f}')) + ' |')
     lines += ['', 'Exact sets of one effect, by its strength:', '']
     strengths = sorted({t.snr for answers in scored.values() for t, _, _ in answers if t.snr})
     lines += ['| entrant | ' + ' | '.join(f'SNR {snr:g}' for snr in strengths) + ' |',
@@ -103,8 +103,9 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
     for k, entrant in enumerate(ordered(scored)):
         answers = scored[entrant]
         wrong = Rate.of(one for _, _, j in answers for one in (j.false_alarm, j.wrong_alone))
-        weak, strong = (Rate.of(j.named for t, _, j in answers if t.kind == 'single' and chosen(t.snr))
-                        for chosen in (lambda snr: snr <= 1, lambda snr: snr > 1))
+        weak, strong = (Rate.of(j.named for t, _, j in answers
+                                if t.kind == 'single' and (t.snr > 1) is strong)
+                        for strong in (False, True))
         colour = 'black' if k == 0 else colours(k % 20)
         x = 100 * wrong.share
         axes.plot([x, x], [100 * weak.share, 100 * strong.share], '-', color=colour, lw=1.5)

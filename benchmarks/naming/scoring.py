@@ -111,9 +111,10 @@ class Rate:
 
     def __str__(self) -> str:
         if not self.count:
-            return '–'
+            return '-'
         low, high = self.interval
-        return f'{100 * self.share:.0f} % ({self.hits}/{self.count}; {100 * low:.0f}–{100 * high:.0f})'
+        return (f'{100 * self.share:.0f} % ({self.hits}/{self.count}; '
+                f'{100 * low:.0f}-{100 * high:.0f})')
 
 
 Scored = Sequence[tuple[Truth, Answer, Judged]]

@@ -179,8 +179,9 @@ def _predictor(noise: Array) -> Array:
     n = len(noise)
     full = np.correlate(noise, noise, 'full')[n - 1:n + HIGHEST_ORDER] / n
     best, chosen = np.inf, np.array([1.0 / np.sqrt(max(full[0], 1e-24))])
+    first = full * (1 + 1e-9 * (np.arange(len(full)) == 0))
     for order in range(1, HIGHEST_ORDER + 1):
-        past = solve_toeplitz(full[:order] * (1 + 1e-9 * (np.arange(order) == 0)), full[1:order + 1])
+        past = solve_toeplitz(first[:order], full[1:order + 1])
         variance = max(float(full[0] - past @ full[1:order + 1]), 1e-24)
         cost = n * np.log(variance) + order * np.log(n)
         if cost < best:

@@ -28,7 +28,8 @@ def relative_deviations(problem: Problem, limit: float = RELATIVE) -> Answer:
         columns = [k for group in chosen for k in group.columns]
         found, inverse, rest = equations.fit(columns)
         noise = rest / max(len(equations.y) - len(columns), 1)
-        relative = np.sqrt(np.maximum(noise * np.diag(inverse), 0)) / np.maximum(np.abs(found), 1e-12)
+        relative = (np.sqrt(np.maximum(noise * np.diag(inverse), 0))
+                    / np.maximum(np.abs(found), 1e-12))
         worst, at = -1.0, 0
         out = chosen[0]
         for group in chosen:
