@@ -338,7 +338,8 @@ class LinkageState(JointMotion):
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        return np.abs(self.reactions.efforts)
+        load: Array = np.abs(self.reactions.efforts)
+        return load
 
     @lazy
     def reactions(self) -> Loads:
