@@ -76,7 +76,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._readers = readers_for(self._settings.model, names)
         self._written = command_writer(names)
         self._feedforward = Feedforward(self._settings.model, own)
-        self._timing = Timing(*(own[name] for name in Timing._fields))
+        self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0, PASSED_OVER: 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._senders = Senders()
@@ -194,7 +194,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     def _use_settings(self) -> None:
         own = self._settings.own
         self._feedforward.use(self._settings.model, own)
-        self._timing = Timing(*(own[name] for name in Timing._fields))
+        self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
         if self._watchdog is not None:
             self._create_parts()
             self._watchdog.rearm()

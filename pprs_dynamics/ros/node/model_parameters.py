@@ -153,13 +153,14 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
         self._changed = changed
         own = (*own, DEMO)
         declare_own(node, own)
-        self._kind: type[NodeModel] = ArmModel if is_mechanism(overrides(node)) else DriveModel
+        given = overrides(node)
+        self._kind: type[NodeModel] = ArmModel if is_mechanism(given) else DriveModel
         taken_from_paper = declare_model(node)
         self._stays: dict[str, Any] = {}
         super().__init__(node, own)
         self.model, self.own = self._checked
         # Whatever is connected would be driven by the forces of another robot.
-        if not self.own[DEMO.name] and not has_model(overrides(node)):
+        if not self.own[DEMO.name] and not has_model(given):
             raise NoModelError(node.get_name())
         self._stays = self._staying(self.model, self.own)
         # A status entry, and a line in the log: another robot would get wrong forces.
