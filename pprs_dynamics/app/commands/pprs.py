@@ -30,9 +30,9 @@ from pprs_dynamics.system.threads import use_one_thread
 
 # Each a module of this folder with a docstring, add_arguments and run.
 COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
-            'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
+            'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 # What all others take: models there are in the file or the store, and a session has no result.
-WITHOUT_MODEL, WITHOUT_JSON = ('history', 'trend'), ('workbench',)
+WITHOUT_MODEL, WITHOUT_JSON = ('history', 'init', 'trend'), ('workbench',)
 # Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
 LONGEST_SENTENCE = 800
 
