@@ -150,7 +150,7 @@ def _time(series: Sequence[Series]) -> tuple[Series | None, float | None, list[s
     named = [one for one in rising if one.title in TIME_COLUMNS] or [
         one for one in rising if {*words_of(one.title)} & {'time', *TIME_LIKE}]
     found = next(iter(named), None)
-    notes = []
+    notes: list[str] = []
     if found is None:
         unnamed = [one for one in rising if not one.title]
         if not unnamed:
