@@ -417,8 +417,7 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(
                 replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
-                StructureLoad(np.tile(engine.wrench, (len(motion), 1)),
-                              np.zeros((len(motion), 3))))
+                StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
             friction = friction + effect.force(state)
     return friction
 
