@@ -21,6 +21,7 @@ from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_bl
 
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
 
 
 def read_structure(values: dict[str, Any], folder: Path) -> Structure:
@@ -85,6 +86,56 @@ def _require_one_motor_each(values: Mapping[str, Any], block: str) -> None:
         if any(word in kind for word in COUPLED) and set(coupled) & set(drives):
             raise ModelError(drives_key(block), coupled, 'have a motor each, but share a '
                              f'transmission {kind} in the URDF: coupled joints are not covered')
+
+
+def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keys and values that the file leaves to the description, complete with defaults.
+
+    Raises
+    ------
+    ModelError
+        For what a description holds of a joint that has no place in a model.
+    """
+    block, joints = mechanism_block(values), structure.description.joints
+    drives = [joints[name] for name in structure.drives]
+    found: dict[str, Any] = {
+        f'{block}.gear_ratio': tuple(joint.reduction or 1.0 for joint in drives),
+        f'{block}.gravity': _gravity(structure),
+        f'{block}.armature': tuple(joint.armature for joint in drives),
+        'friction.viscous': tuple(joint.damping for joint in drives),
+        'friction.coulomb': tuple(joint.dry for joint in drives)}
+    found = {key: described for key, described in found.items() if not values[key]}
+    for name in structure.rows:
+        joint = joints[name]
+        if joint.spring is not None:
+            stiffness, relaxed = joint.spring
+            block_of_effect = f'{name}: {{stiffness: {stiffness:g}, position: {relaxed:g}}}'
+            way = ('take its stiffness off, and write effects: {active: [drive_spring], '
+                   f'drive_spring: {{{block_of_effect}}}}}'
+                   if name in structure.drives else 'springs of passive joints are not covered')
+            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): {way}')
+        if name in structure.drives:
+            continue
+        if joint.armature:
+            raise ModelError(f'{block}.mjcf', name, f'have no armature ({joint.armature:g}), as a '
+                             'joint without a motor: set its armature to 0')
+        given = f'friction.joints.{name}.'
+        if (joint.damping or joint.dry) and not any(key.startswith(given) for key in values):
+            found |= {f'{given}viscous': joint.damping, f'{given}torque': joint.dry,
+                      f'{given}coulomb': 0.0, f'{given}radius': 0.0}
+    return found
+
+
+def _gravity(structure: Structure) -> tuple[float, ...]:
+    """Return gravity in the base: the description's, which is in the frame of its root."""
+    description = structure.description
+    if description.gravity is None:
+        return STANDARD_GRAVITY
+    hung = {joint.child for joint in description.joints.values()}
+    root = next(link for link in description.links if link not in hung)
+    _, frame = structure.links[root]
+    turned = frame.R @ np.array(description.gravity)
+    return tuple(float(each) for each in turned)
 
 
 def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
