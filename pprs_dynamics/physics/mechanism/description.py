@@ -133,6 +133,16 @@ class Loop:
 
 
 @dataclass(frozen=True, eq=False)
+class Transmission:
+    """A gear between motors and joints; `reduction`, motor over joint, of a simple one."""
+
+    name: str
+    kind: str
+    joints: tuple[str, ...]
+    reduction: float | None
+
+
+@dataclass(frozen=True, eq=False)
 class Description:
     """Description of a robot: links, joints, closures.
 
@@ -150,6 +160,7 @@ class Description:
         In the frame of its root, of a format that has it [m/s^2].
     remarks : tuple of str
         Sentences on what looks wrong in it, and on what it holds that is not used.
+    transmissions : tuple of Transmission
     """
 
     path: str
@@ -159,6 +170,7 @@ class Description:
     loops: tuple[Loop, ...] = ()
     gravity: tuple[float, float, float] | None = None
     remarks: tuple[str, ...] = ()
+    transmissions: tuple[Transmission, ...] = ()
 
 
 def inertial_in(frame: Frame, parameters: Array) -> Array:

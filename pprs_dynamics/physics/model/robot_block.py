@@ -16,8 +16,9 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
 from pprs_dynamics.physics.mechanism.description import Description, Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
-from pprs_dynamics.physics.mechanism.urdf import read_urdf, transmissions
+from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
+from pprs_dynamics.system.package_files import located
 
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
@@ -40,13 +41,13 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
         raise ModelError(f'{block}.urdf', MISSING, f'be given, or {block}.mjcf instead')
     if len(given) > 1:
         raise ModelError(given[1], values[given[1]], f'not stand beside {given[0]}')
-    values[given[0]] = str((folder / values[given[0]]).resolve())
+    values[given[0]] = str(located(values[given[0]], folder))
     if given[0].endswith('mjcf'):
         from pprs_dynamics.physics.mechanism.mjcf import read_mjcf
         description = read_mjcf(values[given[0]])
     else:
         description = read_urdf(values[given[0]])
-        _require_one_motor_each(values, block)
+        _require_one_motor_each(description, values[drives_key(block)], block)
     own = tuple((key, value) for key, value in values.items()
                 if key.startswith((f'{block}.home.', f'{block}.loops.')))
     return _structure(description, block, values[f'{block}.base'], values[f'{block}.tool'],
@@ -73,6 +74,14 @@ def _structure(description: Description, block: str, base: str, tool: str,
     for name in poses:
         if name not in description.links:
             raise UnknownNameError('link', name, description.links, f'{block}.home')
+    if description.loops and block == ARM:
+        raise ModelError('arm.urdf', description.path, 'be of a robot without loops, but its '
+                         f'<constraint> {description.loops[0].name} closes one: write a block '
+                         '`robot`, with `drives` instead of `joints`')
+    for loop in description.loops:
+        if loop.name in loops:
+            raise ModelError(f'{block}.loops.{loop.name}', loop.kind, 'not stand in the file as '
+                             'well as in the description')
     closures = (*description.loops, *(Loop(
         name, one['type'], one['a.link'], Frame.of(one['a.xyz'], one['a.rpy']),
         one['b.link'], Frame.of(one['b.xyz'], one['b.rpy'])) for name, one in loops.items()))
@@ -80,11 +89,11 @@ def _structure(description: Description, block: str, base: str, tool: str,
                            lock_others=block == ARM)
 
 
-def _require_one_motor_each(values: Mapping[str, Any], block: str) -> None:
-    drives = values[drives_key(block)]
-    for kind, coupled in transmissions(values[f'{block}.urdf']):
-        if any(word in kind for word in COUPLED) and set(coupled) & set(drives):
-            raise ModelError(drives_key(block), coupled, 'have a motor each, but share a '
+def _require_one_motor_each(description: Description, drives: tuple[str, ...], block: str) -> None:
+    for each in description.transmissions:
+        kind = each.kind.lower()
+        if any(word in kind for word in COUPLED) and set(each.joints) & set(drives):
+            raise ModelError(drives_key(block), list(each.joints), 'have a motor each, but share a '
                              f'transmission {kind} in the URDF: coupled joints are not covered')
 
 
