@@ -264,11 +264,12 @@ def experiment_of(question: Question, found: Found) -> Experiment:
         lambda time: question.model.drive_forces(found.path.motion(time)), question.model)
 
 
-def _expected(contest: Contest, known: Array, after: Array) -> list[ExpectedEvidence]:
+def _expected(contest: Contest, known: Array, after: Array, margin: float,
+              ) -> list[ExpectedEvidence]:
     """Return what a motion promises for every pair of effects of a contest."""
     expected, gained = contest.evidence(known, after), contest.gained(known, after)
     # Twice a log-likelihood ratio scatters by twice the root of its mean.
-    sure = float(ndtr((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
+    sure = float(ndtr((expected - margin) / (2 * np.sqrt(gained) + 1e-9)))
     return [ExpectedEvidence(truth, rival, contest.now, expected, sure)
             for truth, rival in product(*contest.sides)]
 
