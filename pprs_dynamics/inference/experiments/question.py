@@ -35,7 +35,12 @@ from pprs_dynamics.inference.regression.design import FREE, Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.sensitivities import PASSIVE_WIDTHS, model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
+from pprs_dynamics.inference.search.candidates import (
+    CandidateSet,
+    EffectCandidate,
+    Prices,
+    names_of,
+)
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
@@ -332,7 +337,8 @@ def _holds(larger: Sequence[FittedTerm], smaller: FittedTerm, design: Design) ->
     return True
 
 
-def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: float) -> Question:
+def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: float,
+                  decisions: Decisions = DECISIONS) -> Question:
     """Return the question of a robot that nothing, or little, is known of.
 
     It is of the model's own numbers, and of the effects that are common.
@@ -374,10 +380,11 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
         plan = ColumnPlan(model, model, base_without_recordings(model), tuple(terms))
         spectra = dict.fromkeys(range(len(DRIVES)), white)
         known = Information(plan, spectra).prior()
-    subjects = subjects_of(plan, Prices(len(catalogue()), len(DRIVES), samples, DECISIONS))
+    subjects = subjects_of(plan, Prices(names_of(model), len(DRIVES), samples, decisions))
     scales = np.concatenate([np.ones(len(plan.numbers)), *(term.scales for term in terms)])
     criterion = Precision((*plan.numbers, *free_of(subjects)), plan.others, scales)
-    return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise)
+    return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise,
+                    decisions)
 
 
 def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:

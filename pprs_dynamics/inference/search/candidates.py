@@ -267,6 +267,11 @@ def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
     return frozenset(candidate.key for candidate in candidates)
 
 
+def names_of(model: ForceModel) -> int:
+    """Return how many effects the catalogue has for what a model is of."""
+    return sum(map(model.offers, catalogue().values()))
+
+
 @dataclass(frozen=True)
 class Prices:
     """Twice the logarithms of prior odds, for everything that is chosen.
@@ -294,7 +299,7 @@ class Prices:
         Names are those of effects that can act in what it is a model of, those of other packages
         among them. Of errors without a model they are the package's own.
         """
-        names = len(CATALOGUE) if model is None else sum(map(model.offers, catalogue().values()))
+        names = len(CATALOGUE) if model is None else names_of(model)
         return cls(names, len(regression.drives), regression.samples, decisions)
 
     def of_name(self) -> float:
