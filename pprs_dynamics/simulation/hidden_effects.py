@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 
 import numpy as np
 
+from pprs_dynamics.errors import suggestion
 from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
 from pprs_dynamics.simulation.hidden_effect import DriveBound, HiddenEffect, HiddenEffectError
 
@@ -72,9 +72,8 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
     """
     name, _, drives = name.partition(':')
     if name not in HIDDEN_EFFECTS:
-        close = difflib.get_close_matches(name, HIDDEN_EFFECTS, 1)
-        hint = f' (did you mean {close[0]}?)' if close else ''
-        raise HiddenEffectError(f'no hidden effect is called {name!r}{hint}; there are '
+        raise HiddenEffectError(f'no hidden effect is called {name!r}'
+                                f'{suggestion(name, HIDDEN_EFFECTS)}; there are '
                                 f'{", ".join(HIDDEN_EFFECTS)}')
     effect = HIDDEN_EFFECTS[name]
     if not drives:

@@ -35,6 +35,7 @@ class EffortFilter(MeasurementEffect):
     name: ClassVar[str] = 'effort_filter'
     bends_columns: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = True
+    assumed_at_start: ClassVar[str] = 'the filter has settled at the first sample'
     linear = ()
     shape = (Parameter('time_constant', 'T', 's', 'mean delay of the filter', 1e-4, 1.0,
                        scale=0.01),)
