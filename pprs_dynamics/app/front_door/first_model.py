@@ -44,7 +44,7 @@ from pprs_dynamics.physics.mechanism.description import (
     TURNING,
     Description,
 )
-from pprs_dynamics.physics.mechanism.urdf import read_content, read_urdf, transmissions
+from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.model_file import Model, build_model
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
 from pprs_dynamics.system.plain_yaml import scalar
@@ -143,11 +143,13 @@ def first_model(
     names = _names(contents, movable) if contents is not None else Names()
     recorded = set(names.joints) | (_mentioned(contents, movable) if contents else set())
     branch, notes = _branch(description, tool, recorded, ask)
+    notes += description.remarks
     chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
     if contents is not None and contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')
     columns: list[str] = []
+    guessed: list[str] = []
     found: Collection[str] = ()
     if given:
         columns, guessed, found = _columns(given[0], files, contents, names, description, chosen,
@@ -155,7 +157,7 @@ def first_model(
         notes += guessed
     has_efforts = bool({EFFORT, CURRENT} & {*found})
     text = _text(path, Path(output), is_mjcf, description, base or root_of(description), branch,
-                 chosen, names, columns, notes, [one.name for one in given], CURRENT in found)
+                 chosen, names, columns, guessed, [one.name for one in given], CURRENT in found)
     model = build_model(parse_parameters(text, output), source=str(output))
     if CURRENT in found:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
@@ -170,7 +172,7 @@ def first_model(
 
 def _root_tag(path: Path) -> str:
     try:
-        return ElementTree.fromstring(read_content(str(path))).tag
+        return ElementTree.fromstring(expanded(str(path))).tag
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise UnreadableFileError(path, f'no URDF or MJCF, it is not XML: {error}') from None
 
@@ -213,7 +215,7 @@ def _drives(description: Description, path: Path, is_mjcf: bool, branch: Branch,
         return tuple(name for name in branch.names if name in recorded) or branch.names
     # What loops determine is not driven.
     driven = recorded or (_actuated(path) if is_mjcf else {
-        joint for _, joints in transmissions(str(path)) for joint in joints})
+        joint for one in description.transmissions for joint in one.joints})
     found = tuple(name for name in description.joints if name in driven)
     if not found:
         raise FirstModelError(
@@ -417,7 +419,7 @@ def _limit(description: Description, name: str) -> float:
 
 def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, base: str,
           branch: Branch, drives: Sequence[str], names: Names, columns: Sequence[str],
-          notes: Sequence[str], recordings: Sequence[str], currents: bool) -> str:
+          guessed: Sequence[str], recordings: Sequence[str], currents: bool) -> str:
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
     gain = ', '.join(['1.0'] * len(drives))
@@ -455,7 +457,7 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
             + '}  # what recordings call them')
     if columns:
         lines.append('    columns:  # of tables: names, or numbers from 1')
-        lines += [f'      # guessed: {note}' for note in notes]
+        lines += [f'      # guessed: {note}' for note in guessed]
         lines += [f'      {line}' for line in columns]
     return '\n'.join(lines) + '\n'
 
