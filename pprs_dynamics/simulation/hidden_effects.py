@@ -20,7 +20,7 @@ IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in
     hidden_forces.Hysteresis, hidden_forces.FrictionDrift,
     hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
     hidden_forces.drive_spring, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
-    sensors.TimeDelay, hidden_forces.RevoluteFriction,
+    sensors.TimeDelay, sensors.EffortFilter, hidden_forces.RevoluteFriction,
     hidden_forces.SphericalFriction, hidden_forces.revolute_stiffness,
     hidden_bodies.payload_mass, hidden_bodies.payload_offset, hidden_bodies.platform_inertia,
     hidden_forces.external_wrench, hidden_bodies.base_tilt, hidden_forces.platform_drag,
