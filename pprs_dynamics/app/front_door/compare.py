@@ -187,12 +187,13 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     --------
     >>> print(compare('config/paper.yaml', 'run.mcap'))  # doctest: +SKIP
     """
-    inputs = Inputs.of(model, recordings, (), topic, progress).require_recordings()
+    inputs = Inputs.of(model, recordings, (), topic, progress, whole=True).require_recordings()
     measuring = stage(progress, 'motion and model')
     columns, residuals, notes = measure_columns(inputs.model, inputs.fitted, measuring)
     where = localise(residuals, progress=stage(progress, 'where it fails'))
     comparison = compare_residuals(
-        residuals, where, noise_floors(columns, where.patterns) if columns else {},
+        residuals, where,
+        noise_floors(columns, where.patterns, period=residuals.period) if columns else {},
         little_explained(inputs.model, residuals))
     return ComparisonResult(
         inputs, residuals, comparison, tuple(notes),

@@ -107,6 +107,8 @@ class Diagnosis:
     held_out_on : {'blocks', 'validation'}
     selection : Ranking, optional
         All that was tried, for looking closer.
+    decisions : Decisions
+        With which it was made.
     """
 
     verdict: str
@@ -133,6 +135,7 @@ class Diagnosis:
     unseen_noise: tuple[str, ...] = ()
     held_out_on: str = 'blocks'
     selection: Ranking | None = field(default=None, repr=False, compare=False)
+    decisions: Decisions = DECISIONS
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
@@ -236,7 +239,7 @@ class _Answer:
             first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above, little,
             tuple(name for name in floors if name not in seen),
-            'validation' if self.validate else 'blocks', self.ranking)
+            'validation' if self.validate else 'blocks', self.ranking, self.decisions)
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""

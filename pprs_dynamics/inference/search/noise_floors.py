@@ -16,7 +16,6 @@ C. L. Mallows, Some comments on C_p, Technometrics 15 (1973) 661-675.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -25,6 +24,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block, NormalEquations
+from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -38,11 +38,11 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 LEAST_DIRECTION, MOST_DIRECTIONS = 0.03, 6
 # Shapes of an effect beyond these span no few directions: ripples of any period are any curve.
 MOST_SHAPES = 60
-MOST_SAMPLES = 30_000  # of a recording, to which the largest fit is made: a minute at 500 Hz
 
 
 def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = MappingProxyType({}),
-                 blocks: Sequence[Block] = ()) -> dict[str, float]:
+                 blocks: Sequence[Block] = (), period: float | None = None,
+                 ) -> dict[str, float]:
     """Return the rms of the noise of the drives where it can be told [N].
 
     Parameters
@@ -53,6 +53,8 @@ def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = Map
         the design has take part.
     blocks : sequence of Block, optional
         The same, as blocks of the design: of what was found.
+    period : float, optional
+        Between the samples whose noise is told [s]; by default that of the design.
     """
     regression, drives = fits.regression, fits.design.drives
     found = [regression.block({drives.index(name): rows}) for name, every in patterns.items()
@@ -61,7 +63,10 @@ def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = Map
     every = tuple(dict.fromkeys((*catalogue_blocks(fits), *blocks, *found)))
     fit = regression.fit(every, fits.evaluate(()).fit.amplitudes)
     told = _shares_seen(fits, fit) >= fits.decisions.noise_seen
-    return {drives[d]: regression.noise_floor(fit, d)
+    # Means over longer blocks have less white noise, and as much of slower noise.
+    white = fit.amplitudes[:, 0] * (
+        fits.design.residuals.period / (period or fits.design.residuals.period) - 1)
+    return {drives[d]: float(np.sqrt(max(regression.noise_floor(fit, d) ** 2 + white[k], 0.0)))
             for k, d in enumerate(regression.drives) if told[k]}
 
 
@@ -71,7 +76,7 @@ def measure_columns(
 ) -> tuple[FittedSets | None, Residuals, tuple[str, ...]]:
     """Return what a largest fit needs, and what `measure_residuals` returns.
 
-    Of long recordings the former is that of a piece: noise is taken as stationary. None where
+    Of long recordings the former is of the stretches that a search takes. None where
     there are too few samples for any fit.
 
     Parameters
@@ -87,9 +92,9 @@ def measure_columns(
     PprsError
         As `measure_residuals`.
     """
-    piece = _shortened(recordings)
+    piece = excerpts_within_memory(model, recordings)
     whole = None
-    if piece is not recordings:
+    if any(one is not other for one, other in zip(piece, recordings, strict=True)):
         whole = measure_residuals(model, recordings, lambda done, total: progress(
             0.5 * done / total if total else 0.0))
     design = Design.of(model, piece, lambda share: progress(0.5 + 0.5 * share if whole else share))
@@ -98,24 +103,6 @@ def measure_columns(
         return FittedSets(design, decisions), residuals, notes
     except ResidualsError:
         return None, residuals, notes
-
-
-def _shortened(recordings: Sequence[Recording]) -> Sequence[Recording]:
-    """Return recordings of at most about `MOST_SAMPLES` each, from their middle."""
-    if all(len(one.time) <= MOST_SAMPLES for one in recordings):
-        return recordings
-    found = []
-    for one in recordings:
-        parts, left = [], MOST_SAMPLES
-        longest = max(one.segments, key=lambda part: part.stop - part.start)
-        for part in (longest, *(part for part in one.segments if part is not longest)):
-            count = min(part.stop - part.start, left)
-            first = (part.start + part.stop - count) // 2
-            if count:
-                parts.append(slice(first, first + count))
-            left -= count
-        found.append(replace(one, segments=tuple(sorted(parts, key=lambda part: part.start))))
-    return found
 
 
 def catalogue_blocks(fits: FittedSets) -> list[Block]:

@@ -36,7 +36,12 @@ from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
 from pprs_dynamics.physics.model.keys import GAIN, Key, drives_key, keys_of, mechanism_block
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
-from pprs_dynamics.physics.model.robot_block import joint_radii, passive_friction, read_structure
+from pprs_dynamics.physics.model.robot_block import (
+    described_values,
+    joint_radii,
+    passive_friction,
+    read_structure,
+)
 
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
 BLOCKS_PER_PERIOD = 100.0
@@ -151,6 +156,7 @@ class ArmModel(ForceModel):
                 raise ModelError(listed, parameters[listed], 'name at least one joint')
             values = checked_values(parameters)
             structure = read_structure(values, Path(source).parent)
+            values.update(described_values(structure, values))
             robot = _mechanism(structure, values)
             effects = (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
                        AxisOffset(values['friction.offset']), *passive_friction(structure, values),
@@ -200,8 +206,10 @@ def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:
 def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism with its bodies, from the file where it has them."""
     block = mechanism_block(values)
-    rows = [structure.rows[name] for name in structure.drives]
-    bodies = np.array(rows) if block == ARM_BLOCK else np.flatnonzero(structure.inertial[:, 0] > 0)
+    # Of an arm what each joint moves comes first, in the order of `joints`; then what follows them.
+    driven = [structure.rows[name] for name in structure.drives] if block == ARM_BLOCK else []
+    with_mass = [int(row) for row in np.flatnonzero(structure.inertial[:, 0] > 0)]
+    bodies = np.array([*driven, *(row for row in with_mass if row not in driven)], dtype=np.int64)
     inertial = structure.inertial[bodies]
     for key, first, size in (('links.mass', 0, 1), ('links.moment', 1, 3),
                              ('links.inertia', 4, 6)):

@@ -39,6 +39,7 @@ from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.node.provenance import folder_of, names_given
 from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
+from pprs_dynamics.system.package_files import located
 
 ACTIVE = 'effects.active'
 HISTORY = 'history.'
@@ -140,6 +141,12 @@ def drive_count(node: Node) -> int:
     return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 
+def has_model(given: Mapping[str, Any]) -> bool:
+    """Return whether a robot is among the parameters given, and not only changes of the paper's."""
+    return is_mechanism(given) or is_axis(given) or any(
+        name.startswith('geometry.') for name in given)
+
+
 def declare_model(node: Node) -> list[str]:
     """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
 
@@ -160,10 +167,9 @@ def declare_model(node: Node) -> list[str]:
         DriveModel.from_parameters(given)  # refuses it
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
-            given[key] = str(folder_of(key) / given[key])
+            given[key] = str(located(given[key], folder_of(key)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
-    is_own = is_mechanism(given) or any(name.startswith('geometry.') for name in given)
-    defaults = {} if is_own else default_parameters()
+    defaults = {} if has_model(given) else default_parameters()
     _declare_keys(node, keys_of(given), given, defaults)
     return [name for name in KEYS if name not in given and name in defaults]
 

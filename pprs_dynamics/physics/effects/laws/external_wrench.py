@@ -17,7 +17,7 @@ import numpy as np
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState
-from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 FORCES = tuple(f'force_{axis}' for axis in 'xyz')
@@ -61,5 +61,4 @@ class ExternalWrench(BodyEffect):
     def load(self, state: MechanismState | LinkageState) -> StructureLoad:
         """Return the wrench, the same for every sample."""
         wrench = np.array([self.values[p.name] for p in self.parameters])
-        samples = len(state.velocity)
-        return StructureLoad(np.tile(wrench, (samples, 1)), np.zeros((samples, 3)))
+        return StructureLoad(np.tile(wrench, (len(state.velocity), 1)))

@@ -16,7 +16,7 @@ import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 
@@ -47,4 +47,4 @@ class PlatformDrag(BodyEffect):
         motion = state.motion
         wrench = np.concatenate((self.values['coefficient'] * motion.linear_velocity,
                                  self.values['rotational'] * motion.angular_velocity), axis=1)
-        return StructureLoad(wrench, np.zeros((len(wrench), 3)))
+        return StructureLoad(wrench)
