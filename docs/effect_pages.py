@@ -51,6 +51,7 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'homing_error': {'zero': 0.002},
            'joint_friction': {'fork_4.torque': 0.3},
            'link_mass': {'beam.mass': 0.5},
+           'gear_efficiency': {'driving': 0.25, 'driven_back': 0.1},
            'load_friction': {'coefficient': 0.05},
            'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
            'time_delay': {'delay': 0.02}}

@@ -315,8 +315,7 @@ class Design:
         variables = self.residuals.variables
         time = self.residuals.time
         means = DriveSamples(time, variables['position'][:, drive],
-                             variables['velocity'][:, drive], np.zeros_like(time),
-                             np.zeros_like(time), np.zeros_like(time))
+                             variables['velocity'][:, drive], *np.zeros((4, len(time))))
         rows = effect.averaged(means, self.residuals.period, shapes)
         if rows is None:
             return [self.term(effect, drive, shape) for shape in shapes]
