@@ -80,5 +80,5 @@ class ColumnCollector:
             np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
         return FullRate(
             reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
-            transmitted, effort, reconstruction.effort, reconstruction.segments, reconstruction.treat,
-            reconstruction.start)
+            transmitted, effort, reconstruction.effort, reconstruction.segments,
+            reconstruction.treat, reconstruction.start)

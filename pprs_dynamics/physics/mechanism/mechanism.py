@@ -338,7 +338,8 @@ class LinkageState(JointMotion):
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        return self.reactions.efforts
+        efforts: Array = self.reactions.efforts
+        return efforts
 
     @lazy
     def guide_load(self) -> Array:

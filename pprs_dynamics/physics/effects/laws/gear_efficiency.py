@@ -20,9 +20,9 @@ class GearEfficiency(DriveEffect):
     name: ClassVar[str] = 'gear_efficiency'
     is_friction: ClassVar[bool] = True
     linear = (Parameter('driving', 'mu_d', '1', 'share that is lost where the motor drives the '
-                        'load: 1 / efficiency - 1', -10.0, 10.0, scale=0.05),
+                        'load: 1 / efficiency - 1', -100.0, 100.0, scale=0.05),
               Parameter('driven_back', 'mu_b', '1', 'share that is lost where the load drives the '
-                        'motor: 1 - efficiency', -10.0, 10.0, scale=0.05))
+                        'motor: 1 - efficiency', -100.0, 100.0, scale=0.05))
     unphysical_below: ClassVar[Mapping[str, float]] = {'driving': 0.0, 'driven_back': 0.0}
     card = Card(
         'mu_d |tau| sgn(q_dot) for tau q_dot > 0, mu_b |tau| sgn(q_dot) else, tau what gear or '
