@@ -30,6 +30,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
@@ -248,7 +249,7 @@ class ArmEngine:
 
 def _bare(path: Path) -> str:
     """Return a URDF without meshes, every link with some mass: it is set afterwards."""
-    robot = ElementTree.parse(path).getroot()
+    robot = ElementTree.fromstring(expanded(str(path)))
     for link in robot.findall('link'):
         for part in (*link.findall('visual'), *link.findall('collision'),
                      *link.findall('inertial')):
@@ -417,8 +418,7 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(
                 replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
-                StructureLoad(np.tile(engine.wrench, (len(motion), 1)),
-                              np.zeros((len(motion), 3))))
+                StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
             friction = friction + effect.force(state)
     return friction
 

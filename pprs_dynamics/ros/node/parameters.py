@@ -39,6 +39,7 @@ from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.node.provenance import folder_of, names_given
 from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
+from pprs_dynamics.system.package_files import located
 
 ACTIVE = 'effects.active'
 HISTORY = 'history.'
@@ -166,7 +167,7 @@ def declare_model(node: Node) -> list[str]:
         DriveModel.from_parameters(given)  # refuses it
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
-            given[key] = str(folder_of(key) / given[key])
+            given[key] = str(located(given[key], folder_of(key)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
     _declare_keys(node, keys_of(given), given, defaults)
