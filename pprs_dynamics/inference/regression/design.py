@@ -387,9 +387,11 @@ def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
 
 
 def _delay(recording: FullRate, drive: int) -> float:
-    """Return by how much the measured effort is most like the model's if that is late [s].
+    """Return by how much the measured effort is most like the drive's if that is late [s].
 
-    By the cross-correlation over the longest segment, within `LONGEST_DELAY`.
+    By the multiple correlation with the model's effort and what a model may lack most of (dry and
+    viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
+    explains little is like nothing by itself.
     """
     part = max(recording.segments, key=lambda one: one.stop - one.start)
     time = recording.time[part]
@@ -400,13 +402,17 @@ def _delay(recording: FullRate, drive: int) -> float:
     known = np.isfinite(measured)
     if not most or not np.any(known):
         return 0.0
-    model, seen = (np.interp(even, t, values) for t, values in (
-        (time, recording.effort[part, drive]), (time[known], measured[known])))
+    seen = np.interp(even, time[known], measured[known])
+    columns = np.stack([np.interp(even, time, values[part, drive]) for values in (
+        recording.effort, recording.velocity, recording.direction, recording.acceleration)])
+    columns -= columns.mean(axis=1, keepdims=True)
+    columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
     size = fft.next_fast_len(len(even) + most, real=True)
-    alike = fft.irfft(fft.rfft(seen - seen.mean(), size)
-                      * fft.rfft(model - model.mean(), size).conj(), size)
+    alike = fft.irfft(fft.rfft(seen - seen.mean(), size) * fft.rfft(columns, size).conj(), size)
     lags = np.arange(-most, most + 1)
-    return float(lags[np.argmax(alike[lags])] * step)
+    explained = np.einsum('kl,km,ml->l', alike[:, lags], np.linalg.pinv(columns @ columns.T),
+                          alike[:, lags])
+    return float(lags[np.argmax(explained)] * step)
 
 
 def _rows(column: Array) -> dict[int, Array]:
