@@ -12,6 +12,7 @@ builds up while the drive stands, and falls while it slips.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def _within(time: Array, position: Array, effort: Array, step: float, window: fl
         return None
     direction, level = np.sign(mean), effort[inner]
     # From one slip to the next in the same direction, without a turn between.
-    pairs = [(a, b) for a, b in zip(begins, begins[1:], strict=False)
+    pairs = [(a, b) for a, b in pairwise(begins)
              if np.all(direction[a:b] == direction[a]) and np.all(moving[a:b])]
     if len(pairs) < LEAST_SLIPS:
         return None
