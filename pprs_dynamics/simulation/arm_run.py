@@ -46,6 +46,7 @@ from pprs_dynamics.simulation.arm_forms import (
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
 
 RATE = 100.0  # [Hz]
 HARMONICS = 8
@@ -372,6 +373,13 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         efforts = np.stack([np.interp(motion.time - delay, motion.time, column)
                             for column in efforts.T], axis=1)
         hidden.append(truth('time_delay', list(model.drives), {'delay': delay}, 'all efforts late'))
+    if 'effort_filter' in chosen:
+        assert motion.time is not None
+        time_constant = scale * float(random.uniform(0.01, 0.04))
+        every = np.full(len(largest), time_constant)
+        efforts = ButterworthFilter(every, float(np.median(np.diff(motion.time)))).samples(efforts)
+        hidden.append(truth('effort_filter', list(model.drives), {'time_constant': time_constant},
+                            EffortFilter.form))
     shift = np.zeros(len(largest))
     if 'homing_error' in chosen:
         joint = int(random.integers(1, len(model.drives)))

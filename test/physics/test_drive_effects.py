@@ -24,6 +24,7 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFri
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
+from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
@@ -379,6 +380,37 @@ def test_a_call_without_memory_starts_afresh(effect):
     whole = built.force(axes)
     assert np.abs(whole[5000:] - built.force(axes[5000:])).max() > 0.01
     assert_array_equal(built.force(axes), whole)
+
+
+@pytest.mark.parametrize('time_constant', [0.004, 0.03, 0.2])
+def test_a_filtered_ramp_is_the_solution_of_its_differential_equation(time_constant):
+    """(T/2 d/dt + 1)^2 y = t from rest has y = t - T + (t + T) exp(-2 t / T)."""
+    t = np.arange(0.0, 1.0, 0.0005)
+    effect = EffortFilter({'axis': {'time_constant': time_constant}})
+    y = effect.sensed(t[:, None], t, ('axis',))[:, 0]
+    expected = t - time_constant + (t + time_constant) * np.exp(-2 * t / time_constant)
+    assert_allclose(y, expected, atol=1e-2 * time_constant)
+
+
+def test_a_filter_leaves_what_stands_and_takes_what_is_fast():
+    t = np.arange(0.0, 2.0, 0.001)
+    effect = EffortFilter({'axis': {'time_constant': 0.02}})
+    still = effect.sensed(np.full((len(t), 1), 7.5), t, ('axis',))
+    assert_allclose(still, 7.5, rtol=1e-12)
+    for f in (1.0, 20.0, 100.0):
+        y = effect.sensed(np.sin(2 * np.pi * f * t)[:, None], t, ('axis',))[1000:, 0]
+        assert np.ptp(y) / 2 == pytest.approx(1 / (1 + (np.pi * f * 0.02) ** 2), rel=0.1)
+
+
+@pytest.mark.parametrize('chunk', [1, 7])
+def test_a_filter_in_a_stream_equals_one_call(chunk):
+    t = np.arange(200) * 0.01
+    F = np.random.default_rng(0).normal(size=(200, 1)).cumsum(axis=0)
+    effect = EffortFilter({'axis': {'time_constant': 0.05}})
+    memory = effect.initial_memory()
+    parts = [effect.sensed(F[k:k + chunk], t[k:k + chunk], ('axis',), memory)
+             for k in range(0, len(t), chunk)]
+    assert_allclose(np.concatenate(parts), effect.sensed(F, t, ('axis',)), atol=1e-9)
 
 
 # --- what is remembered while parameters change ---------------------------------------------------

@@ -169,7 +169,8 @@ class ArmModel(ForceModel):
             common = values['friction.reversal_velocity']
             width = tuple(own or common for own in values['friction.reversal_velocities'])
             return cls(robot=robot, effects=effects,
-                       reversal=Reversal(width, values.get('friction.reversal_rate', common)),
+                       reversal=Reversal(width, values.get('friction.reversal_rate', common),
+                                         values.get('friction.reversal_slide', common)),
                        values=values, source=source)
 
     @cached_property

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
@@ -252,10 +252,11 @@ def _type_of(key: Key) -> Parameter.Type:
 
 
 def refuse_unknown(node: Node) -> None:
-    """Raise ModelError where a parameter was given that neither node nor model has."""
-    for name, value in overrides(node).items():
+    """Raise UnknownNameError where a parameter was given that neither node nor model has."""
+    known = [*node.get_parameters_by_prefix('')]
+    for name in overrides(node):
         if not node.has_parameter(name) and not is_known(name):
-            raise ModelError(name, value, 'not be there: no such parameter')
+            raise UnknownNameError('parameter', name, known)
 
 
 def overrides(node: Node) -> dict[str, Any]:
@@ -279,7 +280,7 @@ def added_descriptor(name: str) -> ParameterDescriptor:
     block, _, rest = name.partition('.')
     effect, _, place = rest.partition('.')
     if block == 'effects' and effect in CATALOGUE:
-        for parameter in CATALOGUE[effect].parameters:
+        for parameter in (one.widest for one in CATALOGUE[effect].parameters):
             if place.rpartition('.')[2] == parameter.name:
                 unit = f' [{parameter.unit}]' if parameter.unit else ''
                 descriptor = _descriptor(
