@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
-from pprs_dynamics.inference.residuals.readings import POSITION_UNIT
+from pprs_dynamics.inference.residuals.mistakes import POSITION_UNIT
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel

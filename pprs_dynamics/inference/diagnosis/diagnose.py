@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,9 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -45,7 +47,7 @@ from pprs_dynamics.inference.search.fitted_model import (
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.ranking import Ranking, select
+from pprs_dynamics.inference.search.ranking import Ranking, select, without_search
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
@@ -94,6 +96,8 @@ class Diagnosis:
     above_noise : mapping of str to float
         How many times its noise a drive keeps, where that is more than what was found may leave.
     held_out_on : {'blocks', 'validation'}
+    effort_looks_like : mapping of str to NoMeasurement
+        Drives whose efforts are no measurement: then nothing is claimed.
     selection : Ranking, optional
         All that was tried, for looking closer.
     """
@@ -119,6 +123,7 @@ class Diagnosis:
     noise_floor: float
     above_noise: Mapping[str, float] = field(default_factory=dict)
     held_out_on: str = 'blocks'
+    effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     selection: Ranking | None = field(default=None, repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -138,6 +143,7 @@ class Diagnosis:
             'sets': [one.to_dict() for one in self.sets],
             'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
+            'effort_looks_like': kinds_of(self.effort_looks_like),
             'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
@@ -145,6 +151,7 @@ class Diagnosis:
 def diagnose(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
+    as_it_is: bool = False,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
@@ -158,6 +165,8 @@ def diagnose(
     progress : callable, optional
         Called with the share of the work that is done.
     decisions : Decisions, optional
+    as_it_is : bool
+        Whether efforts that look like no measurement are taken for one all the same.
 
     Raises
     ------
@@ -169,6 +178,11 @@ def diagnose(
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
+    other = {} if as_it_is else looks_like(model, recordings)
+    if other:
+        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions)
+        return replace(answer.diagnosis(()), verdict='unknown', depends_on=(),
+                       effort_looks_like=other)
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []

@@ -62,6 +62,11 @@ PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
+    if diagnosis.effort_looks_like:
+        lines = dict.fromkeys(one.line for one in diagnosis.effort_looks_like.values() if one.line)
+        say = f'; where it is what it looks like, write {listed(tuple(lines), "or")} into the model file' if lines else ''
+        return (f'Record the effort that is measured{say}. Where it is measured all the same',
+                files.command('diagnose', '--as-it-is'))
     if diagnosis.depends_on:
         if (curve := _curve(diagnosis)) is not None:
             return ('Look at that place on the machine. A measured curve takes the error away '

@@ -185,6 +185,9 @@ def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
+    if diagnosis.effort_looks_like:
+        told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
+        return f'{"; ".join(map(sentence, told))} No effect is claimed.'
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')

@@ -23,9 +23,10 @@ from pprs_dynamics.inference.residuals.excerpt import (
     forces_in_pieces,
     forces_on,
 )
+from pprs_dynamics.inference.residuals.measured_effort import find_no_measurements
+from pprs_dynamics.inference.residuals.mistakes import POSITION_UNIT, Mistake, OtherReading
 from pprs_dynamics.inference.residuals.readings import (
     LENGTHS,
-    POSITION_UNIT,
     Reading,
     as_named,
     named,
@@ -60,20 +61,6 @@ STROKE_SLACK = 0.05  # share of a stroke by which positions may lie outside it
 FAR_OUT = 10.0  # multiples of the farthest end of a stroke that no mistake of zero explains
 ALIKE = 0.9  # least correlation of a recorded velocity with the derivative of positions
 NEARLY = 0.2  # by how much a factor may be off, relatively
-
-
-class Mistake(Defect):
-    """A finding about what a recording's numbers mean."""
-
-    @classmethod
-    def of(cls, kind: str, drives: Sequence[str], group: Sequence[int], what: str) -> Mistake:
-        """Return a mistake of some of the drives."""
-        return cls(kind, len(group), what, (), tuple(drives[k] for k in group))
-
-    @property
-    def action(self) -> str:
-        """What was done about it, as a clause."""
-        return 'nothing is changed'
 
 
 @dataclass(frozen=True)
@@ -118,6 +105,9 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     if not told & {POSITION_UNIT, 'position_sign', 'reversed_time'}:
         unit = 1.0 if best is None else best.time_unit
         found += _of_velocities(recording, excerpts.get(unit))
+    # In other units or signs it would seem to lack what is there.
+    if not any(isinstance(finding, OtherReading) for finding in found):
+        found += find_no_measurements(model, recording)
     return tuple(found)
 
 
@@ -254,11 +244,11 @@ def _time_units(recording: Recording) -> list[float]:
 def _of_fit(drives: tuple[str, ...], units: Sequence[DriveUnits], fit: _Fit) -> Iterator[Mistake]:
     """Yield the mistakes of times, of what is read otherwise, and of efforts."""
     if fit.time_unit != 1.0:
-        yield Mistake('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as seconds '
+        yield OtherReading('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as seconds '
                       f'they make the motion {1 / fit.time_unit:.0f} times too slow for its '
                       'efforts')
     if fit.reading.kind:
-        yield Mistake.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what)
+        yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what)
     for factor in EFFORT_FACTORS[1:]:
         group = tuple(np.flatnonzero(fit.factors == factor).tolist())
         if not group:
@@ -269,7 +259,7 @@ def _of_fit(drives: tuple[str, ...], units: Sequence[DriveUnits], fit: _Fit) -> 
         times = 'minus' if factor == -1.0 else f'{factor:g} times'
         guess = '' if unit is None else f', as if it were in {unit}'
         other = ' (or its position is negated)' if len(drives) == 1 and factor < 0 else ''
-        yield Mistake.of('effort_sign' if unit is None else 'effort_unit', drives, group,
+        yield OtherReading.of('effort_sign' if unit is None else 'effort_unit', drives, group,
                          f'the effort of {named(drives, group)} looks like {times} what the model '
                          f'says{guess}{other}')
 
@@ -286,7 +276,7 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     unit = next((name for unit, name in LENGTHS.items()
                  if np.all(reach[list(far)] * unit <= np.maximum(-lower, upper)[list(far)])), '')
     drives = recording.drives
-    yield Mistake.of(POSITION_UNIT, drives, far,
+    yield OtherReading.of(POSITION_UNIT, drives, far,
                      f'the positions of {named(drives, far)} reach {reach.max():.4g} m, far out of '
                      'the stroke' + f', as if they were in {unit}' * bool(unit))
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES, DriveUnits
+from pprs_dynamics.inference.residuals.mistakes import POSITION_UNIT
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 
-POSITION_UNIT = 'position_unit'  # kind of mistake
 LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
 ANGLES = {float(np.pi / 180): 'degrees'}
 SLIDES, LIFTS = (0, 1, 2), (3, 4, 5)  # of the six drives, in drive order

@@ -239,6 +239,20 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     return _searched(FittedSets(design, decisions), frozenset(), report)
 
 
+def without_search(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+                   progress: Callable[[float], None] | None = None) -> Ranking:
+    """Return the ranking of the empty set alone: what the model as given leaves, and its noise.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    fits = FittedSets(Design.of(model, recordings, progress), decisions)
+    nothing = fits.evaluate(())
+    return Ranking._keeping(fits, fits, (), nothing, nothing, (), frozenset())
+
+
 def _searched(first: FittedSets, refuted: frozenset[Place],
               report: Callable[[float], None] = lambda share: None) -> Ranking:
     search = Search(first, patterns_of(first), refuted, lambda share: report(0.25 + 0.35 * share))

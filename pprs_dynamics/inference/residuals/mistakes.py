@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a recording's numbers mean instead of what its names and units say, as findings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pprs_dynamics.measurement.files.samples import Defect
+
+POSITION_UNIT = 'position_unit'  # kind of mistake
+# Kinds of efforts that are no measurement of what the drive applies.
+COMMAND, POSITION_ERROR = 'command', 'position_error'
+WITHOUT_GRAVITY, NOISE_FREE = 'without_gravity', 'noise_free'
+
+
+@dataclass(frozen=True)
+class Mistake(Defect):
+    """A finding about what a recording's numbers mean.
+
+    Parameters
+    ----------
+    kind, count, what, spans, drives
+        See `Defect`.
+    line : str
+        What to write into the model file, so that it is read as it looks; '' where no line does.
+    """
+
+    line: str = ''
+
+    @classmethod
+    def of(cls, kind: str, drives: Sequence[str], group: Sequence[int], what: str,
+           line: str = '') -> Mistake:
+        """Return a mistake of some of the drives."""
+        return cls(kind, len(group), what, (), tuple(drives[k] for k in group), line)
+
+    @property
+    def action(self) -> str:
+        """What was done about it, as a clause."""
+        return 'nothing is changed'
+
+
+class NoMeasurement(Mistake):
+    """A finding that efforts are not what drives were measured to apply."""
+
+    @property
+    def action(self) -> str:
+        """What follows, as a clause."""
+        return 'no effect is claimed'
+
+
+class OtherReading(Mistake):
+    """A finding that a recording is in other units, signs or another order than it says."""
