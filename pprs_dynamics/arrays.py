@@ -15,6 +15,31 @@ Value = float | Array
 Sample = int | slice
 
 
+def as_numbers(values: ArrayLike) -> Array:
+    """Return a copy as floats: what is missing (None, NA of pandas) is NaN, dates are seconds.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For what is no number.
+    """
+    if hasattr(values, 'to_numpy'):
+        values = values.to_numpy()  # columns of pandas and of its kind, with NA as an object
+    array = np.asarray(values)
+    if array.dtype.kind in 'mM':
+        origin = np.zeros(1, f'{array.dtype.kind}8[ns]')
+        return np.asarray((array - origin) / np.timedelta64(1, 's'), dtype=float)
+    if array.dtype == object:
+        return np.array([np.nan if _is_missing(one) else float(one) for one in array.flat],
+                        dtype=float).reshape(array.shape)
+    return np.array(array, dtype=float)
+
+
+def _is_missing(value: object) -> bool:
+    # Nothing but NA of pandas is neither equal to itself nor not; pandas need not be there.
+    return value is None or type(value).__name__ in ('NAType', 'NaTType')
+
+
 def root_mean_square(values: ArrayLike) -> float:
     """Return the root of the mean square of what is known; NaN where nothing is."""
     numbers = np.asarray(values)

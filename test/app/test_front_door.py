@@ -10,10 +10,12 @@ import dataclasses
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import pprs_dynamics
@@ -182,6 +184,18 @@ def test_what_cannot_be_read_or_is_given_twice_is_refused(folder: Path) -> None:
         compare('config/paper.yaml', folder / 'nothing.csv')
     with pytest.raises(PprsError, match='viscous_friction'):
         adopt('config/paper.yaml', 'viscous_fricton', run)
+
+
+@pytest.mark.parametrize('call', [compare, pprs_dynamics.diagnose, pprs_dynamics.fit])
+def test_what_is_no_model_and_no_recording_is_refused_in_a_sentence(
+    call: Callable[..., Any], folder: Path,
+) -> None:
+    for model in (None, 3, {}):
+        with pytest.raises(PprsError, match=type(model).__name__):
+            call(model, folder / 'run.csv')
+    for recordings in (None, 3, [None], pd.DataFrame({'time': [0.0]}), np.zeros((3, 2))):
+        with pytest.raises(PprsError, match='must be a path or a Recording'):
+            call('config/paper.yaml', recordings)
 
 
 def test_a_missing_library_is_named(compared: ComparisonResult,

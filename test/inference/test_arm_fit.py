@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import gzip
+from dataclasses import replace
 from pathlib import Path
 
 import made_up_arm as arm
@@ -97,6 +98,24 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
     fit = fit_base(described, [arm.record(real, still, NOISE)])
     assert fit.model.values['friction.viscous'][2] == 33.0
     assert any('reach hardly moves' in sentence for sentence in fit.told)
+
+
+def test_a_joint_stands_however_sharply_another_ones_friction_turns_over(tmp_path: Path) -> None:
+    # Its noise is motion to the narrow width that is fitted to the others, and would be its only.
+    model = ArmModel.load(arm.write_arm(tmp_path, friction__reversal_velocity=0.01))
+    sharp = build_model({**model.values, **arm.FRICTION,
+                         'friction.reversal_velocities': (1e-4, 1e-4, 1e-4)}, model.source)
+    moved = arm.motion()
+    still = JointMotion(*(values * [1, 1, 0] for values in (
+        moved.position, moved.velocity, moved.acceleration)), moved.time)
+    recording = arm.record(sharp, still, NOISE)
+    recording.position[:, 2] += 2e-4 * np.random.default_rng(1).normal(size=len(recording.time))
+    fit = fit_base(model, [replace(recording, velocity=None)])
+    assert set(fit.before) == set(fit.after) == set(fit.held_out) == {'turn', 'swing'}
+    assert fit.after['turn'] < 0.2 * fit.before['turn']
+    assert any('reach hardly moves' in sentence for sentence in fit.told)
+    before, after = (measure_residuals(one, [recording])[0] for one in (model, fit.model))
+    assert np.array_equal(np.isfinite(before.error), np.isfinite(after.error))
 
 
 def test_fitted_links_are_bodies(tmp_path: Path) -> None:

@@ -382,3 +382,15 @@ def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
     # What the linear fit promises is what the model does.
     error = measure_residuals(found.adopted, [recording])[0].error
     assert np.sqrt(np.nanmean(error ** 2)) < 1.02 * found.noise_floor
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -> None:
+    late = build_model({**MODEL.values, 'effects.active': ['time_delay', 'viscous_friction'],
+                        **{f'effects.time_delay.{drive}.delay': 0.008 for drive in DRIVES},
+                        'effects.viscous_friction.slide_2.coefficient': 12.0})
+    recording = record(late, 0.05)
+    recording.effort[:, 2] = np.nan
+    found = diagnose(MODEL, [recording])
+    assert {one.name for one in found.effects} == {'time_delay', 'viscous_friction'}
+    assert 'slide_3' not in {drive for one in found.effects for drive in one.drives}

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -248,6 +250,53 @@ def test_milliseconds_taken_for_seconds_are_told() -> None:
     arrays = measured()
     arrays['time'] = 1000 * arrays['time']
     assert 'one sample in 2 s' in the(judged(arrays), 'slow_rate').text
+
+
+@pytest.mark.parametrize(('count', 'start'), [(1000, 0.0), (1001, 0.0), (1000, 1.7e18)])
+@pytest.mark.parametrize(('unit', 'scale'), [('milliseconds', 1e3), ('microseconds', 1e6),
+                                             ('nanoseconds', 1e9)])
+def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
+    unit: str, scale: float, count: int, start: float, tmp_path: Path,
+) -> None:
+    arrays = measured(count)
+    stamps = np.rint(scale * arrays['time'] + start * scale / 1e9).astype(np.int64)
+    header = ['time', *(f'{drive}/position' for drive in DRIVES)]
+    path = tmp_path / 'run.csv'
+    path.write_text('\n'.join([','.join(header), *(
+        ','.join(map(str, [stamp, *row])) for stamp, row in zip(
+            stamps.tolist(), arrays['position'].tolist(), strict=True))]))
+    recording = read_recording(path)
+    assert len(recording.time) == count
+    assert recording.time[-1] - recording.time[0] == pytest.approx(
+        scale * arrays['time'][-1], rel=1e-6)
+    slow, = (one for one in recording.findings if one.kind == 'slow_rate')
+    assert unit in slow.text
+
+
+def test_what_pandas_has_for_missing_values_counts_as_missing() -> None:
+    arrays = measured(500)
+    frames = {name: pd.DataFrame(values).astype('Float64') for name, values in arrays.items()
+              if name != 'time'}
+    frames['effort'].iloc[10, 2] = frames['velocity'].iloc[20, 3] = pd.NA
+    frames['position'].iloc[30, 1] = pd.NA
+    given = frames | {'effort': frames['effort'].astype(object), 'velocity': [
+        [None if pd.isna(one) else one for one in row]
+        for row in frames['velocity'].to_numpy(dtype=object)]}
+    dates = pd.Series(pd.to_datetime(1.7e9 + arrays['time'], unit='s'))
+    recording = Recording.from_arrays('frame', dates, **given)
+    assert np.isnan(recording.effort[10, 2])
+    assert np.isnan(recording.effort).sum() == 1
+    assert np.isnan(recording.velocity[20, 3])
+    assert np.isnan(recording.velocity).sum() == 1
+    assert len(recording.time) == 499
+    assert np.median(np.diff(recording.time)) == pytest.approx(0.002, abs=1e-6)
+
+
+@pytest.mark.parametrize(('quantity', 'values'), [
+    ('time', [['a']]), ('position', 'many'), ('effort', {'slide_1': 3})])
+def test_what_is_no_number_is_named(quantity: str, values: Any) -> None:
+    with pytest.raises(MotionError, match=f'^{quantity}: '):
+        Recording.from_arrays('wrong', **{**measured(100), quantity: values})
 
 
 def test_efforts_that_are_not_finite_count_as_not_measured() -> None:

@@ -30,9 +30,9 @@ from random_states import (
 )
 from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion, load_model
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import PprsError, SingularityError
+from pprs_dynamics.errors import MotionError, PprsError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.three_pprs.robot import Masses, Robot
 
@@ -584,3 +584,14 @@ def test_state_of_another_model_is_refused(remembering):
     model, motion = remembering
     with pytest.raises(PprsError, match='hysteresis'):
         model.drive_forces(motion, state=paper_model(OPEN_LIMITS).initial_state())
+
+
+@pytest.mark.parametrize(('file', 'motion', 'rule'), [
+    ('config/paper.yaml', JointMotion(*np.zeros((3, 4, 6))), 'must be a PlatformMotion for'),
+    ('config/paper.yaml', None, 'must be a PlatformMotion for'),
+    ('config/single_axis.yaml', HelicalPath().motion(np.arange(4.0)), 'must be a JointMotion for'),
+    ('config/single_axis.yaml', JointMotion(*np.zeros((3, 4, 2))), r'must be \(N, 1\)'),
+    ('config/delta.yaml', JointMotion(*np.zeros((3, 4, 2))), r'must be \(N, 3\)')])
+def test_a_motion_of_another_machine_is_refused_in_a_sentence(file, motion, rule):
+    with pytest.raises(MotionError, match=rule):
+        load_model(file).drive_forces(motion)

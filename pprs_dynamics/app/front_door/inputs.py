@@ -40,7 +40,7 @@ def stage(progress: Progress | None, what: str) -> Callable[[float], None]:
 
 
 class InputError(PprsError, ValueError):
-    """Recordings that are not there."""
+    """Recordings that are not there, or are none."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,7 @@ class Inputs:
     def read(cls, model: Model, recordings: Given, validate: Given = (),
              topic: str | None = None, progress: Progress | None = None) -> Inputs:
         """Read as `of`, but units and signs are not looked at yet."""
+        _require_kinds(recordings, validate)
         found = model if isinstance(model, ForceModel) else load_model(find_file(model))
         base = Path(found.source) if found.source and Path(found.source).is_file() else None
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
@@ -232,6 +233,17 @@ def _refuse_same_paths(given: Sequence[File | Recording], earlier: Sequence[File
             if str(one) in seen:
                 raise UnreadableFileError(str(one), f'it is given twice, but {rule}')
             seen.add(str(one))
+
+
+def _require_kinds(recordings: Given, validate: Given) -> None:
+    """Raise InputError for recordings that are neither a path nor a Recording."""
+    for name, given in (('recordings', recordings), ('validate', validate)):
+        listed = _listed(given) if isinstance(given, (str, PathLike, Recording, Sequence)) else (
+            [given])
+        for one in listed:
+            if not isinstance(one, (Recording, str, PathLike)):
+                raise InputError(f'{name}: one is of type {type(one).__name__}, must be a path or '
+                                 'a Recording (Recording.from_arrays makes one of arrays)')
 
 
 def _named(found: Sequence[_Read]) -> dict[str, Recording]:

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
@@ -302,7 +302,6 @@ def _falling(fits: FittedSets, best: CandidateSet, kept: CandidateSet,
 
 def _over_noise(fits: FittedSets, best: CandidateSet, left: Array) -> float:
     """Return the root of the mean square of errors (M, D), over the noise of each drive."""
-    shares = [np.nanmean(np.square(left[:, d])) / max(
-        fits.regression.noise_floor(best.fit, d), 1e-12) ** 2
-        for d in fits.regression.drives]
-    return float(np.sqrt(np.mean(shares)))
+    return root_mean_square([
+        root_mean_square(left[:, d]) / max(fits.regression.noise_floor(best.fit, d), 1e-12)
+        for d in fits.regression.drives])

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
@@ -196,8 +196,7 @@ def _holds_around_itself(fits: FittedSets, best: CandidateSet, cost: float) -> b
 
 
 def _rms_by_drive(fits: FittedSets, error: Array) -> Array:
-    found: Array = np.sqrt(np.nanmean(np.square(error), axis=0))[list(fits.regression.drives)]
-    return found
+    return np.array([root_mean_square(error[:, d]) for d in fits.regression.drives])
 
 
 def _stands_out(fits: FittedSets, best: CandidateSet) -> bool:

@@ -30,8 +30,11 @@ SHORTEST_SEGMENT = 20
 # Below these a recording is told to be short: too few samples for statistics of a model's error.
 FEW_SAMPLES = 100
 SHORT_TIME = 1.0
-# Median steps beyond this [s] cannot follow a robot; likely milliseconds taken for seconds.
+# Median steps beyond this [s] cannot follow a robot.
 SLOW_STEP = 0.1
+# From this step [s] on stamps are rather of a smaller unit, in which the step is short enough.
+OTHER_UNIT_STEP = 1.0
+STAMP_UNITS = {'milliseconds': 1e3, 'microseconds': 1e6, 'nanoseconds': 1e9}
 
 
 class Judgement:
@@ -197,7 +200,7 @@ class Judgement:
         slow = [(place, step) for place, _, step, _ in spreads if step > SLOW_STEP]
         if slow:
             self._tell('slow_rate', len(slow),
-                       f'there is only one sample in {max(step for _, step in slow):.4g} s',
+                       f'there is only one sample in {_slow(max(step for _, step in slow))}',
                        [place for place, _ in slow])
 
     def _judge_efforts_and_velocities(self) -> None:
@@ -299,3 +302,13 @@ def _taken(samples: Samples, index: Indices | Mask) -> Samples:
 
 def _percent(count: int, total: int) -> str:
     return 'all' if count == total else f'{100 * count / total:.3g} % of the samples'
+
+
+def _slow(step: float) -> str:
+    """Return a long step [s] in words, with the unit in which stamps of it rather are."""
+    if step >= OTHER_UNIT_STEP:
+        for unit, scale in STAMP_UNITS.items():
+            if step <= scale * SLOW_STEP:
+                return (f'{step:.4g} s, the stamps look like {unit} and must be divided by '
+                        f'{scale:.0e}')
+    return f'{step:.4g} s'

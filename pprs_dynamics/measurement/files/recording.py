@@ -12,8 +12,9 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, as_numbers
 from pprs_dynamics.drives import DRIVES, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
@@ -53,6 +54,8 @@ class Recording(Samples):
     gain: Array | None = None
 
     def __post_init__(self) -> None:
+        if self.time.ndim != 1:
+            raise MotionError('time', f'its shape is {self.time.shape}', 'be (N,)', 'shape')
         shape = (len(self.time), len(self.drives))
         for quantity, values in (('position', self.position), ('velocity', self.velocity),
                                  ('effort', self.effort)):
@@ -61,8 +64,8 @@ class Recording(Samples):
 
     @classmethod
     def from_arrays(
-        cls, name: str, time: Array, position: Array, velocity: Array | None = None,
-        effort: Array | None = None, drives: tuple[str, ...] = DRIVES,
+        cls, name: str, time: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None, drives: tuple[str, ...] = DRIVES,
     ) -> Recording:
         """Judge arrays as a file's content would be.
 
@@ -70,19 +73,23 @@ class Recording(Samples):
         ----------
         name : str
         time : (N,) array
-            [s].
+            [s], or dates.
         position, velocity, effort : (N, D) arrays
-            Copied; the last two may be absent.
+            Copied; the last two may be absent, and what is missing may be NaN, None or NA.
         drives : tuple of D str
 
         Raises
         ------
         MotionError
-            For arrays whose shapes do not fit together, or without a single finite sample.
+            For what are no numbers, arrays whose shapes do not fit together, or without a single
+            finite sample.
         """
-        time, position = np.array(time, dtype=float), np.array(position, dtype=float)
-        efforts = np.full(position.shape, np.nan) if effort is None else np.array(effort, float)
-        velocities = None if velocity is None else np.array(velocity, float)
+        given = {'time': time, 'position': position, 'velocity': velocity, 'effort': effort}
+        numbers = {quantity: _numbers(quantity, values) for quantity, values in given.items()
+                   if values is not None}
+        time, position = numbers['time'], numbers['position']
+        efforts = numbers.get('effort', np.full(position.shape, np.nan))
+        velocities = numbers.get('velocity')
         # Checks the shapes before anything computes with them.
         cls(drives, time, position, velocities, efforts, name=name)
         recording = _judged(name, Samples(drives, time, position, velocities, efforts))
@@ -274,6 +281,15 @@ def describe(recording: Recording) -> Summary:
         sum(part.end - part.start for part in segments),
         float(1 / np.median(np.concatenate(steps))) if steps else float('nan'),
         segments, ranges, recording.findings)
+
+
+def _numbers(quantity: str, values: ArrayLike) -> Array:
+    """Return what a caller gave as numbers, or raise MotionError naming the quantity."""
+    try:
+        return as_numbers(values)
+    except (TypeError, ValueError) as error:
+        raise MotionError(quantity, f'it holds what is no number ({error})', 'be numbers',
+                          'shape') from None
 
 
 def _judged(name: str, samples: Samples) -> Recording:

@@ -189,7 +189,9 @@ def whole_epoch(seconds: Array) -> int:
     finite = seconds[np.isfinite(seconds)]
     if not len(finite) or abs(middle := float(np.median(finite))) < EPOCH_STAMP:
         return 0
-    return int(np.floor(finite[np.abs(finite - middle) < EPOCH_STAMP].min()))
+    near = finite[np.abs(finite - middle) < EPOCH_STAMP]
+    # Stamps that lie farther from each other count in no seconds: they are told as they are.
+    return int(np.floor(near.min())) if 2 * len(near) > len(finite) else 0
 
 
 def when(spans: tuple[tuple[float, float], ...]) -> str:

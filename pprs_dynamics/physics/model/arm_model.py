@@ -59,6 +59,7 @@ class ArmModel(ForceModel):
     """
 
     kind: ClassVar[str] = ARM
+    motions: ClassVar[tuple[type, ...]] = (JointMotion, PlatformMotion)
 
     robot: Mechanism
 
@@ -117,8 +118,13 @@ class ArmModel(ForceModel):
 
     @property
     def rest_speed(self) -> float:
-        """Speed [rad/s, m/s] below which a joint stands, and its gear holds any torque."""
-        return float(np.min(self.reversal.velocity))
+        """Speed [rad/s, m/s] below which a joint stands, and its gear holds any torque.
+
+        The file's own, not that of a fit: which samples count must not change with the widths
+        that are fitted to them.
+        """
+        speed: float = self.values['friction.reversal_velocity']
+        return speed
 
     @property
     def blocks_per_period(self) -> float:

@@ -85,6 +85,7 @@ class AxisModel(ForceModel):
     """
 
     kind: ClassVar[str] = SINGLE_AXIS
+    motions: ClassVar[tuple[type, ...]] = (JointMotion,)
     default_file: ClassVar[str] = 'config/single_axis.yaml'
     drives: ClassVar[tuple[str, ...]] = (AXIS,)
     keys = AXIS_KEYS

@@ -84,6 +84,7 @@ class DriveModel(ForceModel):
     """
 
     kind: ClassVar[str] = PLATFORM
+    motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
     default_file: ClassVar[str] = DEFAULT_MODEL
     drives: ClassVar[tuple[str, ...]] = DRIVES
     keys = KEYS
@@ -145,6 +146,7 @@ class DriveModel(ForceModel):
         self, motion: PlatformMotion, state: ModelState | None = None,
     ) -> DriveForces:
         """Return the forces for a platform motion; see `ForceModel.drive_forces`."""
+        self._require_motion(motion)
         one_pass = self._one_pass
         table = None if one_pass is None else one_pass.forces(motion)
         if one_pass is None or table is None:

@@ -23,10 +23,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits, RecordedDrives
-from pprs_dynamics.errors import EffectError
+from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
@@ -119,6 +120,8 @@ class ForceModel(ABC):
     ----------------
     kind : {'platform', 'axis', 'arm'}
         Effects say in which kinds they act.
+    motions : tuple of type
+        Kinds of motion that it has forces for.
     default_file : str
         Model file that is read without another one; empty where there is none.
 
@@ -130,6 +133,7 @@ class ForceModel(ABC):
     """
 
     kind: ClassVar[str]
+    motions: ClassVar[tuple[type, ...]]
     default_file: ClassVar[str] = ''
 
     effects: tuple[Effect, ...]
@@ -302,15 +306,30 @@ class ForceModel(ABC):
 
         Raises
         ------
+        MotionError
+            For a motion of another kind, or of other drives.
         WorkspaceError, SingularityError
             Where the mechanism cannot be there. Strokes and efforts are not checked here:
             `limits` does that, so that recordings beyond them can still be compared.
         EffectError
             Where an effect of another package fails.
         """
+        self._require_motion(motion)
         # Very large numbers overflow; users of the result check that it is finite.
         with np.errstate(over='ignore', invalid='ignore'):
             return self.forces_at(self.mechanism(motion), state)
+
+    def _require_motion(self, motion: Any) -> None:
+        """Raise MotionError for a motion that this model has no forces for."""
+        if not isinstance(motion, self.motions):
+            kinds = ' or a '.join(kind.__name__ for kind in self.motions)
+            raise MotionError('motion', f'it is a {type(motion).__name__}',
+                              f'be a {kinds} for {self.title}', 'shape')
+        if isinstance(motion, JointMotion) and np.shape(motion.position)[1:] != (
+                len(self.drives),):
+            raise MotionError('position', f'its shape is {np.shape(motion.position)}',
+                              f'be (N, {len(self.drives)}), a column for each of '
+                              f'{", ".join(self.drives)}', 'shape')
 
     def forces_at(self, mechanism: Any, state: ModelState | None = None) -> Forces:
         """Return the forces at a state of the mechanism; see `drive_forces`."""

@@ -29,8 +29,12 @@ def find_file(path: str | PathLike[str]) -> Path:
     Raises
     ------
     UnreadableFileError
-        Where there is neither.
+        Where there is neither, and for what is no path.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise UnreadableFileError(
+            path, f"it is of type {type(path).__name__}, must be a model's file, such as "
+            f"'{DEFAULT_MODEL}'")
     if not os.fspath(path):  # which would be the present folder
         raise UnreadableFileError("''", 'the name of a model file must not be empty')
     given = Path(path)
