@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from pprs_dynamics.system.plain_text import displayed
@@ -107,6 +107,25 @@ class UnreadableFileError(PprsError, OSError):
 
     def __str__(self) -> str:
         return f'{self.path}: {self.reason}'
+
+
+class MisreadError(PprsError, ValueError):
+    """A recording that can be read, but looks as if its numbers meant something else.
+
+    Parameters
+    ----------
+    recording : str
+        Its name.
+    readings : sequence of (str, str)
+        What it looks like, as a clause, and the line of a model file that says so; '' for none.
+    """
+
+    def __init__(self, recording: str, readings: Sequence[tuple[str, str]]) -> None:
+        self.recording, self.readings = recording, tuple(readings)
+        looks = '; '.join(what for what, _ in readings)
+        lines = '; '.join(line for _, line in readings if line)
+        write = f'write into the model file {lines}' if lines else 'record it anew'
+        super().__init__(f'{recording}: {looks}: {write}; or go on with --as-it-is')
 
 
 class MotionError(PprsError, ValueError):

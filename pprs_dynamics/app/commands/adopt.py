@@ -25,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'the recordings call for; or EFFECT:drive,drive; or '
                         'measured_curve:DRIVE@VARIABLE for what no effect explains')
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',

@@ -16,6 +16,7 @@ from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_details(parser)
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states, '

@@ -20,6 +20,7 @@ from pprs_dynamics.system.plain_text import counted
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_details(parser)
     arguments.add_report(parser)

@@ -16,6 +16,7 @@ from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file that is written')
     arguments.add_report(parser)

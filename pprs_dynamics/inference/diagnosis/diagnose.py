@@ -181,7 +181,7 @@ def diagnose(
     other = {} if as_it_is else looks_like(model, recordings)
     if other:
         answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions)
-        return replace(answer.diagnosis(()), verdict='unknown', depends_on=(),
+        return replace(answer.diagnosis(()), verdict='unknown', depends_on=(), warnings=(),
                        effort_looks_like=other)
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
@@ -231,7 +231,7 @@ class _Answer:
             tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
             first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above,
-            'validation' if self.validate else 'blocks', self.ranking)
+            'validation' if self.validate else 'blocks', selection=self.ranking)
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""

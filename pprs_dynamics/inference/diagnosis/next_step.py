@@ -64,7 +64,8 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.effort_looks_like:
         lines = dict.fromkeys(one.line for one in diagnosis.effort_looks_like.values() if one.line)
-        say = f'; where it is what it looks like, write {listed(tuple(lines), "or")} into the model file' if lines else ''
+        say = ('; where it is what it looks like, write '
+               f'{listed(tuple(lines), "or")} into the model file' if lines else '')
         return (f'Record the effort that is measured{say}. Where it is measured all the same',
                 files.command('diagnose', '--as-it-is'))
     if diagnosis.depends_on:

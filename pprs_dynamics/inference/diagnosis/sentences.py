@@ -187,7 +187,7 @@ def _headline(diagnosis: Diagnosis) -> str:
     doubt = _doubt(diagnosis)
     if diagnosis.effort_looks_like:
         told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
-        return f'{"; ".join(map(sentence, told))} No effect is claimed.'
+        return f'{" ".join(map(sentence, told))} No effect is claimed.'
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')

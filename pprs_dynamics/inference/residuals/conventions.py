@@ -244,9 +244,9 @@ def _time_units(recording: Recording) -> list[float]:
 def _of_fit(drives: tuple[str, ...], units: Sequence[DriveUnits], fit: _Fit) -> Iterator[Mistake]:
     """Yield the mistakes of times, of what is read otherwise, and of efforts."""
     if fit.time_unit != 1.0:
-        yield OtherReading('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as seconds '
-                      f'they make the motion {1 / fit.time_unit:.0f} times too slow for its '
-                      'efforts')
+        yield OtherReading('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as '
+                           f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
+                           'for its efforts')
     if fit.reading.kind:
         yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what)
     for factor in EFFORT_FACTORS[1:]:

@@ -43,8 +43,14 @@ LEAST_MEANS = 50
 # Masses of a model are right within a factor of two: with less than half of its inertia or gravity
 # an effort holds none.
 LEAST_SHARE = 0.5
+# Where gravity is taken out by another model, less than this share is left; a counterweight that
+# bears most of a weight leaves more.
+LEFT_GRAVITY = 0.2
 # Friction of a drive with a gear is more than this share of its effort; a command's is none.
 LEAST_FRICTION = 0.05
+SURE = 3.0  # times what is found by chance, beyond which friction is there
+# A weight whose swing is a smaller share of its size is a constant.
+CONSTANT = 0.1
 # Share of an effort's variance beyond which it follows the velocity and nothing else.
 FOLLOWS = 0.9
 # Efforts that are the model's but for so small a factor are errors of position [rad/(N m), m/N]:
@@ -57,6 +63,7 @@ LEAST_NOISE = 1e-5
 LEAST_LEFT = 5e-4
 # Steps between the samples whose differences tell noise from motion [s], and their order.
 NOISE_STEP, NOISE_ORDER = 0.01, 4
+CERTAIN = 2.0  # doubts by which a share is above 0
 NORMAL = 1.4826  # standard deviation over the median of absolute values
 CONDITION = 1e-6  # of a column beside others: less is rounding
 
@@ -74,6 +81,8 @@ class EffortContent:
         does not show it.
     viscous, dry : float
         Friction, over the swing of the effort; the former with its sign.
+    friction, friction_by_chance : float
+        Both together, and what of what is left would be found as friction by chance.
     left : float
         What is left, over the swing of the effort.
     noise : float
@@ -86,6 +95,8 @@ class EffortContent:
     gravity_doubt: float
     viscous: float
     dry: float
+    friction: float
+    friction_by_chance: float
     left: float
     noise: float
 
@@ -112,13 +123,12 @@ class EffortContent:
     @property
     def compliance(self) -> float:
         """The factor by which inertia and gravity are the model's; 0 where it is not one."""
-        known = [(share, doubt) for share, doubt in (
-            (self.inertia, self.inertia_doubt), (self.gravity, self.gravity_doubt))
-            if np.isfinite(doubt)]
-        if not known or any(share <= 2 * doubt for share, doubt in known):
-            return 0.0
-        shares = [share for share, _ in known]
-        return float(np.mean(shares)) if min(shares) > LEAST_SHARE * max(shares) else 0.0
+        share, doubt = min((self.inertia, self.inertia_doubt), (self.gravity, self.gravity_doubt),
+                           key=lambda one: one[1])
+        apart = abs(self.inertia - self.gravity)
+        is_one = (share > CERTAIN * doubt
+                  and not apart > self.inertia_doubt + self.gravity_doubt)
+        return share if is_one else 0.0
 
     @property
     def follows_velocity(self) -> bool:
@@ -129,7 +139,7 @@ class EffortContent:
     @property
     def holds_friction(self) -> bool:
         """Whether there is friction in it."""
-        return max(abs(self.viscous), self.dry) > LEAST_FRICTION
+        return self.friction > max(LEAST_FRICTION, SURE * self.friction_by_chance)
 
     @property
     def kind(self) -> str:
@@ -143,7 +153,7 @@ class EffortContent:
                 return COMMAND
         if self.lacks_inertia and not self.holds_friction:
             return COMMAND
-        if self.lacks_gravity:
+        if abs(self.gravity) + self.gravity_doubt < LEFT_GRAVITY and not self.compliance:
             return WITHOUT_GRAVITY
         return NOISE_FREE if self.noise < LEAST_NOISE or self.left < LEAST_LEFT else ''
 
@@ -170,12 +180,11 @@ def find_no_measurements(model: ForceModel, recording: Recording) -> tuple[NoMea
     contents = effort_contents(model, recording)
     kinds = {drive: one.kind for drive, one in contents.items()}
     # What one drive shows for certain holds for all: they are recorded in the same way.
-    for kind, is_shown in ((WITHOUT_GRAVITY, lambda one: one.shows_gravity and not one.lacks_gravity),
-                           (COMMAND, lambda one: one.shows_inertia and not one.lacks_inertia),
-                           (POSITION_ERROR,
-                            lambda one: one.shows_inertia and not one.lacks_inertia)):
-        if any(map(is_shown, contents.values())):
-            kinds = {drive: '' if one == kind else one for drive, one in kinds.items()}
+    weighs = any(one.shows_gravity and not one.lacks_gravity for one in contents.values())
+    moves = any(one.shows_inertia and not one.lacks_inertia for one in contents.values())
+    excluded = ({WITHOUT_GRAVITY} if weighs else set()) | (
+        {COMMAND, POSITION_ERROR} if moves else set())
+    kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}
     return tuple(_told(model, contents, [drive for drive in kinds if kinds[drive] == kind], kind)
                  for kind in dict.fromkeys(kinds.values()) if kind)
 
@@ -222,13 +231,15 @@ def _content(effort: Array, inertia: Array, gravity: Array, velocity: Array, dir
     constant = np.ones_like(effort)
     found, doubts, left = _fitted(effort, [*columns, constant])
     share, doubt = found[1], doubts[1]
-    if not doubt < LEAST_SHARE:
+    if np.std(gravity) < CONSTANT * root_mean_square(gravity):
         # A weight that hardly changes is a constant: then there is no other one.
         alone, alone_doubts, _ = _fitted(effort, columns)
         share, doubt = alone[1], alone_doubts[1]
+    friction = root_mean_square(found[2] * velocity + found[3] * direction)
     return EffortContent(
         found[0], doubts[0], share, doubt, found[2] * float(np.std(velocity)) / swing,
-        abs(found[3]) * float(np.std(direction)) / swing, left / swing, noise / swing)
+        abs(found[3]) * float(np.std(direction)) / swing, friction / swing,
+        left * float(np.sqrt(2 / len(effort))) / swing, left / swing, noise / swing)
 
 
 def _fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[float], float]:
@@ -294,12 +305,12 @@ def _told(model: ForceModel, contents: dict[str, EffortContent], drives: Sequenc
     group = tuple(model.drives.index(drive) for drive in drives)
     one = contents[drives[0]]
     of, line = f'the effort of {named(model.drives, group)}', ''
-    gravity = f'gravity ({one.gravity:.2f} ± {one.gravity_doubt:.2f} of what the model has)'
-    lacking = f'inertia ({one.inertia:.2f} ± {one.inertia_doubt:.2f} of what the model has)'
+    gravity = f'gravity ({_share(one.gravity, one.gravity_doubt)})'
+    lacking = f'inertia ({_share(one.inertia, one.inertia_doubt)})'
     if kind == WITHOUT_GRAVITY:
         line = f'{EFFORT_KIND}: {kind}'
-        what = (f'{of} holds no {gravity}: it looks as if gravity was taken out of it already; else '
-                'a counterweight bears it, or the base stands otherwise than the model says')
+        what = (f'{of} holds no {gravity}: it looks as if gravity was taken out already; else a '
+                'counterweight bears it, or the base stands otherwise than the model says')
     elif kind == NOISE_FREE:
         what = f'{of} holds no noise: it looks computed, not measured'
     elif kind == POSITION_ERROR and one.compliance:
@@ -312,3 +323,8 @@ def _told(model: ForceModel, contents: dict[str, EffortContent], drives: Sequenc
             'what a controller commands') + ', not like a measurement'
         line = f'{EFFORT_KIND}: {COMMANDED}' * (kind == COMMAND)
     return NoMeasurement.of(kind, model.drives, group, what, line)
+
+
+def _share(share: float, doubt: float) -> str:
+    # Adding 0 makes minus nothing nothing.
+    return f'{round(share, 2) + 0.0:.2f} ± {doubt:.2f} of what the model has'

@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
-from pprs_dynamics.measurement.files.samples import Defect
+from pprs_dynamics.measurement.files.samples import Defect, Samples
 
 POSITION_UNIT = 'position_unit'  # kind of mistake
 # Kinds of efforts that are no measurement of what the drive applies.
@@ -32,7 +33,7 @@ class Mistake(Defect):
 
     @classmethod
     def of(cls, kind: str, drives: Sequence[str], group: Sequence[int], what: str,
-           line: str = '') -> Mistake:
+           line: str = '') -> Self:
         """Return a mistake of some of the drives."""
         return cls(kind, len(group), what, (), tuple(drives[k] for k in group), line)
 
@@ -49,6 +50,12 @@ class NoMeasurement(Mistake):
     def action(self) -> str:
         """What follows, as a clause."""
         return 'no effect is claimed'
+
+
+def effort_looks_like(recordings: Iterable[Samples]) -> dict[str, str] | None:
+    """Return the kind of each drive's effort that findings call no measurement; None for none."""
+    return {drive: one.kind for recording in recordings for one in recording.findings
+            if isinstance(one, NoMeasurement) for drive in one.drives} or None
 
 
 class OtherReading(Mistake):
