@@ -452,7 +452,8 @@ def test_whatever_the_stamps_segments_are_ordered_and_everything_is_finite(
 def test_every_defect_of_the_policy_is_planted_in_a_test() -> None:
     folder = Path(__file__).parent
     text = ''.join((folder / f'test_recording{end}.py').read_text() for end in ('s', '_defects'))
-    text += (folder / 'test_recorded_names.py').read_text()
+    for name in ('test_recorded_names.py', 'test_tables_of_others.py'):
+        text += (folder / name).read_text()
     planted = {kind for kind in POLICY
                if re.search(rf"(the|the_one)\([^'\n]*'{kind}'\)|'{kind}' in kinds", text)}
     planted |= {f'constant_{quantity}' for quantity in QUANTITIES} | {'short_segment'}

@@ -20,8 +20,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.three_pprs import evaluation
-from pprs_dynamics.physics.three_pprs.evaluation import compiling_here
+from pprs_dynamics.physics.mechanism import evaluation
+from pprs_dynamics.physics.mechanism.evaluation import compiling_here
 
 MOTION = random_motion(np.random.default_rng(8), 1)
 
