@@ -126,16 +126,18 @@ class MisreadError(PprsError, ValueError):
     ----------
     recording : str
         Its name.
-    readings : sequence of (str, str)
-        What it looks like, as a clause, and the line of a model file that says so; '' for none.
+    looks : sequence of str
+        What it looks like, as clauses.
+    lines : sequence of str
+        Of a model file, that say so; '' where none can.
     """
 
-    def __init__(self, recording: str, readings: Sequence[tuple[str, str]]) -> None:
-        self.recording, self.readings = recording, tuple(readings)
-        looks = '; '.join(what for what, _ in readings)
-        lines = '; '.join(line for _, line in readings if line)
-        write = f'write into the model file {lines}' if lines else 'record it anew'
-        super().__init__(f'{recording}: {looks}: {write}; or go on with --as-it-is')
+    def __init__(self, recording: str, looks: Sequence[str], lines: Sequence[str]) -> None:
+        self.recording, self.looks = recording, tuple(looks)
+        self.lines = tuple(dict.fromkeys(filter(None, lines)))
+        way = (f'if so, write into the model file  {"; ".join(self.lines)}' if self.lines
+               else 'if so, record it anew')
+        super().__init__(f'{recording}: {"; ".join(looks)}: {way}; if not, go on with --as-it-is')
 
 
 class MotionError(PprsError, ValueError):

@@ -13,7 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
-from pprs_dynamics.inference.residuals.mistakes import NoMeasurement, OtherReading
+from pprs_dynamics.inference.residuals.mistakes import (
+    NoMeasurement,
+    OtherReading,
+    columns_line,
+)
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -161,7 +165,8 @@ class Inputs:
             found = [one for one in self.recordings[name].findings
                      if isinstance(one, NoMeasurement)]
             if found:
-                raise MisreadError(displayed(name), [(one.what, one.line) for one in found])
+                raise MisreadError(displayed(name), [one.what for one in found],
+                                   [one.line for one in found])
         return self.require_recordings()
 
     @property
@@ -218,7 +223,7 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
     mistakes = find_mistakes(model, recording)
     readings = [one for one in mistakes if isinstance(one, OtherReading)]
     if refuse and readings:
-        raise MisreadError(recording.name, [(one.what, one.line) for one in readings])
+        raise MisreadError(recording.name, [one.what for one in readings], [columns_line(readings)])
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 

@@ -82,7 +82,8 @@ class EffortContent:
     viscous, dry : float
         Friction, over the swing of the effort; the former with its sign.
     friction, friction_by_chance : float
-        Both together, and what of what is left would be found as friction by chance.
+        Both together, negative where they drive the motion; and what of what is left would be
+        found as friction by chance.
     left : float
         What is left, over the swing of the effort.
     noise : float
@@ -139,7 +140,28 @@ class EffortContent:
     @property
     def holds_friction(self) -> bool:
         """Whether there is friction in it."""
-        return self.friction > max(LEAST_FRICTION, SURE * self.friction_by_chance)
+        return abs(self.friction) > max(LEAST_FRICTION, SURE * self.friction_by_chance)
+
+    @property
+    def factor(self) -> float:
+        """By what its weight, or else its inertia, is the model's; 0 where neither is certain."""
+        for share, doubt in ((self.gravity, self.gravity_doubt),
+                             (self.inertia, self.inertia_doubt)):
+            if abs(share) > SURE * doubt:
+                return share
+        return 0.0
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether anything for certain has the sign that it must have."""
+        return (self.factor > 0 or self.inertia > CERTAIN * self.inertia_doubt
+                or (self.holds_friction and self.friction > 0))
+
+    @property
+    def is_negated(self) -> bool:
+        """Whether all that is there for certain has the other sign, and its usual size."""
+        return (not self.is_upright and self.holds_friction
+                and (self.factor == 0 or LEAST_SHARE < -self.factor < 1 / LEAST_SHARE))
 
     @property
     def kind(self) -> str:
@@ -158,7 +180,9 @@ class EffortContent:
         return NOISE_FREE if self.noise < LEAST_NOISE or self.left < LEAST_LEFT else ''
 
 
-def find_no_measurements(model: ForceModel, recording: Recording) -> tuple[NoMeasurement, ...]:
+def find_no_measurements(model: ForceModel, recording: Recording,
+                         contents: Mapping[str, EffortContent] | None = None,
+                         ) -> tuple[NoMeasurement, ...]:
     """Return what efforts look like that are no measurement, a finding for each kind.
 
     Parameters
@@ -166,6 +190,8 @@ def find_no_measurements(model: ForceModel, recording: Recording) -> tuple[NoMea
     model : ForceModel
     recording : Recording
         Of the model's drives, in the units and signs that it says.
+    contents : mapping of str to EffortContent, optional
+        Of its efforts, where they are known.
 
     Returns
     -------
@@ -177,7 +203,7 @@ def find_no_measurements(model: ForceModel, recording: Recording) -> tuple[NoMea
         every = range(len(model.drives))
         return (NoMeasurement.of(COMMAND, model.drives, every, 'the efforts are commands, as the '
                                  f'model file says with {EFFORT_KIND}: {COMMANDED}'),)
-    contents = effort_contents(model, recording)
+    contents = effort_contents(model, recording) if contents is None else contents
     kinds = {drive: one.kind for drive, one in contents.items()}
     # What one drive shows for certain holds for all: they are recorded in the same way.
     weighs = any(one.shows_gravity and not one.lacks_gravity for one in contents.values())
@@ -235,7 +261,8 @@ def _content(effort: Array, inertia: Array, gravity: Array, velocity: Array, dir
         # A weight that hardly changes is a constant: then there is no other one.
         alone, alone_doubts, _ = _fitted(effort, columns)
         share, doubt = alone[1], alone_doubts[1]
-    friction = root_mean_square(found[2] * velocity + found[3] * direction)
+    resistance = found[2] * velocity + found[3] * direction
+    friction = root_mean_square(resistance) * float(np.sign(np.mean(resistance * velocity)))
     return EffortContent(
         found[0], doubts[0], share, doubt, found[2] * float(np.std(velocity)) / swing,
         abs(found[3]) * float(np.std(direction)) / swing, friction / swing,
@@ -300,8 +327,8 @@ def _fast_noise(recording: Recording, drive: int) -> float:
                      np.min(np.diff(values)) / np.sqrt(12)))
 
 
-def _told(model: ForceModel, contents: dict[str, EffortContent], drives: Sequence[str], kind: str,
-          ) -> NoMeasurement:
+def _told(model: ForceModel, contents: Mapping[str, EffortContent], drives: Sequence[str],
+          kind: str) -> NoMeasurement:
     group = tuple(model.drives.index(drive) for drive in drives)
     one = contents[drives[0]]
     of, line = f'the effort of {named(model.drives, group)}', ''

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 from pprs_dynamics.measurement.files.samples import Defect, Samples
 
+Scales = tuple[tuple[str, str, float], ...]
 POSITION_UNIT = 'position_unit'  # kind of mistake
 # Kinds of efforts that are no measurement of what the drive applies.
 COMMAND, POSITION_ERROR = 'command', 'position_error'
@@ -33,9 +34,9 @@ class Mistake(Defect):
 
     @classmethod
     def of(cls, kind: str, drives: Sequence[str], group: Sequence[int], what: str,
-           line: str = '') -> Self:
+           line: str = '', **more: Any) -> Self:
         """Return a mistake of some of the drives."""
-        return cls(kind, len(group), what, (), tuple(drives[k] for k in group), line)
+        return cls(kind, len(group), what, (), tuple(drives[k] for k in group), line, **more)
 
     @property
     def action(self) -> str:
@@ -58,5 +59,26 @@ def effort_looks_like(recordings: Iterable[Samples]) -> dict[str, str] | None:
             if isinstance(one, NoMeasurement) for drive in one.drives} or None
 
 
+@dataclass(frozen=True)
 class OtherReading(Mistake):
-    """A finding that a recording is in other units, signs or another order than it says."""
+    """A finding that a recording is in other units, signs or another order than it says.
+
+    Parameters
+    ----------
+    kind, count, what, spans, drives, line
+        See `Mistake`.
+    scales : tuple of (drive, key, value)
+        Of `columns` in the model file, so that it is read as it looks; '' for keys of no drive.
+    """
+
+    scales: Scales = ()
+
+
+def columns_line(findings: Iterable[OtherReading]) -> str:
+    """Return the line of a model file with which a recording is read as it looks; '' for none."""
+    blocks: dict[str, list[str]] = {}
+    for drive, key, value in (scale for one in findings for scale in one.scales):
+        blocks.setdefault(drive, []).append(f'{key}: {value:.7g}')
+    entries = [entry if not drive else f'{drive}: {{{entry}}}' for drive, entry in (
+        (drive, ', '.join(keys)) for drive, keys in blocks.items())]
+    return f'columns: {{{", ".join(entries)}}}' if entries else ''
