@@ -282,7 +282,8 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
 
 
 def arm_recording(model: ArmModel, motion: float | list[float] = 1.0,
-                  effort: float | list[float] = 1.0, changes: Callable[[Arrays], Arrays] | None = None,
+                  effort: float | list[float] = 1.0,
+                  changes: Callable[[Arrays], Arrays] | None = None,
                   ) -> Recording:
     run = arm.record(arm.real_arm(Path(model.source).parent), arm.motion(12.0))
     assert run.velocity is not None

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    inputs = read_inputs(options, screen)
+    inputs = read_inputs(options, screen, whole=True)
     with staged_bar(screen) as progress:
         result = compare(inputs.model, inputs, topic=options.topic, beside=options.beside,
                          progress=progress)

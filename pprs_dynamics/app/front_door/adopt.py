@@ -224,7 +224,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
         As `compare`.
     """
     inputs = Inputs.of(
-        model, recordings, validate, topic, progress, as_it_is).require_measurements()
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
     request = requested(effect, inputs.model)
     return AdoptionResult(inputs, adopt_effect(
         inputs.model, request, inputs.fitted, inputs.held_out, force,
@@ -261,7 +261,7 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
     if refit is not None:
         require_open_numbers(inputs.model)
         again = Inputs.of(inputs.model, refit, inputs.held_out, topic,
-                          progress, inputs.as_it_is).fitted or inputs.fitted
+                          progress, as_it_is=inputs.as_it_is).fitted or inputs.fitted
     run = adopt_effects(
         inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
         None if diagnosis is None else diagnosis.diagnosis)

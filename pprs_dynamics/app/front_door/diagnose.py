@@ -124,7 +124,7 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
         As `compare`.
     """
     inputs = Inputs.of(
-        model, recordings, validate, topic, progress, as_it_is).require_recordings()
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_recordings()
     return DiagnosisResult(inputs, diagnose_recordings(
         inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing'),
         as_it_is=inputs.as_it_is))

@@ -102,6 +102,6 @@ def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
         As `compare`.
     """
     inputs = Inputs.of(
-        model, recordings, validate, topic, progress, as_it_is).require_measurements()
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
     return FitResult(inputs, fit_base(inputs.model, inputs.fitted, inputs.held_out,
                                       stage(progress, 'fitting')))

@@ -123,8 +123,15 @@ class Design:
         progress: Callable[[float], None] | None = None,
     ) -> Design:
         """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`."""
-        reconstructions = tuple(reconstruct(model, recording) for recording in recordings)
-        return cls._evaluated(model, model, reconstructions, progress)
+        report = progress or (lambda share: None)
+        reconstructions = []
+        for k, recording in enumerate(recordings):
+            def followed(done: int, total: int, k: int = k) -> None:
+                report(0.5 * (k + done / total) / len(recordings))
+
+            reconstructions.append(reconstruct(model, recording, followed))
+        return cls._evaluated(model, model, tuple(reconstructions),
+                              lambda share: report(0.5 + 0.5 * share))
 
     def around(self, point: OperatingPoint, alone: bool = False) -> Design:
         """Return the design of the same recordings around another operating point.

@@ -68,6 +68,7 @@ POLICY = {
     'frozen_samples': 'they are kept',
     'short_segment': 'those segments are not used',
     'too_short': 'it is kept',
+    'too_long': 'the rest is left out of fits',
 }
 
 
