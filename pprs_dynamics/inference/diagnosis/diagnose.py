@@ -22,6 +22,8 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
+from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
+from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -69,7 +71,8 @@ class Diagnosis:
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
     unconfirmed : tuple of FoundEffect
-        Fitted as well, but the error does not fall with them, or not on held-out data.
+        Fitted as well, but no machine can have them, or the error does not fall with them, or not
+        on held-out data.
     candidates, suspects : tuple of RankedEffect
     depends_on : tuple of Statement
         What no effect explains.
@@ -186,13 +189,27 @@ def diagnose(
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []
-    while weak := [one for one in answer.effects if not one.is_confirmed]:
+    if any(one.is_impossible for one in answer.effects):
+        # Whatever stands for what cannot be, or beside it, would be as wrong.
+        found = _all_objected(answer.effects)
+        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions)
+        report(1.0)
+        return replace(answer.diagnosis(found), verdict='unknown')
+    while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
     diagnosis = answer.diagnosis(tuple(unconfirmed))
     report(1.0)
     return diagnosis
+
+
+def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
+    """Return effects of which one cannot be: that first, and the others as found beside it."""
+    impossible = [one for one in effects if one.is_impossible]
+    beside = listed([one.name for one in impossible])
+    return (*impossible, *(replace(one, objection=f'it was found beside {beside}, which cannot be')
+                           for one in effects if not one.is_impossible))
 
 
 class _Answer:
@@ -253,6 +270,8 @@ class _Answer:
         for k, candidate in enumerate(ordered):
             last = next(c for c in final.found.effects if c.effect is candidate.effect)
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
+            impossible = why_impossible(
+                candidate.effect, said.parameters, self.design, self.decisions)
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 final.fits.library.force(final.found, last, self.remaining.shape),
@@ -261,7 +280,8 @@ class _Answer:
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
-                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
+                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
+                impossible or why_nothing(candidate.effect, said.parameters), bool(impossible)))
         return found
 
     def _error_held_out(self, model: ForceModel) -> float:

@@ -227,6 +227,9 @@ def _doubt(diagnosis: Diagnosis) -> str:
     told = []
     for one in diagnosis.unconfirmed:
         title = _title(diagnosis, one)
+        if one.objection:
+            told.append(f' {title} was fitted as well and is no finding: {one.objection}.')
+            continue
         on, before, after = (
             'the error', one.error_before, one.error_after) if (
             one.error_after >= one.error_before) else (

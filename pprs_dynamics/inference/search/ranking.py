@@ -121,6 +121,11 @@ class Ranking:
         return self._keeping(self.first, self.last, self.patterns, self.best, kept,
                              self.remainders, refuted)
 
+    def claiming_nothing(self) -> Ranking:
+        """Return the ranking with nothing kept, under the noise that the best set leaves."""
+        return self._keeping(self.first, self.last, self.patterns, self.best,
+                             self.last.evaluate(()), (), self.refuted)
+
     @cached_property
     def shares(self) -> tuple[float, ...]:
         """Return the part of the error that each effect of `order` takes away.
