@@ -73,7 +73,8 @@ class ComparisonResult(Result):
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs compare --json` writes."""
         content = {**self.comparison.to_dict(), 'verdict': self.verdict,
-                   'effort_looks_like': effort_looks_like(self.inputs.fitted)}
+                   'effort_looks_like': effort_looks_like(
+                       one.findings for one in self.inputs.fitted)}
         return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:

@@ -35,7 +35,6 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
 from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -78,7 +77,7 @@ def adopt(
         Called with the share of the work that is done.
     diagnosis : Diagnosis, optional
         On the same recordings, where it is known already: of `original(model)`, and for a curve
-        of the model itself.
+        of the model itself. The fit is made with its decisions.
 
     Raises
     ------
@@ -108,7 +107,8 @@ def adopt(
     placed = replace(request, drives=named.drives) if named and not request.drives else request
     try:
         fitted = fit_effect(start, placed, recordings,
-                            lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
+                            lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share),
+                            diagnosis.decisions)
     except (ModelError, StandingError) as error:
         return case.without_model(str(error))
     if fitted is None:
@@ -217,7 +217,7 @@ def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
     """Return the model with what it has fitted anew, where that gains anything."""
     design = Design.of(case.start, case.recordings,
                        lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
-    fits, name = FittedSets(design, DECISIONS), case.request.name
+    fits, name = FittedSets(design, case.diagnosis.decisions), case.request.name
     found = fits.evaluate(())
     try:
         fitted = SettledSet(fits, found, estimate_widths(fits, found)).model

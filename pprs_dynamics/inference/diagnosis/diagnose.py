@@ -103,6 +103,8 @@ class Diagnosis:
         Drives whose efforts are no measurement: then nothing is claimed.
     selection : Ranking, optional
         All that was tried, for looking closer.
+    decisions : Decisions
+        With which it was made.
     """
 
     verdict: str
@@ -128,6 +130,7 @@ class Diagnosis:
     held_out_on: str = 'blocks'
     effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     selection: Ranking | None = field(default=None, repr=False, compare=False)
+    decisions: Decisions = DECISIONS
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
@@ -248,7 +251,8 @@ class _Answer:
             tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
             first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above,
-            'validation' if self.validate else 'blocks', selection=self.ranking)
+            'validation' if self.validate else 'blocks', selection=self.ranking,
+            decisions=self.decisions)
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
-from pprs_dynamics.measurement.files.samples import Defect, Samples
+from pprs_dynamics.measurement.files.samples import Defect
 
 Scales = tuple[tuple[str, str, float], ...]
 POSITION_UNIT = 'position_unit'  # kind of mistake
@@ -53,9 +53,9 @@ class NoMeasurement(Mistake):
         return 'no effect is claimed'
 
 
-def effort_looks_like(recordings: Iterable[Samples]) -> dict[str, str] | None:
+def effort_looks_like(findings: Iterable[Iterable[Defect]]) -> dict[str, str] | None:
     """Return the kind of each drive's effort that findings call no measurement; None for none."""
-    return {drive: one.kind for recording in recordings for one in recording.findings
+    return {drive: one.kind for each in findings for one in each
             if isinstance(one, NoMeasurement) for drive in one.drives} or None
 
 
