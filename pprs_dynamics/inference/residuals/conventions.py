@@ -121,13 +121,15 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     best = _Search(model, excerpts).best()
     contents = effort_contents(model, recording)
     found: list[Defect] = []
+    signs = _of_signs(model, recording, contents)
     # With all positions negated many arms weigh as with all efforts negated, and friction too.
-    if best is not None and not (best.reading.kind == POSITION_SIGN
-                                 and best.reading.cost == ALL_NEGATED
-                                 and list(_of_signs(model, recording, contents))):
+    is_either = (best is not None and best.reading.kind == POSITION_SIGN
+                 and best.reading.cost == ALL_NEGATED
+                 and any({*one.drives} >= {*contents} for one in signs))
+    if best is not None and not is_either:
         found += _of_fit(model, best)
     else:
-        found += _of_signs(model, recording, contents) or _of_shares(model, contents)
+        found += signs or _of_shares(model, contents)
     told = {finding.kind for finding in found}
     if not told & {POSITION_UNIT, 'drive_order'}:
         found += _of_strokes(model, recording)
