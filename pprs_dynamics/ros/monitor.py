@@ -16,6 +16,7 @@ from std_msgs.msg import Float64MultiArray, String
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import EffectError, PprsError
+from pprs_dynamics.inference.diagnosis.quantities import word_little
 from pprs_dynamics.inference.residuals.live import (
     ARM_WINDOW,
     ERROR_SPAN,
@@ -23,6 +24,7 @@ from pprs_dynamics.inference.residuals.live import (
     Compared,
     LiveComparison,
 )
+from pprs_dynamics.inference.search.explained_effort import little_of
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.force_command import FRAME
@@ -154,6 +156,12 @@ class MonitorNode(ExplainsRefusals):
         text = (f'largest running error {np.nanmax(running):.4g} {unit}'
                 if np.isfinite(running).any() else
                 'no running error: efforts are not measured, or all joints stand')
+        shares = dict(zip(self._settings.model.drives,
+                          self._comparison.running_explained().tolist(), strict=True))
+        self._status.facts['explained'] = {name: round(share, 4) if np.isfinite(share) else None
+                                           for name, share in shares.items()}
+        little = word_little(little_of(shares))
+        text = f'{little}; {text}' if little else text
         if self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
         else:

@@ -41,3 +41,23 @@ def test_a_stream_that_slows_down_is_compared_again():
     assert max(compared) > 5.5
     assert comparison.running_error() == pytest.approx(np.full(6, OFFSET), rel=0.1)
     assert comparison.gaps >= 1
+
+
+def test_what_is_explained_of_late_is_told_of_drives_that_moved_long_enough():
+    model = DriveModel.load()
+    time = np.arange(0, 14.0, STEP)
+    forces = model.drive_forces(Excitation(14.0, seed=3).motion(time))
+    effort = forces.total.copy()
+    effort[:, 1] = 30 * np.sin(7 * time)  # no force of this machine
+    effort[:, 2] = 5 + np.random.default_rng(1).normal(size=len(time))  # nothing but noise
+    comparison = LiveComparison(model, span=SPAN)
+    for row in range(len(time)):
+        comparison.push(time[row], forces.mechanism.position[row], effort[row])
+        if row % 10 == 0:
+            comparison.evaluate()
+        if row == 1000:
+            assert np.isnan(comparison.running_explained()).all()
+    found = comparison.running_explained()
+    assert found[[0, 3, 4, 5]] == pytest.approx(1.0, abs=0.01)
+    assert found[1] < 0.5
+    assert np.isnan(found[2])

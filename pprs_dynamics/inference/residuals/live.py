@@ -26,6 +26,10 @@ WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
 # Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
 ARM_WINDOW = 0.25  # [s]
 ERROR_SPAN = 2.0  # [s] over which the running error is taken
+# Forgetting [s] of what is explained, and for how long a drive must have moved for it to be told:
+# over less than a stroke or two an effort changes by little but its noise.
+EXPLAINED_SPAN, LEAST_MOVED = 30.0, 10.0
+MOVING = 2.0  # times the width in which the model's friction turns over
 # Stamps to see before their step is known; more than a late first message or two.
 STAMPS_TO_LEARN = 50
 
@@ -80,6 +84,9 @@ class LiveComparison:
         self._model = model
         self._seed: PlatformMotion | None = None
         self._recent.clear()
+        # Of drives in motion: samples, effort, error, squares of both and of the effort's steps.
+        self._sums = np.zeros((6, len(model.drives)))
+        self._summed_until: float | None = None
 
     @property
     def gaps(self) -> int:
@@ -135,7 +142,39 @@ class LiveComparison:
         # Stamps may go back, too: then what came before them is of another stream.
         while not time[-1] - self._span <= self._recent[0][0] <= time[-1]:
             self._recent.popleft()
+        speed = np.abs([sample.velocity for sample in samples])
+        width = self._model.reversal.widths(len(self._model.drives))
+        self._sum(time, model + residual, np.where(speed > MOVING * width, residual, np.nan))
         return Compared(time, model, residual)
+
+    def _sum(self, time: Array, effort: Array, residual: Array) -> None:
+        """Take samples of drives that move into what is explained."""
+        if self._summed_until is None or not (
+                0 <= time[-1] - self._summed_until < EXPLAINED_SPAN):
+            self._sums[:], self._summed_until = 0.0, float(time[0])
+        passed = float(time[-1]) - self._summed_until
+        self._summed_until = float(time[-1])
+        known = np.isfinite(residual)
+        y, e = (np.where(known, values, 0.0) for values in (effort, residual))
+        steps = np.where(known[1:] & known[:-1], np.diff(y, axis=0), 0.0) ** 2 / 2
+        self._sums *= np.exp(-passed / EXPLAINED_SPAN)
+        self._sums += [known.sum(axis=0), y.sum(axis=0), e.sum(axis=0), (y ** 2).sum(axis=0),
+                       (e ** 2).sum(axis=0), steps.sum(axis=0)]
+
+    def running_explained(self) -> Array:
+        """Return the share of the effort's variance that the model explains of late, (D,).
+
+        NaN for drives that moved too little, or whose effort is mostly white noise.
+        """
+        shares = np.full(len(self._model.drives), np.nan)
+        if self._live is None:
+            return shares
+        count, y, e, yy, ee, steps = self._sums
+        n = np.maximum(count, 1)
+        effort, error = yy / n - (y / n) ** 2, ee / n - (e / n) ** 2
+        told = (count * self._live.polynomial.step >= LEAST_MOVED) & (effort > 2 * steps / n)
+        shares[told] = 1 - error[told] / effort[told]
+        return shares
 
     def _begin_again(self, time: float) -> None:
         """Start afresh after a gap, in the same machine unless time went back."""
