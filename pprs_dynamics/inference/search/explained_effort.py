@@ -9,8 +9,6 @@ not yet a model of that drive, and no noise accounts for the rest.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -69,15 +67,10 @@ def little_explained(model: ForceModel, residuals: Residuals, left: Array | None
         See `explained_shares`.
     decisions : Decisions, optional
     """
-    return little_of({name: share for name, share in explained_shares(residuals, left).items()
-                      if _can_be_explained(model, residuals, residuals.drives.index(name),
-                                           decisions)}, decisions)
-
-
-def little_of(shares: Mapping[str, float], decisions: Decisions = DECISIONS) -> dict[str, float]:
-    """Return the drives of whose effort little is explained, with the shares; least first."""
-    return dict(sorted(((name, share) for name, share in shares.items()
-                        if share < decisions.explained), key=lambda one: one[1]))
+    little = {name: share for name, share in explained_shares(residuals, left).items()
+              if share < decisions.explained and _can_be_explained(
+                  model, residuals, residuals.drives.index(name), decisions)}
+    return dict(sorted(little.items(), key=lambda one: one[1]))
 
 
 def _can_be_explained(model: ForceModel, residuals: Residuals, d: int,
