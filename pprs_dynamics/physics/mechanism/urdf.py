@@ -138,9 +138,10 @@ def _described(content: bytes, path: str) -> Description:
             if link not in links:
                 raise UnreadableFileError(path, f'constraint {loop.name} is on {link}, which is '
                                           'no link')
-    remarks = (*_impossible_bodies(links, joints), *_unused(robot, joints, transmissions))
     return Description(path, links, joints, hashlib.sha256(content).hexdigest(), loops,
-                       remarks=remarks, transmissions=transmissions)
+                       remarks=tuple(_unused(robot, joints, transmissions)),
+                       transmissions=transmissions,
+                       faults=tuple(_impossible_bodies(links, joints)))
 
 
 def _transmission(element: ElementTree.Element) -> Transmission:
