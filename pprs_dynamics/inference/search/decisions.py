@@ -66,6 +66,10 @@ class Decisions:
     scatter_ratio: float = _number(
         1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
         'less does not show in a plot')
+    one_load: float = _number(
+        0.05, '1', 'standard deviation of the load of a drive in motion over its mean, up to which '
+        'friction by load and friction that no load changes are told as one',
+        'dry friction varies by as much along a guide')
     reversal_share: float = _number(
         0.12, '1', 'share of the samples, the slowest, that a pattern of friction may leave out',
         'friction turns over there, in a width that nobody knows')
@@ -90,6 +94,12 @@ class Decisions:
     poor: float = _number(
         0.2, '1', 'unexplained error over the effort, above which a model is poor',
         'a fifth is more than friction in most robots')
+    most_gain: float = _number(
+        1.5, '1', 'factor of a gain beyond which it is no effect of a drive',
+        'constants of drives are known to 10 %; beyond half as much it is another unit or motor')
+    most_tilt: float = _number(
+        0.35, 'rad', 'lean of a base beyond which it is no effect of how the machine was put up',
+        'a base is levelled to a degree; what leans by 20 stands on a slope or a wall on purpose')
     sure: float = _number(
         2.0, 'deviations', 'by how much a number must have moved to be told as calibrated',
         '95 %')
