@@ -9,10 +9,41 @@ from dataclasses import dataclass
 from typing import Any
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 Drives = tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class RankedSet:
+    """A set of effects with its cost.
+
+    Parameters
+    ----------
+    names : tuple of (name, drives)
+        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
+    terms : CostTerms
+        Of its cost, less those of the best set.
+    barred : str
+        Why it may not be, whatever it costs; '' where it may.
+    """
+
+    names: tuple[tuple[str, Drives], ...]
+    terms: CostTerms
+    barred: str = ''
+
+    @property
+    def cost(self) -> float:
+        """Above that of the best set; lower is better."""
+        return self.terms.total
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return an entry of `sets` in the JSON."""
+        return {'cost': self.cost, 'terms': self.terms.to_dict(), 'effects': [
+            {'name': name, 'drives': listed(drives)} for name, drives in self.names],
+            **({'barred': self.barred} if self.barred else {})}
 
 
 @dataclass(frozen=True)
@@ -52,7 +83,7 @@ class FoundEffect(FittedEffect):
     Parameters
     ----------
     evidence : float
-        By which the cost of the best set rises without it.
+        By which the best set without it, whatever stands there, costs more than that with it.
     error_before, error_after, held_out_before, held_out_after : float
         [N], with the effects before it, and with it as well.
     at_bound : tuple of str
@@ -64,6 +95,8 @@ class FoundEffect(FittedEffect):
         Whether the error falls with it, and that on held-out data: either their rms, or for
         certain that of each frequency in units of its noise. In the former slow noise and the
         model's own numbers have a share.
+    without : RankedSet, optional
+        The best set without it, against the best one with it.
     """
 
     evidence: float
@@ -74,6 +107,7 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     is_confirmed: bool = True
+    without: RankedSet | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
@@ -81,6 +115,7 @@ class FoundEffect(FittedEffect):
                 'alike': [list(names) for names in self.places if len(names) > 1],
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
                 'evidence': self.evidence,
+                'without': None if self.without is None else self.without.to_dict(),
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
 
@@ -123,27 +158,6 @@ class RankedEffect:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives), 'evidence': self.evidence,
                 'error_after': self.error_after}
-
-
-@dataclass(frozen=True)
-class RankedSet:
-    """A set of effects with its cost.
-
-    Parameters
-    ----------
-    names : tuple of (name, drives)
-        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
-    cost : float
-        Above that of the best set; lower is better.
-    """
-
-    names: tuple[tuple[str, Drives], ...]
-    cost: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return an entry of `sets` in the JSON."""
-        return {'cost': self.cost, 'effects': [
-            {'name': name, 'drives': listed(drives)} for name, drives in self.names]}
 
 
 @dataclass(frozen=True)
