@@ -420,7 +420,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         threshold = self._settings.own['lag_warning']
         waits = self._lag.median > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
-            state=self.state,
+            state=self.state, assumed=self._settings.model.assumed_at_start,
             preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),

@@ -220,6 +220,8 @@ class Feedforward:
         Rejection, WorkspaceError, SingularityError, LimitError, EffectError
             Where nothing may; the memory is then what it was.
         """
+        if self._epoch is None:
+            self._epoch = request.start
         memory = self._memory or self._made_memory()
         if not self._remembers:
             forces = self._model.drive_forces(request.motion, memory)
@@ -237,7 +239,7 @@ class Feedforward:
 
     def _made_memory(self) -> ModelState:
         self._memory = memory = (self._model.continued_state(*self._before) if self._before
-                                 else self._model.initial_state())
+                                 else self._model.initial_state(0.0))
         self._remembers = memory.has_memory
         return memory
 
@@ -361,7 +363,6 @@ class Feedforward:
 
     def _timed(self, request: TrajectoryRequest) -> Motion:
         """Return the motion on one time scale for all messages, which memories go by."""
-        if self._epoch is None:
-            self._epoch = request.start
+        assert self._epoch is not None  # `answer` sets it
         return request.motion.with_time(
             (request.start - self._epoch + request.offsets) / NANOSECONDS)
