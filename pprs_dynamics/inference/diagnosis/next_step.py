@@ -9,12 +9,17 @@ import shlex
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
+from pprs_dynamics.physics.model.arm_model import ArmModel
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+    from pprs_dynamics.physics.model.force_model import ForceModel
 
+OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 
 
@@ -59,8 +64,25 @@ class GivenFiles:
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 
 
+def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
+    """Return what to do before anything else where a model explains little, and the command.
+
+    A description alone, without friction and with the maker's masses, is fitted first.
+    """
+    if isinstance(model, ArmModel):
+        bare = not any(np.any(model.values[key]) for key in OWN_FRICTION)
+        words = ('The model has no friction yet: fit inertia and friction first' if bare else
+                 'Check units, signs and zeros, and that this is the model of this machine as it '
+                 'was recorded; then fit it')
+        return words, files.command('fit', '--output', 'base.yaml')
+    return ('Check units, signs and zeros, and that this is the model of this machine as it was '
+            'recorded', files.command('info'))
+
+
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
+    if diagnosis.little:
+        return first_step(diagnosis.model, files)
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.depends_on:
         if (curve := _curve(diagnosis)) is not None:

@@ -255,7 +255,8 @@ class Design:
         return DriveRange(float(longest.time[-1] - longest.time[0]),
                           float(np.median(np.diff(longest.time))),
                           float(np.ptp(position)), float(np.abs(velocity).max()),
-                          self.given.gear_ratios[drive], _delay(longest, drive))
+                          self.given.gear_ratios[drive], _delay(longest, drive),
+                          self.given.units[drive].turns)
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive: it may act, and is not there."""

@@ -12,7 +12,12 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import ModelNumber, PresentCoefficient, within
+from pprs_dynamics.inference.regression.base_columns import (
+    ModelNumber,
+    PresentCoefficient,
+    units_of,
+    within,
+)
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
@@ -183,6 +188,7 @@ def _of_component(fits: FittedSets, component: Component, c: Array, covariance: 
     effect, shape = component.effect, component.parameters
     prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
     unit_of = _units(fits.design, component.drive)
+    units = units_of(fits.design.given, component.drive)
     values = component.values(c)
     size = len(c)
     found = {}
@@ -199,13 +205,13 @@ def _of_component(fits: FittedSets, component: Component, c: Array, covariance: 
             slope[k] = (component.values(moved)[parameter.name] - values[parameter.name]) / step
         variance = float(slope @ covariance[:size, :size] @ slope)
         found[prefix + parameter.name] = Estimate(
-            within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
+            within(parameter, values[parameter.name], units), max(variance, 0.0) ** 0.5,
             unit_of(parameter.unit))
     for k, parameter in enumerate(effect.shape if with_shape else ()):
         value = float(shape[parameter.name])
         amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
         found[prefix + parameter.name] = Estimate(
-            within(parameter, value), parameter.spread(amount, value),
+            within(parameter, value, units), parameter.spread(amount, value),
             unit_of(parameter.unit))
     return found, [prefix + name for name in fits.library.at_edge(
         component, fits.decisions.edge_share)]

@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -155,7 +156,8 @@ class FittedSets:
         A pattern has to be more than the lack of fit of the effects beside it.
         """
         beyond = sorted({one.effect.name for one in found.blocks
-                         if not one.is_within(found.coefficients(one))})
+                         if not one.is_within(found.coefficients(one),
+                                              units_of(self.design.given, one.drive))})
         if beyond:
             return f'a value of {", ".join(beyond)} is beyond its bounds'
         for candidate in found.unknowns:
@@ -254,7 +256,8 @@ class FittedSets:
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
-                shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
+                bounded = parameter.of(units_of(self.design.given, component.drive).turns)
+                shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
             moved[component] = Component.of(effect, component.drive, shape, component.names)
         return tuple(
             EffectCandidate.of(moved.get(one, one) for one in c.components)

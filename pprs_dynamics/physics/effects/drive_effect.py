@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -48,13 +48,15 @@ class DriveRange:
     duration, step : float
         Of the recording, and between samples [s].
     stroke : float
-        Between the lowest and the highest position [m].
+        Between the lowest and the highest position [m, rad].
     top_speed : float
-        [m/s]
+        [m/s, rad/s]
     gear_ratio : float
         Turns of the motor per turn of the drive; 1 where no gear is known.
     delay : float
         By which the measured effort is most like the model's [s].
+    turns : bool
+        Whether the drive is revolute.
     """
 
     duration: float
@@ -63,6 +65,7 @@ class DriveRange:
     top_speed: float
     gear_ratio: float = 1.0
     delay: float = 0.0
+    turns: bool = False
 
 
 class DriveEffect(CatalogueEffect):
@@ -147,6 +150,23 @@ class DriveEffect(CatalogueEffect):
         if memory is not None and set(memory) != set(self.drives):
             raise ModelError('state', sorted(memory), f'come from a model with this very '
                              f'{self.name}')
+
+    @classmethod
+    def check_bounds(cls, values: Any, turning: Collection[str]) -> None:
+        """Raise ModelError where a parameter is beyond what it may be in a drive of its kind.
+
+        Parameters
+        ----------
+        values : mapping
+            See `from_file`.
+        turning : collection of str
+            Drives that turn.
+        """
+        for drive, block in values.items() if isinstance(values, Mapping) else ():
+            for p in cls.parameters if isinstance(block, Mapping) else ():
+                if p.turning is not None and p.name in block:
+                    p.of(drive in turning).check(f'effects.{cls.name}.{drive}.{p.name}',
+                                                 block[p.name])
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""
