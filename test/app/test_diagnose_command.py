@@ -87,7 +87,8 @@ def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
 
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
-    added = {'above_noise', 'calibrated', 'held_out_on', 'noise_floor', 'noise_floors', 'sets',
+    added = {'above_noise', 'barred', 'calibrated', 'explained', 'explained_after',
+             'little_explained', 'held_out_on', 'noise_floor', 'noise_floors', 'sets',
              'unconfirmed', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:

@@ -369,7 +369,8 @@ class _Answer:
 
     def _sets(self) -> tuple[RankedSet, ...]:
         # Of a set that bends nothing the cost is that in the first design.
-        return self._of_each_name(self.ranking.sets, MOST_SETS)
+        best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
+        return (best, *sorted(others, key=lambda one: one.cost))
 
     def _barred(self) -> tuple[RankedSet, ...]:
         """Return the sets that would be rivals, or better, and may not be."""
@@ -388,7 +389,7 @@ class _Answer:
     def _told(self, found: CandidateSet, best: CandidateSet) -> RankedSet:
         """Return a set against another one."""
         names = tuple((c.name, self.design.named(c.drives)) for c in found.candidates)
-        return RankedSet(names, found.terms - best.terms, found.barred)
+        return RankedSet(names, self.ranking.difference(found, best), found.barred)
 
     def _within_model_error(self, remainder: Remainder) -> WithinModelError:
         force = self.fits.library.force(remainder.found, remainder.candidate,

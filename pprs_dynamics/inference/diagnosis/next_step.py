@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 from pprs_dynamics.physics.model.arm_model import ArmModel
 
@@ -91,6 +93,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                         'adopt', curve, '--output', 'with_curve.yaml', held_out=True))
         return ('Look at that place on the machine, and record the motion again: what comes back '
                 'is the machine. Then diagnose both recordings', repeat)
+    if diagnosis.verdict == 'ambiguous' and all(
+            _need_another_load(names) for names in diagnosis.indistinguishable):
+        return ('Repeat the motion with another load, or in a posture in which the drive carries '
+                'more: only friction by load grows with it. Then diagnose that recording with the '
+                'load in the model', replace(files, recordings=(SECOND,)).command('diagnose'))
     if diagnosis.verdict == 'ambiguous':
         return ('Record a motion that tells the candidates apart; this designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
@@ -110,6 +117,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 repeat)
     return ('Nothing to add. Another motion may show what this one does not excite',
             replace(files, recordings=(SECOND,)).command('diagnose'))
+
+
+def _need_another_load(names: Sequence[str]) -> bool:
+    effect = find_effect(names[0])
+    return effect is not None and list(names[1:]) == [effect.at_one_load]
 
 
 def _curve(diagnosis: Diagnosis) -> str | None:

@@ -31,6 +31,9 @@ class CostTerms:
         What the lack of fit of other effects makes of it; 0, as it is judged after the fit.
     feasibility : float
         By how much possible bodies fit worse than those of the least squares.
+    linearisation : float
+        By how much the exact forces of its own fitted model fit worse than the linear ones; 0
+        where that was not computed.
     """
 
     fit: float = 0.0
@@ -41,6 +44,7 @@ class CostTerms:
     signs: float = 0.0
     discrepancy: float = 0.0
     feasibility: float = 0.0
+    linearisation: float = 0.0
 
     @property
     def total(self) -> float:

@@ -66,6 +66,10 @@ class Decisions:
     scatter_ratio: float = _number(
         1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
         'less does not show in a plot')
+    one_load: float = _number(
+        0.05, '1', 'standard deviation of the load of a drive in motion over its mean, up to which '
+        'friction by load and friction that no load changes are told as one',
+        'dry friction varies by as much along a guide')
     reversal_share: float = _number(
         0.12, '1', 'share of the samples, the slowest, that a pattern of friction may leave out',
         'friction turns over there, in a width that nobody knows')
