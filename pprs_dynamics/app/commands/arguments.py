@@ -57,6 +57,12 @@ def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> No
     add_topic(parser)
 
 
+def add_as_it_is(parser: argparse.ArgumentParser) -> None:
+    """Declare --as-it-is."""
+    parser.add_argument('--as-it-is', action='store_true', help='take recordings as they are, '
+                        'whatever their units, signs and efforts look like')
+
+
 def add_validation(parser: argparse.ArgumentParser,
                    what: str = 'held-out errors are taken on it') -> None:
     """Declare --validate."""

@@ -22,6 +22,7 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_details(parser)
     arguments.add_report(parser)

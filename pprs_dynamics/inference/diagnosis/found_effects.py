@@ -95,6 +95,10 @@ class FoundEffect(FittedEffect):
         Whether the error falls with it, and that on held-out data: either their rms, or for
         certain that of each frequency in units of its noise. In the former slow noise and the
         model's own numbers have a share.
+    objection : str
+        Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
+    is_impossible : bool
+        Whether that is that no machine can have it.
     without : RankedSet, optional
         The best set without it, against the best one with it.
     """
@@ -107,6 +111,8 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     is_confirmed: bool = True
+    objection: str = ''
+    is_impossible: bool = False
     without: RankedSet | None = None
 
     def to_dict(self) -> dict[str, Any]:
