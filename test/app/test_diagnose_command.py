@@ -88,8 +88,8 @@ def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
     added = {'above_noise', 'barred', 'calibrated', 'effort_looks_like', 'explained',
-             'explained_after', 'held_out_on', 'little_explained', 'noise_floor', 'noise_floors', 'sets',
-             'unconfirmed', 'warnings'}
+             'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
+             'noise_floors', 'sets', 'unconfirmed', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
         assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',
