@@ -23,7 +23,7 @@ RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report', 'mcap')
+OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
 INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
@@ -42,6 +42,11 @@ def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with a
                ) -> None:
     """Declare --report."""
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE), help=what)
+
+
+def add_picture(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare --picture."""
+    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png'), help=what)
 
 
 def add_topic(parser: argparse.ArgumentParser) -> None:

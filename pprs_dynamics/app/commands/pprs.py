@@ -85,6 +85,7 @@ def _ended(given: Sequence[str]) -> int:
             parser.print_help()
             return 0
         options = parser.parse_args(given)
+        options.words = given  # for the record of a page
         check_files(options)
         from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
 
