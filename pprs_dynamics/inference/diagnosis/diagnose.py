@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -247,8 +247,25 @@ class _Answer:
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
-                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
+                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
+                self._in_model(candidate, said.parameters)))
         return found
+
+    def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:
+        """Return what the given model says of an effect; nothing where it lacks it.
+
+        Of links and joints only those that it is on are told.
+        """
+        found = {}
+        for one in candidate.components:
+            values = self.ranking.first.design.present(one.effect, one.drive)
+            prefix = '' if one.drive is None else f'{self.drives[one.drive]}.'
+            found.update({prefix + name: float(value) for name, value in (values or {}).items()
+                          if prefix + name in keys})
+        # A body or friction on a link or joint where there is none is new.
+        return found if not candidate.effect.is_of_one_place or any(
+            one.given[k] for one in candidate.components if one.given
+            for k, c in enumerate(one.effect.coefficients) if c.name in one.names) else {}
 
     def _error_held_out(self, model: ForceModel) -> float:
         """Return the error of a model on the recordings that are not fitted [N]."""

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from pprs_dynamics.arrays import Array
@@ -64,6 +65,9 @@ class FoundEffect(FittedEffect):
         Whether the error falls with it, and that on held-out data: either their rms, or for
         certain that of each frequency in units of its noise. In the former slow noise and the
         model's own numbers have a share.
+    in_model : mapping of str to float
+        What the given model says of the parameters, where it has the effect: then the recordings
+        say something else. Empty for an effect that it lacks.
     """
 
     evidence: float
@@ -74,12 +78,14 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     is_confirmed: bool = True
+    in_model: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
                 'alike': [list(names) for names in self.places if len(names) > 1],
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
+                **({'in_model': dict(self.in_model)} if self.in_model else {}),
                 'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}

@@ -17,10 +17,10 @@ PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s�
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
-def with_uncertainty(value: float, std: float, unit: str) -> str:
-    """Return a value with ± two standard deviations, in a unit of fitting size."""
+def with_uncertainty(value: float, std: float, unit: str, size: float | None = None) -> str:
+    """Return a value with ± two standard deviations, in a unit that fits its size or another."""
     below, factor, name = READ_IN.get(unit, (0.0, 1.0, unit))
-    if abs(value) >= below:
+    if abs(value if size is None else size) >= below:
         factor, name = 1.0, unit
     name = PRINTED.get(name, name)
     name = name if name in ('', '°') else f' {name}'

@@ -41,6 +41,7 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 
+MOST_CHANGED = 4  # values of an effect of the model that a sentence sets against the recordings'
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
@@ -71,17 +72,24 @@ class Finding:
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A fitted parameter of an effect; `drive` is '' for none."""
+    """A fitted parameter of an effect; `drive` is '' for none, `given` what the model says."""
 
     effect: str
     drive: str
     parameter: Parameter
     estimate: Estimate
+    given: float | None = None
+
+    @property
+    def size(self) -> float:
+        """The larger of both values, which decides how they are read."""
+        return max(abs(self.estimate.value), abs(self.given or 0.0))
 
     @property
     def text(self) -> str:
         """Value with uncertainty and unit as people read it."""
-        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit)
+        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit,
+                                self.size)
 
 
 @dataclass(frozen=True)
@@ -183,7 +191,6 @@ def runner_up(diagnosis: Diagnosis) -> str:
 
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
-    named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
@@ -202,7 +209,7 @@ def _headline(diagnosis: Diagnosis) -> str:
             for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
+        beside = f' Beside it: {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
     if diagnosis.verdict == 'adequate':
@@ -216,7 +223,35 @@ def _headline(diagnosis: Diagnosis) -> str:
              else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
-    return f'The model lacks {named}{which}.{fall}{level}{doubt}'
+    claims = _claims(diagnosis)
+    return f'{claims[:1].upper()}{claims[1:]}{which}.{fall}{level}{doubt}'
+
+
+def _claims(diagnosis: Diagnosis) -> str:
+    """Return what the model lacks, and what it has that is not as the recordings say."""
+    new = [_or_rivals(diagnosis, one) for one in diagnosis.effects if not one.in_model]
+    told = [f'the model lacks {listed(new)}'] if new else []
+    return '; '.join([*told, *(_otherwise(diagnosis, one)
+                               for one in diagnosis.effects if one.in_model)])
+
+
+def _otherwise(diagnosis: Diagnosis, found: FoundEffect) -> str:
+    """Return what the model says of an effect that it has, and what the recordings say."""
+    fitted = [one for one in _fitted(diagnosis, found) if one.given is not None]
+    several = len({one.drive for one in fitted}) > 1
+
+    def told(one: FittedValue, text: str) -> str:
+        symbol = f'{one.parameter.symbol} ' if len(found.effect.parameters) > 1 else ''
+        return symbol + text + (f' on {one.drive}' if several else '')
+
+    fitted = fitted[:MOST_CHANGED]
+    given = ', '.join(told(one, with_uncertainty(
+        one.given, 0.0, one.estimate.unit, one.size)) for one in fitted if one.given is not None)
+    said = ', '.join(told(one, one.text) for one in fitted)
+    rivals = _rivals(diagnosis, found)
+    other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
+    return (f'{_title(diagnosis, found)} is in the model with {given}; '
+            f'this recording says {said}{other}')
 
 
 def _doubt(diagnosis: Diagnosis) -> str:
@@ -257,7 +292,8 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card_in(diagnosis.model.kind)
     title = _title(diagnosis, found)
-    what = f'The model lacks {title}: {_parameters(diagnosis, found)}'
+    what = (sentence(_otherwise(diagnosis, found)).rstrip('.') if found.in_model else
+            f'The model lacks {title}: {_parameters(diagnosis, found)}')
     if issubclass(found.effect, MeasurementEffect):
         what += ('. This is what the sensor says, not what the drive must do: it enters '
                  'comparisons and the monitor, never a command')
@@ -305,8 +341,9 @@ def _fitted(diagnosis: Diagnosis, found: FittedEffect) -> list[FittedValue]:
     values = []
     for key, estimate in found.parameters.items():
         drive, name = found.effect.place_and_parameter(key)
-        if estimate.value:
-            values.append(FittedValue(found.name, drive, known[name], estimate))
+        given = found.in_model.get(key) if isinstance(found, FoundEffect) else None
+        if estimate.value or given:
+            values.append(FittedValue(found.name, drive, known[name], estimate, given))
     return sorted(values, key=lambda one: order.index(one.drive))
 
 

@@ -56,13 +56,26 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
     """
     for component, block in bodies.items():
         place = fit.places[block]
-        robot = with_bodies(model.robot, model.effects)  # type: ignore[attr-defined]
-        found = nearest_possible(robot, component, fit.of(block), fit.covariance[place, place])
+        # What is changed of a body that the model has is none: all of it has to be one.
+        there = [one for one in model.effects
+                 if not (component.given and type(one) is component.effect)]
+        before = given_body(component)
+        robot = with_bodies(model.robot, there)  # type: ignore[attr-defined]
+        found = nearest_possible(robot, component, before + fit.of(block),
+                                 fit.covariance[place, place])
         if found is None:
             return None
-        if not np.array_equal(found, fit.of(block)):
+        found = found - before
+        if not np.allclose(found, fit.of(block), rtol=1e-12, atol=0.0):
             fit = regression.held(fit, fit.index_of([block]), found)
     return fit
+
+
+def given_body(component: Component) -> Array:
+    """Return what the given model has of a component's coefficients, (k,)."""
+    known = dict(zip((c.name for c in component.effect.coefficients), component.given,
+                     strict=False))
+    return np.array([known.get(name, 0.0) for name in component.names])
 
 
 def nearest_possible(robot: Mechanism, component: Component, c: Array, covariance: Array,

@@ -270,7 +270,7 @@ class Search:
         shapes = [effect.alternatives(one.parameters) for one in candidate.components]
         for number in range(min(map(len, shapes))):
             yield EffectCandidate.of(
-                Component.of(effect, one.drive, others[number], one.names)
+                replace(one, shape=tuple(sorted(others[number].items())))
                 for one, others in zip(candidate.components, shapes, strict=True))
 
     def _simplify(self, found: CandidateSet) -> None:

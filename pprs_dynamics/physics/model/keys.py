@@ -304,7 +304,8 @@ def named_keys(parameters: Mapping[str, Any]) -> dict[str, Key]:
 
 
 # Blocks whose keys are not listed one by one.
-ADDED = ('effects.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix', 'columns.')
+ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
+         'columns.')
 
 
 def is_axis(names: Iterable[str]) -> bool:
