@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
-from pprs_dynamics.inference.adoption.fit_effect import EffectFit
+from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
@@ -25,7 +25,6 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-SURE = 2.0  # standard deviations
 MOVING = 5.0  # widths in which friction turns over
 BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back

@@ -78,7 +78,8 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 'diagnose both recordings', repeat)
     if len(diagnosis.effects) == 1:
         found = diagnosis.effects[0]
-        return ('Confirm it on the machine, then add it', files.command(
+        step = 'set it anew, or take it out' if found.in_model else 'add it'
+        return (f'Confirm it on the machine, then {step}', files.command(
             'adopt', found.name, '--output', f'with_{found.name}.yaml', held_out=True))
     if diagnosis.effects:
         return ('Confirm them on the machine, then add them', files.command(

@@ -209,7 +209,7 @@ def _headline(diagnosis: Diagnosis) -> str:
             for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it: {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
+        beside = f' Beside it, {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
     if diagnosis.verdict == 'adequate':
@@ -224,7 +224,8 @@ def _headline(diagnosis: Diagnosis) -> str:
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
     claims = _claims(diagnosis)
-    return f'{claims[:1].upper()}{claims[1:]}{which}.{fall}{level}{doubt}'
+    begin = 'T' if claims.startswith('the model') else claims[:1]
+    return f'{begin}{claims[1:]}{which}.{fall}{level}{doubt}'
 
 
 def _claims(diagnosis: Diagnosis) -> str:
@@ -292,7 +293,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card_in(diagnosis.model.kind)
     title = _title(diagnosis, found)
-    what = (sentence(_otherwise(diagnosis, found)).rstrip('.') if found.in_model else
+    what = (_otherwise(diagnosis, found) if found.in_model else
             f'The model lacks {title}: {_parameters(diagnosis, found)}')
     if issubclass(found.effect, MeasurementEffect):
         what += ('. This is what the sensor says, not what the drive must do: it enters '

@@ -60,8 +60,8 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
         coefficients, shape = one.coefficients, one.shape
         if (given := design.present(kind, one.drive)) is not None:
             # What is there already has been moved within its uncertainty.
-            moved = {p.name: float(values[f'effects.{kind.name}.{drive}{p.name}'])
-                     for p in kind.parameters}
+            moved = {name: float(values.get(f'effects.{kind.name}.{drive}{name}', value))
+                     for name, value in given.items()}
             coefficients = {name: value + coefficients.get(name, 0.0)
                             for name, value in kind.to_coefficients(moved).items()}
             if all(given[name] == value for name, value in shape.items()):
