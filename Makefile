@@ -11,7 +11,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo demo-feedforward test fuzz reproduce feedforward localisation score adoption benchmark \
-	reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
+	naming reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
@@ -27,6 +27,7 @@ help:
 	@echo 'make benchmark  speed against Pinocchio and MuJoCo, latency against an echo node'
 	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
 	@echo 'make reliability-full   the same at full size (an hour or two)'
+	@echo 'make naming     the naming benchmark: this package and its peers (an hour; NAMING=small: minutes)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make decisions  the score with each chosen number of the diagnosis halved and doubled (an hour)'
 	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests see (two hours)'
@@ -84,6 +85,14 @@ reliability: $(VENV)/.test
 reliability-full: $(VENV)/.test
 	$(BIN)/python -m benchmarks.node.reliability --full
 
+# Public problems; tables and picture of docs/benchmark.md. What is there is not run again.
+NAMING ?= full
+NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),10,60)
+naming: $(VENV)/.naming
+	$(BIN)/python -m benchmarks.naming.run make output/naming --seed 2 --problems $(NAMING_PROBLEMS)
+	-$(BIN)/python -m benchmarks.naming.run enter output/naming
+	$(BIN)/python -m benchmarks.naming.run score output/naming --page docs/benchmark.md
+
 experiments: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.experiments
 
@@ -110,6 +119,11 @@ $(VENV)/.demo: setup.py | $(VENV)/bin/python
 $(VENV)/.test: $(VENV)/.demo
 	@echo 'Installing physics engines, linters and colcon for the tests ...'
 	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,test]'
+	@touch $@
+
+$(VENV)/.naming: $(VENV)/.test
+	@echo 'Installing the peers of the naming benchmark ...'
+	@$(BIN)/pip install -qq --editable '.[ros,report,sim,bags,fast,workbench,fleet,test,naming]'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.demo

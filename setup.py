@@ -73,6 +73,8 @@ setup(
         'notebook': ['rich>=13', 'matplotlib>=3.8', 'pandas>=2'],
         # The site of the documentation: Markdown and notebooks, in a theme that reads on a phone.
         'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8'],
+        # Peers of the naming benchmark: LASSO, group LASSO, sparse identification of dynamics.
+        'naming': ['scikit-learn>=1.5', 'skglm>=0.4', 'pysindy>=2.0'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',

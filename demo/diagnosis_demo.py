@@ -140,7 +140,9 @@ def record(story: Story, seed: int, duration: float) -> None:
     story.say(f'A physics engine plays the robot. One effect out of {len(CATALOGUE)} that the '
               'catalogue knows and a few that it\ndoes not is drawn and hidden in it. Its name '
               f'goes to {story.file("truth.json")}, which stays closed till the end.')
-    common = ('--effect', 'random', '--seed', str(seed), '--duration', f'{duration:g}')
+    # The folder is the demonstration's own, which may run again.
+    common = ('--effect', 'random', '--seed', str(seed), '--duration', f'{duration:g}',
+              '--overwrite')
     first = story.start('simulate', '--output', story.file('run.mcap'), *common,
                         '--json', story.file('truth.json'))
     # Beside the first, as there are two cores; its bar would write over the first one's.

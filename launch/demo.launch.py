@@ -33,7 +33,7 @@ def generate_launch_description() -> LaunchDescription:
     common = {'package': 'pprs_dynamics', 'namespace': given['namespace'], 'output': 'screen'}
 
     def check(context: LaunchContext) -> None:
-        # Launch would leave a missing file out: that is the paper's robot.
+        # Launch would leave a missing file out, and say so in a line among many.
         require_file(given['model'].perform(context))
 
     return LaunchDescription([

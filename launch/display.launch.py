@@ -9,10 +9,9 @@
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
-from launch.substitutions import Command, LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import Command, LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
 from pprs_dynamics.system.input_files import require_file
@@ -21,8 +20,7 @@ from pprs_dynamics.system.input_files import require_file
 def generate_launch_description() -> LaunchDescription:
     """Return the nodes and their arguments."""
     arguments = {
-        'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
-                  'model file, with a path'),
+        'model': (None, 'model file of the robot that is connected, with a path'),
         'joint_states': ('joint_states', 'topic of the measurements'),
         'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
                    'the model file'),
@@ -30,7 +28,7 @@ def generate_launch_description() -> LaunchDescription:
     given = {name: LaunchConfiguration(name) for name in ('urdf', *arguments)}
 
     def monitor(context: LaunchContext) -> list[Node]:
-        # Launch would leave a missing file out: that is the paper's robot.
+        # Launch would leave a missing file out, and say so in a line among many.
         require_file(given['model'].perform(context))
         own = {}
         if given['prefix'].perform(context):

@@ -3,15 +3,15 @@
 
 """Feedforward beside a controller of ros2_control, and optionally its monitor.
 
-    ros2 launch pprs_dynamics feedforward.launch.py controller:=joint_trajectory_controller
+    ros2 launch pprs_dynamics feedforward.launch.py model:=/path/robot.yaml \
+      controller:=joint_trajectory_controller
 """
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
 from pprs_dynamics.system.input_files import require_file
@@ -20,8 +20,7 @@ from pprs_dynamics.system.input_files import require_file
 def generate_launch_description() -> LaunchDescription:
     """Return the nodes and their arguments."""
     arguments = {
-        'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
-                  'model file, with a path'),
+        'model': (None, 'model file of the robot that is connected, with a path'),
         'namespace': ('', 'of the nodes'),
         'prefix': ('', 'of the joints: joint_states and controllers say PREFIXslide_1; empty: '
                    'joint_prefix of the model file'),
@@ -33,7 +32,7 @@ def generate_launch_description() -> LaunchDescription:
     given = {name: LaunchConfiguration(name) for name in arguments}
 
     def nodes(context: LaunchContext) -> list[Node]:
-        # Launch would leave a missing file out: that is the paper's robot.
+        # Launch would leave a missing file out, and say so in a line among many.
         require_file(given['model'].perform(context))
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):

@@ -7,10 +7,9 @@
 """
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
 from pprs_dynamics.system.input_files import require_file
@@ -19,8 +18,7 @@ from pprs_dynamics.system.input_files import require_file
 def generate_launch_description() -> LaunchDescription:
     """Return the node and its arguments."""
     arguments = {
-        'model': (PathJoinSubstitution([FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
-                  'model file, with a path'),
+        'model': (None, 'model file of the robot that is connected, with a path'),
         'namespace': ('', 'of the node'),
         'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
                    'the model file'),
@@ -32,7 +30,7 @@ def generate_launch_description() -> LaunchDescription:
     given = {name: LaunchConfiguration(name) for name in arguments}
 
     def nodes(context: LaunchContext) -> list[Node]:
-        # Launch would leave a missing file out: that is the paper's robot.
+        # Launch would leave a missing file out, and say so in a line among many.
         require_file(given['model'].perform(context))
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):

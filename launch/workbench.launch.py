@@ -8,7 +8,7 @@
 
 from launch.actions import DeclareLaunchArgument, ExecuteProcess
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.substitutions import FindPackagePrefix, FindPackageShare
+from launch_ros.substitutions import FindPackagePrefix
 
 from launch import LaunchDescription
 
@@ -17,9 +17,8 @@ def generate_launch_description() -> LaunchDescription:
     """Return the process and its arguments."""
     pprs = PathJoinSubstitution([FindPackagePrefix('pprs_dynamics'), 'lib/pprs_dynamics/pprs'])
     return LaunchDescription([
-        DeclareLaunchArgument('model', default_value=PathJoinSubstitution(
-            [FindPackageShare('pprs_dynamics'), 'config/paper.yaml']),
-            description='model file, with a path'),
+        DeclareLaunchArgument(
+            'model', description='model file of the robot that is connected, with a path'),
         DeclareLaunchArgument('topic', default_value='joint_states',
                               description='of the measurements'),
         DeclareLaunchArgument('namespace', default_value='/',

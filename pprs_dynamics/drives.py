@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 # Of the 3-PPRS of the paper.
@@ -55,19 +56,44 @@ def common_unit(units: Sequence[DriveUnits], unit: str) -> str:
     return ' or '.join(sorted({one.of(unit) for one in units})) or unit
 
 
+# A column of a table by its name, or by its number from 1. `name[k]` is element k, from 0, of a
+# column that holds lists; a dot is between a structure and its field.
+Column = str | int
+
+
 class DriveColumns(NamedTuple):
     """Columns of one drive, by quantity, and what their numbers are multiplied by."""
 
-    names: Mapping[str, str]
+    names: Mapping[str, Column]
     effort_scale: float = 1.0
     position_scale: float = 1.0
+    velocity_scale: float = 1.0
 
 
 class RecordedColumns(NamedTuple):
-    """Columns of a table that is no recording by its header: of time, and of each drive."""
+    """How tables hold a recording; what is not said is as in our own format.
 
-    time: str
-    drives: Mapping[str, DriveColumns]
+    Parameters
+    ----------
+    time : str or int, optional
+    drives : mapping of str to DriveColumns
+    time_scale : float, optional
+        Seconds per unit of time; as the stamps look by default.
+    rate : float, optional
+        Samples per second of tables without times [Hz].
+    decimal : {'.', ','}
+        What is between the whole and the rest of a number.
+    files : mapping of str to str
+        By quantity, or `time`: files that make one recording, from its folder; * stands for what
+        recordings differ in.
+    """
+
+    time: Column | None = None
+    drives: Mapping[str, DriveColumns] = MappingProxyType({})
+    time_scale: float | None = None
+    rate: float | None = None
+    decimal: str = '.'
+    files: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -80,7 +106,7 @@ class RecordedDrives:
     joints : tuple of D str, optional
         What messages and columns call them; their names where not given.
     columns : RecordedColumns, optional
-        Of tables that are no recordings by their header.
+        Of tables that are no recordings by their header, and of topics that are no joint states.
     gain : tuple of D floats, optional
         Effort per ampere, for what was recorded as a current [N m/A, N/A].
     in_amperes : bool

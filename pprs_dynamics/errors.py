@@ -17,6 +17,12 @@ FEW = 6
 MANY = 40
 
 
+def meant(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is most like a misspelt one, '' where none is like it."""
+    close = difflib.get_close_matches(name, list(known), 1)
+    return close[0] if close else ''
+
+
 class Missing:
     """Stands for a value that is absent, unlike None."""
 
@@ -87,15 +93,19 @@ class UnknownNameError(ModelError):
     @property
     def sentence(self) -> str:
         """The error without its source."""
-        close = difflib.get_close_matches(self.value, self.known, 1)
-        if self.instead:
-            hint = f' (use {self.instead})'
-        elif close and len(self.known) > FEW:
-            hint = f' (did you mean {close[0]}?)'
-        else:
-            hint = f' (known: {", ".join(self.known)})' if len(self.known) <= MANY else ''
+        hint = f' ({self.hint})' if self.hint else ''
         place = f'{self.place}: ' if self.place else ''
         return f'{place}unknown {self.kind} {self.value}{hint}'
+
+    @property
+    def hint(self) -> str:
+        """What to write instead: the name that is like it, or those that there are."""
+        if self.instead:
+            return f'use {self.instead}'
+        close = meant(self.value, self.known) if len(self.known) > 1 else ''
+        known = f'known: {", ".join(self.known)}' if len(self.known) <= (
+            FEW if close else MANY) else ''
+        return '; '.join(filter(None, (known, f'did you mean {close}?' if close else '')))
 
 
 class UnreadableFileError(PprsError, OSError):

@@ -42,9 +42,6 @@ FLOORS = {
     'ros': ['messages', 'node'],
     'app': ['fleet', 'report', 'front_door', 'workbench', 'commands'],
 }
-# The 3-PPRS' compiled motion stands behind the motion of any platform, and its spatial algebra
-# behind an arm's.
-LIFTS = {('mechanism', 'three_pprs')}
 # Equations of the paper that the code must state; (14) is the sum, (1) and (2) the friction laws.
 EQUATIONS = set(range(1, 17))
 
@@ -101,7 +98,7 @@ def test_arrows_point_one_way(file: Path) -> None:
         below = {name.split('.')[2] for name in used
                  if name.startswith(f'pprs_dynamics.{room}.') and name.count('.') > 2}
         above = set(floors[floors.index(folder) + 1:])
-        assert {name for name in below & above if (folder, name) not in LIFTS} == set()
+        assert below & above == set()
     libraries = {name.split('.')[0] for name in used}
     if room != 'ros':
         assert not libraries & ROS

@@ -110,7 +110,8 @@ def children_seconds(pid: int) -> float:
 def one_round(domain: int, diagnose: bool, seconds: float, folder: Path) -> dict[str, Any]:
     """Return the times of one round with a monitor of its own."""
     recorded = states(SPAN + BEGUN + seconds + 5)
-    command = [executable('monitor'), '--ros-args', '-p', f'diagnose_span:={SPAN}',
+    command = [executable('monitor'), '--ros-args', '-p', 'demo:=true',
+               '-p', f'diagnose_span:={SPAN}',
                '-p', f'diagnose_every:={SPAN if diagnose else 0.0}']
     with node_process(command, domain, folder / 'log') as process:
         stream = Beside(recorded)

@@ -5,7 +5,7 @@
 
     python -m benchmarks.node.reliability [--full] [PART ...]
 
-PARTs are latency, storm, restart, soak, fuzz; all by default. What each found is kept in
+PARTs are latency, storm, restart, stall, soak, fuzz; all by default. What each found is kept in
 output/reliability, also while it runs, so that parts can be run one by one and a run that is ended
 early is not lost; the page is written from what is there. `--resume` leaves out parts that have
 been run at the size that is asked for.
@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from benchmarks import ROOT
-from benchmarks.node import fuzz, latency, parameter_storm, restart, soak
+from benchmarks.node import fuzz, latency, parameter_storm, restart, soak, stall
 from benchmarks.node.reliability_page import HEAD, RELEASES, SECTIONS
 
 KEPT = ROOT / 'output' / 'reliability'
@@ -32,6 +32,7 @@ PARTS: dict[str, tuple[ModuleType, float, float]] = {
     'latency': (latency, 10.0, 60.0),
     'storm': (parameter_storm, 2_000, 10_000),
     'restart': (restart, 5, 20),
+    'stall': (stall, 3.0, 3.0),
     'soak': (soak, 5.0, 20.0),
     'fuzz': (fuzz, 100_000, 1_000_000),
 }

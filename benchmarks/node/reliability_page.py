@@ -43,7 +43,8 @@ model's table, the parameter files and the command line. `test/ros/test_rclpy_in
 def _latency(found: dict[str, Any]) -> str:
     return ('\n'.join(latency.rows(found)) + '\n\nThe echo node is what rclpy\'s tutorials show: '
             'message objects, rclpy\'s executor, six zeros. Both ran at the same time, measured in '
-            'turns by one client of one thread.\n')
+            'turns by one client of one thread. The node answers every message here (a queue of '
+            '1 000, `max_age` 0); by itself it takes the ten latest.\n')
 
 
 def _fuzz(found: dict[str, Any]) -> str:
@@ -70,6 +71,20 @@ def _storm(found: dict[str, Any]) -> str:
             'ones make.\n')
 
 
+def _stall(found: dict[str, Any]) -> str:
+    rows = [f'| {what} | {of["sent"]:,} | {of["commands"]:,} | {of["old_commands"]} | '
+            f'{1e3 * of["oldest_s"]:.0f} ms | {of["farthest_mm"]:.1f} mm | {of["TIME"]} | '
+            f'{of["superseded"]:,} |'
+            for what, of in (('stamped', found['stamped']), ('stamp 0', found['unstamped']))]
+    return ('\n'.join((
+        f'Stopped (SIGSTOP) for {found["stopped_s"]:g} s in a stream of {found["rate"]:g} Hz of a '
+        'platform that rises at 15 mm/s, and continued. Commands of the 0.3 s after that:', '',
+        '| messages | sent | commands | setpoints older than 0.1 s | oldest setpoint | '
+        'farthest from the path | rejected, `TIME` | passed over for later ones |',
+        '|---|---|---|---|---|---|---|---|', *rows, '')) + '\nThe drives hold the pose of the '
+        'stop, with its gravity, until the first command.\n')
+
+
 def _soak(found: dict[str, Any]) -> str:
     return (f'{found["minutes"]:g} minutes at {found["rate"]:g} Hz: {found["sent"]:,} messages '
             f'sent, {found["answered"]:,} answered. Resident memory after the first minute '
@@ -88,4 +103,4 @@ def _restart(found: dict[str, Any]) -> str:
 SECTIONS: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     'latency': ('Speed', _latency), 'fuzz': ('Damaged messages', _fuzz),
     'storm': ('Parameters', _storm), 'soak': ('Endurance', _soak),
-    'restart': ('Restart', _restart)}
+    'stall': ('Standstill', _stall), 'restart': ('Restart', _restart)}

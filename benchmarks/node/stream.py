@@ -34,6 +34,9 @@ RELIABLE = QoSProfile(depth=1000)
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SETTLE = 0.7  # [s] discovery is one-sided: the node may see us a moment after we see it
 PATIENCE = 20.0  # [s]
+# Of a node that answers every message, as is counted here; by itself it takes the latest ones.
+EACH = ('max_age:=0.0', 'max_ahead:=0.0',
+        'qos_overrides./feedforward/trajectory.subscription.depth:=1000')
 
 
 class Stream:
@@ -169,9 +172,18 @@ def served(
         holder.close()
 
 
-def feedforward(*parameters: str) -> list[str]:
-    """Return the command that starts the node under test with parameters `name:=value`."""
-    words = [word for parameter in parameters for word in ('-p', parameter)]
+def feedforward(*parameters: str, each: bool = True) -> list[str]:
+    """Return the command that starts the node under test, the paper's robot without a model file.
+
+    Parameters
+    ----------
+    parameters : str
+        As `name:=value`.
+    each : bool
+        Whether every message is to be answered, however late, and not only the latest ones.
+    """
+    words = [word for parameter in ('demo:=true', *(EACH if each else ()), *parameters)
+             for word in ('-p', parameter)]
     return [executable('feedforward'), '--ros-args', *words]
 
 

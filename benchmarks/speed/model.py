@@ -29,8 +29,8 @@ from benchmarks.speed.peers import MujocoPeer, PinocchioPeer
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
+from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.model.one_pass import forces_kernel
-from pprs_dynamics.physics.three_pprs.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 

@@ -29,14 +29,20 @@ from pprs_dynamics.ros.force_command import (
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Code, Rejection
-from pprs_dynamics.ros.messages.trajectory_request import RequestReader, readers_for
+from pprs_dynamics.ros.messages.trajectory_request import (
+    TRAJECTORY,
+    RequestReader,
+    Timing,
+    readers_for,
+)
 from pprs_dynamics.ros.node.clocks import CommandWatchdog
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
-from pprs_dynamics.ros.node.qos import UNANSWERED, publisher, subscription
+from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
+from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
@@ -69,13 +75,15 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         names = RobotNames.of(self._settings.model, own['frame_id'])
         self._readers = readers_for(self._settings.model, names)
         self._written = command_writer(names)
-        self._feedforward = Feedforward(self._settings.model, self._settings.own)
-        self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0,
+        self._feedforward = Feedforward(self._settings.model, own)
+        self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
+        self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0, PASSED_OVER: 0,
                           **dict.fromkeys(REJECTIONS, 0)}
+        self._senders = Senders()
         self._margins_due, self._margins, self._beyond_curve = 0.0, Margins(None, 1.0, ''), ''
         self._last_unjudged: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
-        self._counted = (0, time.monotonic())
+        self._counted = (0, 0, time.monotonic())
         self._files = files_given(options.get('cli_args') or sys.argv)
         self._status = StatusReporter(
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
@@ -151,7 +159,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         # Raw: message objects of a long trajectory would take longer than the model.
         self._inputs = [
             subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
-                         raw=True, profile=UNANSWERED)
+                         raw=True, profile=SETPOINTS)
             for topic, reader in self._readers.items()]
 
     def _publisher(self, kind: type, topic: str) -> Any:
@@ -184,21 +192,26 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._inputs, self._publishers_made, self._parts = [], [], {}
 
     def _use_settings(self) -> None:
-        self._feedforward.use(self._settings.model, self._settings.own)
+        own = self._settings.own
+        self._feedforward.use(self._settings.model, own)
+        self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
         if self._watchdog is not None:
             self._create_parts()
             self._watchdog.rearm()
 
     # --- messages -------------------------------------------------------------------------------
 
-    def _on_trajectory(self, reader: RequestReader, data: bytes, info: dict[str, int]) -> None:
+    def _on_trajectory(self, reader: RequestReader, data: bytes, info: dict[str, Any]) -> None:
         began = time.perf_counter()
+        passed_over = self._senders.passed_over(info)
         if self.state != 'active' or self._watchdog is None:
             return
         self._counters['received'] += 1
+        self._counters[PASSED_OVER] += passed_over
         own, now = self._settings.own, self.get_clock().now().nanoseconds
         try:
-            request = reader.read(data, now, own['max_age'], own['missing_derivatives'])
+            request = reader.read(data, now, own['missing_derivatives'])
+            self._timing.check(request, now, _since(info['source_timestamp']))
             answer = self._feedforward.answer(request)
         except PprsError as error:
             self._reject(Rejection.of(error))
@@ -212,7 +225,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._watchdog.feed(request.end - (now or request.start))
         self._publish_rest(answer)
         if info['received_timestamp']:
-            self._lag.add(max(0.0, (time.time_ns() - info['received_timestamp']) / NANOSECONDS
+            self._lag.add(max(0.0, _since(info['received_timestamp'])
                               - (time.perf_counter() - began)))
         self._judge(answer)
 
@@ -251,7 +264,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 if isinstance(effect, MeasuredCurve)
                 and (said := effect.left(answer.forces.mechanism))), '')
         left = self._margins
-        if answer.clamped:
+        if self._senders.take_turns:
+            report('WARN', 'CONFLICT', 'the drives follow several publishers in turn, all on '
+                   f'{self.resolve_topic_name(TRAJECTORY)}: {publishers_of(self, TRAJECTORY)}')
+        elif answer.clamped:
             report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the effort was clamped')
         elif left.singularity is not None and left.singularity < own['warning_margin']:
             report('WARN', 'NEAR_SINGULAR', f'{left.singularity:.3f} of the way to the limits of '
@@ -262,8 +278,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         elif self._beyond_curve:
             report('WARN', 'CURVE', self._beyond_curve)
         elif self._lagging:
-            report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median: they '
-                   'come faster than they are answered, or the machine is busy')
+            report('WARN', 'LAG', f'messages wait for {self._lag.median:.3f} s at the median, or '
+                   'most are passed over for later ones: they come faster than they are answered, '
+                   'or the machine is busy')
         else:
             report('OK', 'OK', 'commands follow the trajectory')
 
@@ -330,14 +347,21 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         if self._last_unjudged is not None and self._status.code == 'OK':
             # Nothing came after it: where it leads to is told all the same.
             self._judge(self._last_unjudged)
-        accepted, now = self._counters['accepted'], time.monotonic()
-        before, then = self._counted
-        self._counted = (accepted, now)
+        accepted, passed, now = (self._counters['accepted'], self._counters[PASSED_OVER],
+                                 time.monotonic())
+        before, passed_before, then = self._counted
+        self._counted = (accepted, passed, now)
         threshold = self._settings.own['lag_warning']
+        waits = self._lag.median > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
             state=self.state,
             preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
-            lagging=bool(threshold and accepted > before and self._lag.median > threshold),
+            lagging=bool(threshold and accepted > before and waits),
             model={'files': self._files, 'sha256': self._settings.model.fingerprint})
+
+
+def _since(stamp: int) -> float:
+    """Return for how long the middleware's stamp [ns] has passed [s]; 0 where it gives none."""
+    return max(0.0, (time.time_ns() - stamp) / NANOSECONDS) if stamp else 0.0

@@ -33,7 +33,12 @@ _PARAMETERS = (
     own_parameter('autostart', True, 'true: active at once; false: a supervisor configures and '
                   'activates the node', stays=True),
     FRAME,
-    own_parameter('max_age', 0.0, 'oldest header stamp that is accepted [s]; 0: any', lower=0),
+    own_parameter('max_age', 0.1, 'oldest header stamp that is accepted, and longest time since a '
+                  'message without one was sent [s]; 0: any', lower=0),
+    own_parameter('max_ahead', 0.5, 'how far ahead of its moment a first point is accepted, which '
+                  'is executed at once [s]; 0: any', lower=0),
+    own_parameter('max_duration', 600.0, 'longest trajectory that is accepted [s]: its command is '
+                  'not stale before its end', lower=0.001, upper=3600),
     own_parameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '
                   'reject the message, or take them from a spline through the points',
                   choices=(REJECT, SPLINE)),

@@ -37,7 +37,7 @@ from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED
+from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
 from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
@@ -79,9 +79,9 @@ class LiveJointStates(Node):
         self._monitor: list[float] | None = None
         self._diagnosis: dict[str, Any] | None = None
         self._heard = 0.0
-        self.create_subscription(JointState, topic, self._on_state, UNANSWERED, raw=True)
+        self.create_subscription(JointState, topic, self._on_state, MEASURED, raw=True)
         # Raw, as what is no message of the kind would end the executor.
-        self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, UNANSWERED,
+        self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, MEASURED,
                                  raw=True)
         self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED,
                                  raw=True)

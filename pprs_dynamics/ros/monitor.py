@@ -36,7 +36,7 @@ from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParam
 from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
-from pprs_dynamics.ros.node.qos import LATCHED, UNANSWERED, publisher, subscription
+from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.system.plain_text import for_json
 
@@ -62,6 +62,7 @@ class MonitorNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('monitor', allow_undeclared_parameters=True, **options)
+        self._worker, self._changed = DiagnosisWorker(), ''
         parameters: tuple[NodeParameter, ...] = PARAMETERS
         if is_mechanism(overrides(self)):
             parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
@@ -85,10 +86,9 @@ class MonitorNode(ExplainsRefusals):
         self._joints = AllJoints()
         self._latest: tuple[int, Array] | None = None
         subscription(self, JointState, 'joint_states', self._on_state, raw=True,
-                     profile=UNANSWERED)
+                     profile=MEASURED)
         steady_timer(self, 1.0 / own['update_rate'], self._judge)
         self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
-        self._worker, self._changed = DiagnosisWorker(), ''
         if own['diagnose_every']:
             self._diagnosis = publisher(self, String, '~/diagnosis', LATCHED)
             steady_timer(self, LOOK, self._diagnose)

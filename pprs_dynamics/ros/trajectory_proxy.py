@@ -136,13 +136,13 @@ class TrajectoryProxyNode(ExplainsRefusals):
         now = self.get_clock().now().nanoseconds
         missing = self._settings.own['missing_derivatives']
         if not isinstance(model, DriveModel):
-            return reader_for(model).read(serialize_message(goal.trajectory), now, 0.0, missing)
+            return reader_for(model).read(serialize_message(goal.trajectory), now, missing)
         if not goal.trajectory.points:
             return reader_for(model).read(
-                serialize_message(goal.multi_dof_trajectory), now, 0.0, missing)
+                serialize_message(goal.multi_dof_trajectory), now, missing)
         # Drives' positions: the platform's motion follows from them.
         request = read_joint_trajectory(
-            goal.trajectory, RobotNames.of(model).joints, now, 0.0, missing)
+            goal.trajectory, RobotNames.of(model).joints, now, missing)
         drives: Any = request.motion
         found = solve_forward_motion(
             model.robot.geometry, drives.position, drives.velocity, drives.acceleration)

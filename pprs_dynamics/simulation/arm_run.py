@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
@@ -115,6 +116,7 @@ class ArmEngine:
             self._set_body(self.links[int(row)], parameters)
         mujoco.mj_setConst(self.model, self.data)
         self.gravity = np.asarray(robot.gravity, dtype=float)
+        self.wrench = np.zeros(6)  # that the tool applies at its origin, in the base's axes
 
     def _set_body(self, body: int, parameters: Array) -> None:
         mass, centre, moments, axes = principal_inertia(parameters)
@@ -198,11 +200,20 @@ class ArmEngine:
         for k in range(len(motion)):
             self.state.put(m, k)
             self.engine.mj_inverse(self.model, data)
-            needed = data.qfrc_inverse.copy()
+            needed = data.qfrc_inverse + self._of_wrench()
             for name, effort in (passive or {}).items():
                 needed[self.state.dof(name)] += effort[k]
             found[k] = self.state.driven(needed, self._constraints())
         return found
+
+    def _of_wrench(self) -> Array:
+        """Return the efforts of all joints with which the tool applies the wrench, (nv,)."""
+        row, frame = self.structure.links[self.structure.tool]
+        body, efforts = self.links[row], np.zeros(self.model.nv)
+        at = Frame(self.data.xmat[body].reshape(3, 3), self.data.xpos[body]).of_point(frame.p)
+        self.engine.mj_applyFT(self.model, self.data, self.root.R.T @ self.wrench[:3],
+                               self.root.R.T @ self.wrench[3:], at, body, efforts)
+        return efforts
 
     def _constraints(self) -> Array:
         """Return derivatives of the closures and couplings, (r, nv)."""
@@ -335,16 +346,16 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
                             'T w / sqrt(w^2 + w_0^2)'))
     if 'base_tilt' in chosen:
         hidden.append(engine.hide_tilt(random, scale))
+    largest = np.abs(plain + _own_friction(model, engine, motion)).max(axis=0)
+    if 'external_wrench' in chosen:
+        engine.wrench[2] = scale * 0.05 * float(largest.max())
+        hidden.append(truth('external_wrench', None, {'force_z': float(engine.wrench[2])},
+                            'at the tool'))
     bodies = engine.torques(motion, passive) if hidden else plain
     if progress is not None:
         progress(0.8)
-    efforts = bodies + _own_friction(model, motion)
+    efforts = bodies + _own_friction(model, engine, motion)
     largest = np.abs(efforts).max(axis=0)
-    if 'external_wrench' in chosen:
-        force = scale * 0.05 * float(largest.max()) * np.array([0, 0, 1.0, 0, 0, 0])
-        linkage = model.robot.at(motion.position, motion.velocity, motion.acceleration)
-        efforts += linkage.wrench_efforts(np.tile(force, (len(motion), 1)))
-        hidden.append(truth('external_wrench', None, {'force_z': force[2]}, 'at the tool'))
     for name in chosen:
         if name in FORMS:
             hidden.append(_add(name, model, motion, np.abs(bodies), largest, efforts, random,
@@ -394,8 +405,8 @@ def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np
     return name, torque * rate / np.sqrt(rate ** 2 + width ** 2), {'torque': torque}
 
 
-def _own_friction(model: ArmModel, motion: JointMotion) -> Array:
-    """Return friction, offset and armature as the model file has them."""
+def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
+    """Return friction, offset and armature as the model file has them, under the true loads."""
     values, v = model.values, motion.velocity
     friction: Array = (
         model.robot.armature * motion.acceleration
@@ -404,7 +415,11 @@ def _own_friction(model: ArmModel, motion: JointMotion) -> Array:
         + np.array(values['friction.offset']))
     for effect in model.effects:
         if isinstance(effect, LinkageFriction):
-            friction = friction + effect.force(model.mechanism(motion))
+            state = model.mechanism(motion).loaded(
+                replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
+                StructureLoad(np.tile(engine.wrench, (len(motion), 1)),
+                              np.zeros((len(motion), 3))))
+            friction = friction + effect.force(state)
     return friction
 
 

@@ -94,6 +94,34 @@ def test_two_outputs_are_never_one(
     assert '--report and --json at once, must be another file' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('command', [
+    ['simulate', '--duration', '2', '--output', 'run.csv'],
+    ['simulate', '--duration', '2', '--output', 'link.csv'],
+    ['compare', 'run.csv', '--mcap', 'old.mcap'],
+    ['next-experiment', '--purpose', 'commission', '--output', 'run.csv'],
+], ids=' '.join)
+def test_a_recording_that_exists_is_not_replaced(
+    command: list[str], folder: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    (folder / 'old.mcap').write_bytes(b'a measurement')
+    (folder / 'link.csv').symlink_to('run.csv')
+    before = contents(folder)
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert f'{command[-1]}: it exists already' in said
+    assert '--overwrite' in said
+    assert len(said.splitlines()) == 1
+    assert contents(folder) == before
+
+
+def test_a_recording_is_replaced_where_it_is_asked_for(folder: Path) -> None:
+    before = (folder / 'run.csv').read_bytes()
+    assert main(['simulate', '--duration', '2', '--output', 'run.csv', '--overwrite']) == 0
+    after = (folder / 'run.csv').read_bytes()
+    assert after != before
+    assert after.startswith(b'time,')
+
+
 def test_every_option_that_names_files_is_known_to_the_check() -> None:
     """A new option with a file must be told to be read or written."""
     known = {*OUTPUTS, *INPUTS}

@@ -57,12 +57,23 @@ def test_recordings_follow_each_other_as_segments_of_their_own() -> None:
     alone = [measure_residuals(DriveModel.load(), [recording])[0] for recording in recordings]
     assert np.all(np.diff(both.time) > 0)
     np.testing.assert_array_equal(np.unique(both.segment), [0, 1])
+    np.testing.assert_array_equal(both.record, both.segment)
     for number, single in enumerate(alone):
         part = both.segment == number
         np.testing.assert_array_equal(both.error[part], single.error)
         for name, values in single.variables.items():
             np.testing.assert_array_equal(both.variables[name][part], values)
     assert len(notes) >= 4
+
+
+def test_noise_goes_on_through_the_gaps_of_a_recording() -> None:
+    recording = recorded(23, 0.0)[0]
+    kept = (recording.time < 8.0) | (recording.time > 9.0)
+    cut = Recording.from_arrays('cut', recording.time[kept], recording.position[kept], None,
+                                recording.effort[kept])
+    residuals, _ = measure_residuals(DriveModel.load(), [cut, recording])
+    np.testing.assert_array_equal(np.unique(residuals.segment), [0, 1, 2])
+    np.testing.assert_array_equal(residuals.record, np.maximum(residuals.segment - 1, 0))
 
 
 def test_the_variables_are_those_of_the_motion() -> None:

@@ -224,7 +224,9 @@ def test_what_is_no_such_table_is_one_sentence(
 
 @pytest.mark.parametrize('keys', [
     {'joint_map.slide_9': 'x'}, {'joint_map.slide_1': ''}, {'joint_prefix': 3},
-    {'joint_map.slide_1': 'lift_1'}, {'columns.time': 't'}, {'columns.slide_1.position': 'q'},
+    {'joint_map.slide_1': 'lift_1'}, {'columns.slide_1.position': 0},
+    {'columns.time': True}, {'columns.rate': -100.0}, {'columns.decimal': ';'},
+    {'columns.files.effort': 'tau.csv'}, {'columns.files.torque': 'tau.csv'},
     {**COLUMNS, 'columns.slide_1.colour': 'c'}, {**COLUMNS, 'columns.slide_1.scale': 0.0}])
 def test_names_that_are_none_are_refused(keys: dict[str, Any]) -> None:
     values = {**DriveModel.load().values, **keys}

@@ -313,16 +313,23 @@ def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> N
         read_recording(path, topic='/silent/joint_states')
 
 
-def test_one_storage_file_without_metadata_is_read_and_two_are_not(tmp_path: Path) -> None:
+def test_storage_files_without_metadata_are_read_in_the_order_of_their_messages(
+    tmp_path: Path,
+) -> None:
     arrays = measured(600)
     path = by_own_writer('')(tmp_path, arrays)
     (path / 'metadata.yaml').unlink()
     recording = read_recording(path)
     assert_same(recording, arrays)
     assert the(recording, 'no_metadata').count == 1
-    (path / 'second.mcap').write_bytes((path / 'recording.mcap').read_bytes())
-    with pytest.raises(UnreadableFileError, match=r'metadata\.yaml'):
-        read_recording(path)
+    split = tmp_path / 'split'
+    split.mkdir()
+    for name, part in (('b_0.mcap', slice(0, 200)), ('a_1.mcap', slice(200, 600))):
+        write_recording(split / name, judged({
+            key: values[part] for key, values in arrays.items()}))
+    recording = read_recording(split)
+    assert_same(recording, arrays)
+    assert the(recording, 'no_metadata').count == 2
 
 
 def test_header_stamps_of_0_are_replaced_by_times_of_recording(tmp_path: Path) -> None:

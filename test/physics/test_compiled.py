@@ -25,9 +25,8 @@ from random_states import model_of, paper_model, random_motion, random_robot
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import MotionError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism import compilation
+from pprs_dynamics.physics.mechanism import compilation, evaluation
 from pprs_dynamics.physics.model.one_pass import SHORT
-from pprs_dynamics.physics.three_pprs import evaluation
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates
 
@@ -244,7 +243,7 @@ def test_a_program_that_soon_ends_does_not_wait_for_the_compiler():
 import sys
 import numpy as np
 from pprs_dynamics import DriveModel, Excitation
-from pprs_dynamics.physics.three_pprs import evaluation
+from pprs_dynamics.physics.mechanism import evaluation
 evaluation.PAYS = 1_000
 evaluation.postpone_compiling()
 model, motion = DriveModel.load(), Excitation(2.0).motion(np.arange(0.0, 2.0, 0.004))

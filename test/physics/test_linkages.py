@@ -21,6 +21,7 @@ from pprs_dynamics.errors import ModelError, PprsError, SingularityError, Worksp
 from pprs_dynamics.physics.effects.laws.joint_friction import friction_rows
 from pprs_dynamics.physics.mechanism import linkage
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
@@ -134,6 +135,80 @@ def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states(tmp_path
     active, passive = (forces.parts[f'{kind}_friction'] for kind in ('active', 'passive'))
     assert found['passive_friction'] == pytest.approx(active + passive, abs=1e-10)
     assert min(np.abs(part).max() for part in (active, passive)) > 1
+
+
+def test_a_wrench_on_the_platform_loads_every_joint_as_in_the_closed_form(tmp_path: Path) -> None:
+    """580 N on the platform: friction of drives and passive joints follows what they carry."""
+    wrench = {f'effects.external_wrench.{name}': value for name, value in zip(
+        ('force_x', 'force_y', 'force_z', 'moment_x', 'moment_y', 'moment_z'),
+        (150.0, -250.0, 500.0, 4.0, -9.0, 6.0), strict=True)}
+    found, expected = [], []
+    for added in ({}, {'effects.active': ['external_wrench'], **wrench}):
+        paper, model = three_pprs(tmp_path, drives=True)
+        paper = DriveModel.from_parameters({**paper.values, **added})
+        model = ArmModel.from_parameters({**model.values, **added}, model.source)
+        forces = paper.drive_forces(random_motion(np.random.default_rng(4), 100))
+        s = forces.mechanism
+        expected.append(forces.parts['active_friction'] + forces.parts['passive_friction'])
+        found.append(model.drive_forces(
+            JointMotion(s.position, s.velocity, s.acceleration)).parts['passive_friction'])
+    assert found[1] == pytest.approx(expected[1], abs=1e-8)
+    assert np.max(np.abs(found[1] - found[0])) > 10
+
+
+def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
+    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    state = model.mechanism(states(model, SIZES['hexapod'], 8))
+    wrench = np.random.default_rng(0).normal(size=(8, 6))
+    loaded = state.loaded(model.robot, StructureLoad(wrench, np.zeros((8, 3))))
+    for part in (slice(2, 5), np.array([6, 1]), np.arange(8) % 2 == 0):
+        assert loaded[part].rigid_force == pytest.approx(loaded.rigid_force[part], abs=1e-9)
+
+
+def test_a_gear_does_not_carry_its_rotor(tmp_path: Path) -> None:
+    """The motor accelerates the rotor on its own side: only its effort grows, not the load."""
+    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    motion = states(model, SIZES['five_bar'])
+    with_rotor = ArmModel.from_parameters(
+        {**model.values, 'robot.armature': (0.5, 0.8)}, model.source)
+    before, after = model.mechanism(motion), with_rotor.mechanism(motion)
+    assert after.guide_load == pytest.approx(before.guide_load, abs=1e-12)
+    assert after.rigid_force - before.rigid_force == pytest.approx(
+        motion.acceleration * np.array([0.5, 0.8]), abs=1e-9)
+
+
+def four_bar(coupler: float) -> robots.RobotText:
+    """Return a four-bar with light rods, in line at home where the coupler is 0.4 m long."""
+    text = robots.RobotText('four_bar', tool='crank')
+    text.link('base')
+    text.link('crank', 1.0, (0.05, 0, 0), (0.001, 0.001, 0.001))
+    text.link('rod')
+    text.link('rocker')
+    text.joint('turn', 'revolute', 'base', 'crank', axis=(0, 0, 1))
+    text.joint('knee', 'continuous', 'crank', 'rod', (0.1, 0, 0), axis=(0, 0, 1))
+    text.joint('foot', 'continuous', 'base', 'rocker', (0.3, 0, 0), axis=(0, 0, 1))
+    text.drives = ['turn']
+    text.home = {'knee': 0.7, 'foot': 1.4} if coupler < 0.4 else {}
+    text.loops['tip'] = {'type': 'revolute', 'a': {'link': 'rod', 'xyz': [coupler, 0.0, 0.0]},
+                         'b': {'link': 'rocker', 'xyz': [0.2, 0.0, 0.0]}}
+    return text
+
+
+def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_path: Path) -> None:
+    """With all links in line a joint seems free, a row seems implied; neither is, elsewhere."""
+    model = ArmModel.load(four_bar(0.4).write(tmp_path))
+    turn = np.linspace(0.0, 0.5, 50)[:, None]
+    rest = np.zeros_like(turn)
+    with pytest.raises(WorkspaceError, match=r'tip is open by .* mm.*robot\.home') as error:
+        model.drive_forces(JointMotion(turn, rest, rest))
+    assert 0 < error.value.sample < 50
+    # A coupler that leaves the links out of line closes all the way, redundant rows and all.
+    model = ArmModel.load(four_bar(0.3).write(tmp_path))
+    moved = model.mechanism(JointMotion(turn, rest, rest)).linkage
+    ends = [moved.frame_of(link) for link in ('rod', 'rocker')]
+    tips = [end.p + end.R @ np.array([x, 0, 0])
+            for end, x in zip(ends, (0.3, 0.2), strict=True)]
+    assert tips[0] == pytest.approx(tips[1], abs=1e-9)
 
 
 def energy(model: ArmModel, moved: linkage.Motion) -> np.ndarray:
@@ -321,6 +396,28 @@ def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
     model = ArmModel.load(text.write(tmp_path))
     q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
     expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
+    assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize('block', ['robot', 'arm'])
+def test_what_follows_a_joint_weighs_on_it_in_either_block(tmp_path: Path, block: str) -> None:
+    """A rod that turns twice as far as the upper arm that it hangs on, and with it."""
+    text = robots.RobotText('follower', tool='upper')
+    text.link('base')
+    text.link('upper')
+    text.link('motor', 2.0, (0, 0, 0), (0.1, 0.1, 0.1))
+    text.link('rod', 1.0, (0.1, 0, 0), (0.01, 0.01, 0.01))
+    text.joint('shoulder', 'revolute', 'base', 'upper', axis=(0, 1, 0))
+    text.joint('mount', 'fixed', 'upper', 'motor')
+    text.joint('hinge', 'revolute', 'upper', 'rod', axis=(0, 1, 0),
+               more='\n    <mimic joint="shoulder" multiplier="1" offset="0"/>')
+    text.drives = ['shoulder']
+    path = text.write(tmp_path)
+    if block == 'arm':
+        path.write_text(path.read_text().replace('robot:', 'arm:').replace('drives:', 'joints:'))
+    model = ArmModel.load(path)
+    q, v, a = np.random.default_rng(0).normal(size=(3, 6, 1))
+    expected = 0.1 * a + 4 * (0.01 + 0.1 ** 2) * a - 2 * 0.1 * 9.81 * np.cos(2 * q)
     assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
 
 

@@ -269,8 +269,8 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
     moved = motion(5, 1)
     # Started in another folder than the file's.
     with node_process([executable('feedforward'), '--ros-args', '--params-file', str(file),
-                       '-p', 'command_timeout:=0.0', '-p', 'timeout_action:=silent'],
-                      ros_domain, tmp_path / 'log') as process:
+                       '-p', 'command_timeout:=0.0', '-p', 'timeout_action:=silent',
+                       '-p', 'max_age:=0.0'], ros_domain, tmp_path / 'log') as process:
         assert running.connected()
         assert running.spin_until(publisher.get_subscription_count)
         for k in range(len(moved)):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from controller_rules import ControllerSettings, objection
+from controller_rules import WAY, ControllerSettings, objection
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -19,6 +19,7 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.ros import play_trajectory
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
@@ -29,7 +30,6 @@ from pprs_dynamics.ros.messages.trajectory_request import reader_for
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
-WAY = 2_000_000  # [ns] from sender to controller, through feedforward
 RATE = 100.0
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject'}
@@ -44,14 +44,16 @@ def settings() -> ControllerSettings:
         given['allow_nonzero_velocity_at_trajectory_end'])
 
 
-def forwarded(points: int, ahead: float, sample: int = 100) -> JointTrajectory:
+def forwarded(
+    points: int, ahead: float, sample: int = 100, rate: float = RATE,
+) -> JointTrajectory:
     """Return what feedforward makes of a message of play_trajectory, in the middle of a path."""
     model = DriveModel.load()
-    motion = HelicalPath().motion(np.arange(sample, sample + points) / RATE)
+    motion = HelicalPath().motion(np.arange(sample, sample + points) / rate)
     message = conversions.write_trajectory(
         motion, conversions.time(NOW + round(ahead * 1e9)),
-        [round(k * 1e9 / RATE) for k in range(points)])
-    request = reader_for(model).read(serialize_message(message), NOW, 0.0, 'reject')
+        [round(k * 1e9 / rate) for k in range(points)])
+    request = reader_for(model).read(serialize_message(message), NOW, 'reject')
     answer = Feedforward(model, OWN).answer(request)
     found = deserialize_message(CommandBytes(conversions.PAPER).joint_trajectory(
         request.start, request.offsets, answer.forces, answer.effort), JointTrajectory)
@@ -60,12 +62,19 @@ def forwarded(points: int, ahead: float, sample: int = 100) -> JointTrajectory:
 
 
 @pytest.mark.parametrize(('points', 'ahead', 'said'), [
-    (1, 0.0, 'ends in the past'),  # play_trajectory as it starts by itself
+    (1, 0.0, 'ends in the past'), (2, 0.0, 'ends in the past'),
     (1, 0.02, ''), (10, 0.0, ''), (10, 0.02, '')])
 def test_a_stream_is_taken_where_it_ends_after_its_arrival(
     points: int, ahead: float, said: str,
 ) -> None:
     assert objection(forwarded(points, ahead), settings(), NOW + WAY) == said
+
+
+@pytest.mark.parametrize('rate', [50.0, 100.0, 500.0, 1000.0])
+def test_a_stream_is_taken_with_reserve_by_the_defaults(rate: float) -> None:
+    given = {one.name: one.default for one in play_trajectory.PARAMETERS}
+    message = forwarded(given['points'], given['ahead'], rate=rate)
+    assert objection(message, settings(), NOW + 2 * WAY) == ''
 
 
 def test_a_piece_in_motion_needs_the_parameter_of_our_file() -> None:
@@ -216,9 +225,9 @@ def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
         read = reader_for(model, names).read
         if not accepted:
             with pytest.raises(Rejection, match='left_base'):
-                read(serialize_message(message), NOW, 0.0, 'reject')
+                read(serialize_message(message), NOW, 'reject')
             continue
-        request = read(serialize_message(message), NOW, 0.0, 'reject')
+        request = read(serialize_message(message), NOW, 'reject')
     answer = Feedforward(model, OWN).answer(request)
     state = deserialize_message(CommandBytes(names).joint_state(NOW, answer.effort[0]), JointState)
     assert list(state.name) == ['left_slide_1', 'left_slide_2', 'left_slide_3', 'left_lift_1',

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.node import fuzz, parameter_storm, soak
+from benchmarks.node import fuzz, parameter_storm, soak, stall
 
 pytestmark = pytest.mark.nodes
 
@@ -26,3 +26,12 @@ def test_a_steady_stream_is_answered_message_by_message(ros_domain: int) -> None
     found = soak.run(0.1, rate=200.0, domain=ros_domain)
     # A busy machine may hold up node and client, and the stream with them.
     assert found['answered'] == found['sent'] > 100
+
+
+def test_a_node_that_stood_still_executes_nothing_of_what_waited(ros_domain: int) -> None:
+    found = stall.run(1.0, domain=ros_domain)
+    for stream in (found['stamped'], found['unstamped']):
+        assert stream['commands'] > 10, found  # it goes on
+        assert stream['old_commands'] == 0, found
+        # It stood, and later messages took the place of some five hundred.
+        assert stream['superseded'] > 200, found

@@ -30,6 +30,7 @@ pytestmark = pytest.mark.nodes
 
 MOTION = random_motion(np.random.default_rng(3), 1)
 MESSAGE = message_of(MOTION)
+DEMO = [executable('feedforward'), '--ros-args', '-p', 'demo:=true']
 
 
 class Supervisor:
@@ -151,7 +152,7 @@ def test_a_node_that_is_active_by_itself_can_still_be_managed() -> None:
 def test_a_signal_ends_it_with_the_timeouts_action_as_its_last_word(
     ros_domain: int, tmp_path: Path, number: signal.Signals,
 ) -> None:
-    command = [executable('feedforward'), '--ros-args', '-p', 'command_timeout:=0.0']
+    command = [*DEMO, '-p', 'command_timeout:=0.0', '-p', 'max_age:=0.0']
     with bench() as running, node_process(command, ros_domain, tmp_path / 'log') as process:
         commands = running.listen(Float64MultiArray, '/feedforward/commands')
         publisher = running.probe.create_publisher(
@@ -173,7 +174,7 @@ def test_a_signal_ends_it_with_the_timeouts_action_as_its_last_word(
 
 def test_a_signal_during_the_start_ends_it_too(ros_domain: int, tmp_path: Path) -> None:
     for delay in (0.0, 0.2, 0.4, 0.6):
-        with node_process([executable('feedforward')], ros_domain, tmp_path / 'log') as process:
+        with node_process(DEMO, ros_domain, tmp_path / 'log') as process:
             time.sleep(delay)
             process.send_signal(signal.SIGTERM)
             process.wait(10)
@@ -183,7 +184,7 @@ def test_a_signal_during_the_start_ends_it_too(ros_domain: int, tmp_path: Path) 
 def test_killed_and_started_again_it_answers_from_the_first_message_it_gets(
     ros_domain: int, tmp_path: Path,
 ) -> None:
-    command = [executable('feedforward')]
+    command = [*DEMO, '-p', 'max_age:=0.0']  # however busy this machine is
     with bench() as running:
         commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
         running.follow_status('/feedforward/status')
@@ -208,7 +209,8 @@ def test_two_namespaces_do_not_disturb_each_other() -> None:
     with bench() as running:
         nodes = [running.add(
             FeedforwardNode, namespace=name, parameter_overrides=overrides(
-                masses__payload=payload, command_timeout=0.0))
+                masses__payload=payload, command_timeout=0.0, max_age=0.0, **{
+                    f'qos_overrides./{name}/feedforward/trajectory.subscription.depth': 100}))
             for name, payload in (('left', 0.5), ('right', 3.0))]
         answers = [running.listen(Float64MultiArray, f'/{name}/feedforward/commands')
                    for name in ('left', 'right')]

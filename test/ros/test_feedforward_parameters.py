@@ -249,8 +249,8 @@ def test_every_topic_of_every_node_has_the_qos_that_is_asked_for(
     factory: Any, topic: str, entity: str,
 ) -> None:
     with bench() as running:
-        running.add(factory, parameter_overrides=[
-            Parameter(f'qos_overrides.{topic}.{entity}.reliability', value='best_effort')])
+        running.add(factory, parameter_overrides=overrides(
+            **{f'qos_overrides.{topic}.{entity}.reliability': 'best_effort'}))
         look = getattr(running.probe, f'get_{entity}s_info_by_topic')
         assert running.spin_until(lambda: look(topic))
         info, = look(topic)
@@ -261,7 +261,8 @@ def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(
     ros_domain: int, tmp_path: Path,
 ) -> None:
     log = tmp_path / 'log'
-    command = [executable('feedforward'), '--ros-args', '-r', '~/commands:=/effort/commands',
+    command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true',
+               '-r', '~/commands:=/effort/commands',
                '-p', 'qos_overrides./effort/commands.publisher.reliability:=best_effort']
     with bench() as running, node_process(command, ros_domain, log):
         running.listen(Float64MultiArray, '/effort/commands')  # reliable
@@ -279,7 +280,7 @@ def test_what_only_counts_at_the_start_is_refused_while_the_node_runs(
     node: Any, name: str, value: Any,
 ) -> None:
     with bench() as running:
-        made = running.add(node)
+        made = running.add(node, parameter_overrides=overrides())
         result, = made.set_parameters([Parameter(name, value=value)])
         assert not result.successful
         assert name.partition('.')[0] in result.reason

@@ -8,10 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
+from node_bench import overrides
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
@@ -235,8 +239,24 @@ def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
         assert node.counters['stale'] == 1
 
 
+def test_of_setpoints_that_wait_the_latest_are_executed_and_the_others_are_told() -> None:
+    motion = random_motion(np.random.default_rng(2), 30)
+    with feedforward_bench() as node:
+        node.answer(message_of(motion[:1]))
+        for k in range(len(motion)):  # nobody spins
+            node.publisher.publish(message_of(motion[k:k + 1]))
+        assert node.bench.spin_until(lambda: len(node.commands) > 10)
+        node.bench.spin_for(0.3)
+        expected = DriveModel.load().drive_forces(motion[-10:]).total
+        np.testing.assert_allclose([command.data for command in node.commands[1:]], expected,
+                                   rtol=0, atol=EQUAL)
+        assert node.counters['superseded'] == len(motion) - 10
+        node.wait_for_status(lagging=True)
+
+
 def test_messages_that_queue_up_are_told() -> None:
-    with feedforward_bench(lag_warning=0.01) as node:
+    depth = {'qos_overrides./feedforward/trajectory.subscription.depth': 100}
+    with feedforward_bench(lag_warning=0.01, **depth) as node:
         message = message_of(random_motion(np.random.default_rng(2), 1))
         # Nobody spins: the messages wait for the node, at the median a quarter second.
         for _ in range(50):
@@ -284,3 +304,87 @@ def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
         assert (status.name, status.level) == ('/feedforward', b'\x02')
         assert status.hardware_id == '3-PPRS'
         assert {value.key: value.value for value in status.values}['EMPTY'] == '1'
+
+
+def test_what_was_sent_too_long_ago_is_not_executed_whether_it_is_stamped_or_not() -> None:
+    """Messages that lay in the middleware while the node stood still."""
+    limit = 0.3
+    with feedforward_bench(max_age=limit) as node:
+        for stamped in (True, False):
+            now = node.node.get_clock().now().nanoseconds
+            stamp = conversions.time(now) if stamped else None
+            node.publisher.publish(message_of(MOTION, stamp))
+            while node.node.get_clock().now().nanoseconds < now + 1.5e9 * limit:
+                pass
+            rejected, silent = node.counters['TIME'], len(node.commands)
+            assert node.bench.spin_until(lambda rejected=rejected: node.counters['TIME'] > rejected)
+            assert len(node.commands) == silent
+            node.answer(message_of(MOTION, (stamped and conversions.time(
+                node.node.get_clock().now().nanoseconds)) or None))
+
+
+def test_what_is_due_much_later_is_not_executed_at_once() -> None:
+    with feedforward_bench(max_ahead=0.5, command_timeout=TIMEOUT) as node:
+        def due_in(seconds: float, offset: float = 0.0) -> int:
+            message = message_of(MOTION[:1], conversions.time(
+                node.node.get_clock().now().nanoseconds + round(seconds * 1e9)))
+            message.points[0].time_from_start = conversions.duration(round(offset * 1e9))
+            node.send(message)
+            return len(node.commands)
+
+        due_in(3600.0)
+        assert 'max_ahead allows 0.5 s' in node.wait_for_status(code='TIME')['message']
+        due_in(0.0, 1.0)  # stamped now, and due in a second all the same
+        assert node.counters['TIME'] == 2
+        node.bench.spin_for(2 * TIMEOUT)
+        assert not node.commands
+        due_in(0.2)
+        assert node.bench.spin_until(lambda: node.commands)
+        node.wait_for_status(code='STALE')
+
+
+def test_no_time_from_start_switches_the_watchdog_off() -> None:
+    with feedforward_bench(command_timeout=TIMEOUT, max_duration=5.0) as node:
+        node.answer(message_of(MOTION))
+        endless = message_of(MOTION)
+        endless.points[-1].time_from_start.sec = 2_000_000_000
+        node.send(endless)
+        assert 'max_duration allows 5 s' in node.wait_for_status(code='TIME')['message']
+        node.wait_for_status(code='STALE')
+        refused, = node.node.set_parameters([Parameter('max_duration', value=0.0)])
+        assert not refused.successful  # it cannot be switched off either
+
+
+def test_two_publishers_that_take_turns_are_told_by_name() -> None:
+    with feedforward_bench() as node:
+        other = Node('teach_pendant', context=node.bench.context)
+        try:
+            publisher = other.create_publisher(
+                MultiDOFJointTrajectory, '/feedforward/trajectory', 10)
+            assert node.bench.spin_until(
+                lambda: node.node.count_publishers('/feedforward/trajectory') == 2)
+            assert node.bench.spin_until(publisher.get_subscription_count)
+            for _ in range(3):
+                node.answer(message_of(MOTION))
+                before = len(node.commands)
+                publisher.publish(message_of(MOTION))
+                assert node.bench.spin_until(lambda before=before: len(node.commands) > before)
+            said = node.wait_for_status(code='CONFLICT', level='WARN')['message']
+            assert '/teach_pendant' in said
+            assert '/probe' in said
+        finally:
+            other.destroy_node()
+        node.bench.spin_for(1.2)
+        node.answer(message_of(MOTION))
+        assert node.wait_for_status(code='OK')
+
+
+def test_a_second_node_of_its_name_is_told() -> None:
+    with feedforward_bench() as node:
+        node.answer(message_of(MOTION))
+        twin = node.bench.add(FeedforwardNode, parameter_overrides=overrides())
+        said = node.wait_for_status(code='CONFLICT', level='WARN')['message']
+        assert '2 nodes are called /feedforward' in said
+        node.bench.executor.remove_node(twin)
+        twin.destroy_node()
+        assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)

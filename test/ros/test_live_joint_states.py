@@ -77,7 +77,8 @@ def test_numbers_that_are_taken_back_are_set_on_running_nodes_again(
 
 def test_a_node_takes_a_whole_model_or_nothing_of_it(ros_domain: int, tmp_path: Path) -> None:
     payload = MODEL.values['masses.payload'] + 0.1
-    with node_process([executable('monitor')], ros_domain, tmp_path / 'log'), bench() as asking:
+    command = [executable('monitor'), '--ros-args', '-p', 'demo:=true']
+    with node_process(command, ros_domain, tmp_path / 'log'), bench() as asking:
         nodes = LiveNodes(MODEL)
         client = asking.probe.create_client(GetParameters, '/monitor/get_parameters')
         try:

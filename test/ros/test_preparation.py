@@ -20,8 +20,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.three_pprs import evaluation
-from pprs_dynamics.physics.three_pprs.evaluation import compiling_here
+from pprs_dynamics.physics.mechanism import evaluation
+from pprs_dynamics.physics.mechanism.evaluation import compiling_here
 
 MOTION = random_motion(np.random.default_rng(8), 1)
 
@@ -62,7 +62,8 @@ def test_a_node_without_compiled_kernels_answers_messages_and_services(
     log = tmp_path / 'log'
     cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache'),
             'PPRS_DYNAMICS_PLAIN': '0'}
-    command = [executable('feedforward'), '--ros-args', '-p', 'command_timeout:=0.0']
+    command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true', '-p', 'max_age:=0.0',
+               '-p', 'command_timeout:=0.0']
     with bench() as running, node_process(command, ros_domain, log, cold) as process:
         commands = running.listen(Float64MultiArray, '/feedforward/commands')
         running.follow_status('/feedforward/status')
@@ -110,7 +111,7 @@ def test_a_node_that_ends_while_it_compiles_ends_without_a_word(
     ros_domain: int, tmp_path: Path, node: str,
 ) -> None:
     log = tmp_path / 'log'
-    command = [sys.executable, '-c', COMPILING.format(node=node)]
+    command = [sys.executable, '-c', COMPILING.format(node=node), '--ros-args', '-p', 'demo:=true']
     with bench() as running, node_process(command, ros_domain, log) as process:
         running.follow_status(f'/{node}/status')
         assert running.spin_until(lambda: running.status, 20), log.read_text()

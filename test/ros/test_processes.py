@@ -25,6 +25,7 @@ from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 pytestmark = pytest.mark.nodes
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
+DEMO = [executable('feedforward'), '--ros-args', '-p', 'demo:=true']
 EQUAL = 1e-12
 
 
@@ -51,7 +52,7 @@ def test_a_csv_of_poses_is_played_as_the_motion_that_it_is(
     assert done.returncode == 0, done.stderr
     assert running.spin_until(lambda: len(received) == len(motion))
     assert [len(message.points) for message in received] == [2] * (len(motion) - 1) + [1]
-    played = [read_trajectory(message, 1, 0.0).motion for message in received]
+    played = [read_trajectory(message, 1).motion for message in received]
     for name in ('position', 'orientation', 'linear_velocity', 'angular_acceleration'):
         np.testing.assert_allclose([getattr(p, name)[0] for p in played], getattr(motion, name),
                                    rtol=0, atol=EQUAL)
@@ -142,7 +143,7 @@ def test_what_ros_would_pass_over_is_refused_with_usage(
 
 
 def test_a_mixed_list_on_the_command_line_gets_the_hint(ros_domain: int) -> None:
-    done = subprocess.run([executable('feedforward'), '--ros-args', '-p', 'gravity:=[0,0.0,-9.81]'],
+    done = subprocess.run([*DEMO, '-p', 'gravity:=[0,0.0,-9.81]'],
                           env=environment(ros_domain), capture_output=True, text=True, timeout=20)
     assert done.returncode == 2
     assert 'write 0.0, not 0' in done.stderr
@@ -151,7 +152,7 @@ def test_a_mixed_list_on_the_command_line_gets_the_hint(ros_domain: int) -> None
 def test_a_listener_that_took_everything_is_not_complained_about(
     running: Bench, ros_domain: int, tmp_path: Path,
 ) -> None:
-    with node_process([executable('feedforward')], ros_domain, tmp_path / 'log'):
+    with node_process(DEMO, ros_domain, tmp_path / 'log'):
         assert running.spin_until(
             lambda: running.probe.count_subscribers('/feedforward/trajectory'), 20)
         done = play(ros_domain, 'source:=excitation', 'duration:=0.5')
@@ -175,7 +176,7 @@ def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None
 def test_sigint_ends_the_node_cleanly_within_a_second(
     running: Bench, ros_domain: int, tmp_path: Path,
 ) -> None:
-    with node_process([executable('feedforward')], ros_domain, tmp_path / 'log') as process:
+    with node_process(DEMO, ros_domain, tmp_path / 'log') as process:
         assert running.spin_until(
             lambda: running.probe.count_publishers('/feedforward/commands'), 20)
         process.send_signal(signal.SIGINT)

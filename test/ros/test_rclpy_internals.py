@@ -15,9 +15,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, message_of, random_motion
-from node_bench import bench, overrides
+from node_bench import bench
 from rclpy import node as rclpy_node
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from ros_processes import environment, node_process
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
@@ -118,7 +119,8 @@ def test_without_overrides_a_name_that_is_none_is_still_refused(
 def test_overrides_are_the_same_in_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     given = {'a.number': 1.5, 'a.list': [1.0, 2.0], 'a.word': 'up', 'a.switch': True}
     with bench() as running:
-        node = Node('asked', context=running.context, parameter_overrides=overrides(**given))
+        node = Node('asked', context=running.context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in given.items()])
         candidates = (*given, 'not.given', 'use_sim_time')
         known = rclpy_internals.parameter_overrides(node, tuple)
         monkeypatch.setattr(rclpy_internals, 'OVERRIDES', '_renamed')

@@ -17,6 +17,7 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, simulate_arm
@@ -54,6 +55,20 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: ArmModel) -> None:
                           'effects.payload_mass.mass': 1.5}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
         loaded.drive_forces(motion).parts['payload_mass'], abs=1e-8)
+
+
+@pytest.mark.parametrize('of', ['arm', 'hexapod'])
+def test_a_wrench_at_the_tool_is_that_of_the_engine(model: ArmModel, of: str) -> None:
+    robot = model if of == 'arm' else ArmModel.load('config/hexapod.yaml')
+    motion = draw_motion(robot, 2.0, 1)
+    engine = ArmEngine(robot)
+    before = engine.torques(motion)
+    engine.wrench = np.array([30.0, -20.0, 500.0, 1.0, 2.0, -3.0])
+    state = robot.mechanism(motion)
+    loaded = state.loaded(robot.robot, StructureLoad(
+        np.tile(engine.wrench, (len(motion), 1)), np.zeros((len(motion), 3))))
+    assert engine.torques(motion) - before == pytest.approx(
+        loaded.rigid_force - state.rigid_force, abs=1e-8)
 
 
 def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
@@ -119,7 +134,8 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
     assert main(['simulate', '--model', path, '--output', output, '--effect', 'payload_mass',
                  '--duration', '5', '--json', str(truth)]) == 0
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
-    assert main(['simulate', '--model', path, '--output', output, '--effect', 'rod_mass']) == 2
+    assert main(['simulate', '--model', path, '--output', output, '--overwrite', '--effect',
+                 'rod_mass']) == 2
     assert 'no hidden effect of such a robot' in capsys.readouterr().err
 
 

@@ -15,6 +15,9 @@ from itertools import pairwise
 
 from trajectory_msgs.msg import JointTrajectory
 
+# [ns] Age of messages, at the median, where a real controller dropped them: sent by
+# play_trajectory, answered by feedforward, taken in the controller's next update.
+WAY = 11_500_000
 STILL = 1.1920929e-07  # the smallest float above 1, less 1: slower counts as standing
 
 
@@ -35,6 +38,8 @@ def objection(message: JointTrajectory, settings: ControllerSettings, now: int) 
         return "joints don't match the controller's"
     if not names or not points:
         return 'empty'
+    if len(set(names)) < len(names):
+        return 'a joint is named twice'
     if unknown := set(names) - set(settings.joints):
         return f'unknown joint {min(unknown)}'
     if not settings.allow_nonzero_velocity_at_trajectory_end and any(
@@ -55,4 +60,6 @@ def objection(message: JointTrajectory, settings: ControllerSettings, now: int) 
             return 'velocities or accelerations do not match the joints'
         if point.effort and 'effort' not in settings.command_interfaces:
             return 'effort is only supported with the effort command interface'
+        if point.effort and len(point.effort) != len(names):
+            return 'effort does not match the joints'
     return ''

@@ -85,8 +85,12 @@ def checked_status(data: str) -> dict[str, Any]:
 
 
 def overrides(**values: Any) -> list[Parameter]:
-    """Return parameters as a node takes them when it starts, `__` in a name for the dot."""
-    return [Parameter(name.replace('__', '.'), value=value) for name, value in values.items()]
+    """Return parameters as a node takes them when it starts, `__` in a name for the dot.
+
+    The robot is the paper's where they hold none.
+    """
+    return [Parameter(name.replace('__', '.'), value=value)
+            for name, value in {'demo': True, **values}.items()]
 
 
 @contextmanager

@@ -18,7 +18,8 @@ from pprs_dynamics.system.output_files import writable_file
 from pprs_dynamics.system.plain_text import displayed
 
 JSON, PAGE, MODEL, POSES = ('.json',), ('.html',), ('.yaml', '.yml'), ('.csv',)
-RECORDING = ('.csv', '.mcap', '.db3', '')  # without an ending: a rosbag2 folder
+FILES_OF_RECORDINGS = ('.csv', '.mcap', '.db3')
+RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
@@ -67,6 +68,12 @@ def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool 
     """Declare --output of a model file."""
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         required=required, help=what)
+
+
+def add_overwrite(parser: argparse.ArgumentParser) -> None:
+    """Declare --overwrite, of commands that write a recording or poses; see `check_files`."""
+    parser.add_argument('--overwrite', action='store_true', help='replace a recording or poses '
+                        'that exist already under that name')
 
 
 def number(lower: float, upper: float, unit: str = '', above: bool = False,
@@ -142,6 +149,8 @@ def output_folder(text: str) -> str:
 def check_files(options: argparse.Namespace) -> None:
     """Refuse outputs that are an input, or each other, through links too, before anything runs.
 
+    Recordings and poses that exist are replaced with --overwrite alone: a measurement is lost then.
+
     Raises
     ------
     UnreadableFileError
@@ -158,6 +167,10 @@ def check_files(options: argparse.Namespace) -> None:
                 raise UnreadableFileError(
                     name, f'it is --{option} and {same} at once, must be another file')
             seen.append((f'--{option}', Path(name)))
+            if (Path(name).suffix in FILES_OF_RECORDINGS and os.path.lexists(name)
+                    and not getattr(options, 'overwrite', False)):
+                raise UnreadableFileError(name, 'it exists already, must be another name for '
+                                          f'--{option}, or be given with --overwrite')
 
 
 def _said(option: str) -> str:

@@ -20,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states, '
                         'with layouts for PlotJuggler and Foxglove beside it')
+    arguments.add_overwrite(parser)
     parser.add_argument('--beside', metavar='FILE', help='another model file on the same '
                         'recordings, or another recording: its errors stand beside')
     arguments.add_report(parser)
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    inputs = read_inputs(options, screen)
+    inputs = read_inputs(options, screen, whole=True)
     with staged_bar(screen) as progress:
         result = compare(inputs.model, inputs, topic=options.topic, beside=options.beside,
                          progress=progress)

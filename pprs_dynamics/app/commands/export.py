@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     options.model = options.file
-    inputs = read_inputs(options, screen)
+    inputs = read_inputs(options, screen, whole=True)
     model, recordings = inputs.model, inputs.fitted
     expressed = express(model, options.to)
     robot = export_robot(expressed, options.to)

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from pprs_dynamics.app.report.page import Page
 
 
-def read_inputs(options: argparse.Namespace, screen: Any) -> Inputs:
+def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -> Inputs:
     """Read model and recordings of the arguments, and print what is wrong with the latter.
+
+    Excerpts of what is too long for a fit, but where the `whole` is asked for.
 
     Raises
     ------
@@ -36,7 +38,7 @@ def read_inputs(options: argparse.Namespace, screen: Any) -> Inputs:
 
     with staged_bar(screen) as progress:
         inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
-                           options.topic, progress)
+                           options.topic, progress, whole)
     for recording in (*inputs.fitted, *inputs.held_out):
         for finding in recording.findings:
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')

@@ -11,6 +11,7 @@ import shlex
 
 from pprs_dynamics.app.commands.arguments import (
     POSES,
+    add_overwrite,
     add_recordings,
     add_report,
     number,
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
                         required=True, help='poses for play_trajectory; of an arm, positions, '
                         'velocities and accelerations of its joints')
+    add_overwrite(parser)
     parser.add_argument('--purpose', choices=PURPOSES, default='separate',
                         help='separate: what the recordings leave open (default); commission: '
                         'the first motion of a new robot')

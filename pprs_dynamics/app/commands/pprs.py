@@ -70,7 +70,7 @@ def _ended(given: Sequence[str]) -> int:
         # Importing a command takes long enough to be interrupted.
         options = _parser(given).parse_args(given)
         check_files(options)
-        from pprs_dynamics.physics.three_pprs.evaluation import postpone_compiling
+        from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
 
         postpone_compiling()
         status: int = _module(options.command).run(options)

@@ -12,7 +12,14 @@ import argparse
 
 import numpy as np
 
-from pprs_dynamics.app.commands.arguments import RECORDING, add_report, number, output_file, seed
+from pprs_dynamics.app.commands.arguments import (
+    RECORDING,
+    add_overwrite,
+    add_report,
+    number,
+    output_file,
+    seed,
+)
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
@@ -33,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', metavar='RECORDING', type=output_file(*RECORDING),
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
+    add_overwrite(parser)
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
                         choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '

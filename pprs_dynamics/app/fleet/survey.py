@@ -193,7 +193,9 @@ def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
 
 
 def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
-    model = _model(job.model, tuple(job.values.items()))
+    model = _model(job.model, tuple(
+        (key, tuple(value) if isinstance(value, list) else value)  # as files have lists
+        for key, value in job.values.items()))
     recording = read_recording(path, model.recorded, job.topic)
     summary = describe(recording)
     if common['time'] is None:

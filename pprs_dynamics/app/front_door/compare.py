@@ -180,7 +180,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     --------
     >>> print(compare('config/paper.yaml', 'run.mcap'))  # doctest: +SKIP
     """
-    inputs = Inputs.of(model, recordings, (), topic, progress).require_recordings()
+    inputs = Inputs.of(model, recordings, (), topic, progress, whole=True).require_recordings()
     measuring = stage(progress, 'motion and model')
     residuals, notes = measure_residuals(
         inputs.model, inputs.fitted,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.readings import POSITION_UNIT
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
@@ -72,8 +73,12 @@ class Inputs:
 
     @classmethod
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
-           topic: str | None = None, progress: Progress | None = None) -> Inputs:
+           topic: str | None = None, progress: Progress | None = None,
+           whole: bool = False) -> Inputs:
         """Read what is given as a path and check it, and take what is in memory as it is.
+
+        Of recordings that are too long for a fit excerpts are taken, but where the `whole` is
+        asked for.
 
         Raises
         ------
@@ -84,9 +89,11 @@ class Inputs:
             Where the model is none.
         """
         if isinstance(recordings, Inputs):
-            return recordings
-        held_out = () if isinstance(validate, Inputs) else validate
-        return cls.read(model, recordings, held_out, topic, progress).checked()
+            found = recordings
+        else:
+            held_out = () if isinstance(validate, Inputs) else validate
+            found = cls.read(model, recordings, held_out, topic, progress).checked()
+        return found if whole else found.within_memory()
 
     @classmethod
     def read(cls, model: Model, recordings: Given, validate: Given = (),
@@ -119,6 +126,13 @@ class Inputs:
         def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
             return {name: with_mistakes(self.model, one, refuse=True) if name in self.paths
                     else one for name, one in recordings.items()}
+        return replace(self, recordings=each(self.recordings), validation=each(self.validation))
+
+    def within_memory(self) -> Inputs:
+        """Return this with no more of each recording than a fit can hold."""
+        def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
+            return dict(zip(recordings, excerpts_within_memory(
+                self.model, list(recordings.values())), strict=True))
         return replace(self, recordings=each(self.recordings), validation=each(self.validation))
 
     def with_more(self, path: File, is_held_out: bool = False) -> Inputs:

@@ -118,6 +118,7 @@ class Session:
         PprsError
             As `measure_residuals`.
         """
+        inputs = inputs.within_memory()
         try:
             session = cls(inputs.model, inputs.recordings, inputs.validation)
         except PprsError:

@@ -178,10 +178,10 @@ def fit_curve(
             raise CurveError(f'{request.name}: {request.drive} was not measured')
         residuals = replace(residuals, measured=measured)
     series = DriveSeries(residuals, drive, FrequencyBands.for_residuals(residuals))
-    if series.known.sum() < 10 * (INTERVALS[0] + DEGREE):
-        raise CurveError(f'{request.name}: {request.drive} was measured at {series.known.sum()} '
+    if len(series) < 10 * (INTERVALS[0] + DEGREE):
+        raise CurveError(f'{request.name}: {request.drive} was measured at {len(series)} '
                          'samples only')
-    seen = x[series.index][series.known]
+    seen = x[series.index]
     start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
     if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
         raise CurveError(f'{request.name}: {request.variable} hardly varies in the recordings')
@@ -191,7 +191,7 @@ def fit_curve(
         start, end = -pi, pi
     root = np.sqrt(noise.power(series.frequency))
     error = series.transform(series.error) / root
-    scale = root_mean_square(series.error[series.known])
+    scale = root_mean_square(series.error)
     found = []
     for intervals in INTERVALS:
         index, weight = spline_basis(x[series.index], start, end, intervals, turns)

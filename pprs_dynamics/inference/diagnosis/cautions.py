@@ -30,7 +30,7 @@ def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
         yield (f'the recordings last {duration:.3g} s together: too short to tell effects from '
                'slow noise; record at least 20 s')
         return
-    worth = {d: noise.effective_samples(int(regression.series[d].known.sum()))
+    worth = {d: noise.effective_samples(len(regression.series[d]))
              for d, noise in regression.noise(best.fit).items()}
     poor = [design.drives[d] for d, count in worth.items() if count < fits.decisions.few_samples]
     if poor:

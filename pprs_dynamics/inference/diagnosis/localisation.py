@@ -214,21 +214,19 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
     regression, d = library.regression, library.d
     series = regression.series[d]
     white = regression.whitened(fit, d, series.inverse(regression.remaining(fit, d)))
-    known = series.known
-    scores = np.zeros(len(white))
-    n = int(known.sum())
-    shares = (_ranks(np.abs(white[known])) - 0.5) / n
+    n = len(white)
+    shares = (_ranks(np.abs(white)) - 0.5) / n
     ranked = np.array([NormalDist().inv_cdf(share) for share in shares.tolist()])
     # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
-    scores[known] = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
+    scores = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
     best: tuple[float, str, Pattern, Array] | None = None
     for family in library.families:
         if family.paired or family.variable in stated or len(family.columns) == 1:
             continue
         # Bins do not overlap, so that sums over patterns are sums over their bins.
-        members = family.columns[:, known] > 0.5
+        members = family.columns > 0.5
         inside = family.weights @ members.sum(axis=1)
-        totals = family.weights @ (members @ scores[known])
+        totals = family.weights @ (members @ scores)
         gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - library.price(family)
         for at in np.argsort(-gains):
             pattern, gain = family.patterns[at], float(gains[at])
@@ -237,9 +235,9 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
             if pattern.kind not in ('range', 'fast') or totals[at] <= 0:
                 continue
             column = family.pattern_columns(int(at))[0]
-            held = column[known] > 0.5
-            ratio = (np.mean(white[known][held] ** 2)
-                     / max(float(np.mean(white[known][~held] ** 2)), 1e-300))
+            held = column > 0.5
+            ratio = (np.mean(white[held] ** 2)
+                     / max(float(np.mean(white[~held] ** 2)), 1e-300))
             if ratio >= library.prices.decisions.scatter_ratio:
                 best = (gain, family.variable, Pattern('scatter', pattern.limits, float(ratio)),
                         column)
@@ -248,7 +246,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
     gain, variable, pattern, column = best
     # Scatter that comes and goes by itself makes sizes go together: they are worth fewer samples.
     centred = scores.copy()
-    for part in (known & (column > 0.5), known & ~(column > 0.5)):
+    for part in (column > 0.5, column <= 0.5):
         centred[part] -= centred[part].mean()
     lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
     worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)

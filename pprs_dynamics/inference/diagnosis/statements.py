@@ -149,9 +149,8 @@ def word_statement(
     """
     pattern, variable = candidate.pattern, candidate.family.variable
     drive, series = library.residuals.drives[library.d], library.series
-    known = series.known
-    error = series.error[known]
-    columns = candidate.rows[library.d][:, series.index][:, known]
+    error = series.error
+    columns = candidate.rows[library.d][:, series.index]
     shape = coefficients @ columns
     total = max(float(error @ error), 1e-300)
     limits, share, time = pattern.limits, 0.0, 1.0
@@ -163,7 +162,7 @@ def word_statement(
     else:
         held = np.abs(columns[0]) > 0.5
         if pattern.kind == 'fading':
-            held = np.abs(library.values(variable)[known]) < limits[1]
+            held = np.abs(library.values(variable)) < limits[1]
         share, time = float(error[held] @ error[held]) / total, float(held.mean())
     amplitude = float(np.hypot(*coefficients)) if candidate.family.paired else float(
         np.abs(coefficients).max())
@@ -188,9 +187,8 @@ def word_scatter(library: PatternLibrary, variable: str, pattern: Pattern, colum
                  evidence: float) -> Statement:
     """Return the statement that the noise is larger in a range than elsewhere."""
     drive = library.residuals.drives[library.d]
-    known = library.series.known
-    error = library.series.error[known]
-    held = column[known] > 0.5
+    error = library.series.error
+    held = column > 0.5
     total = max(float(error @ error), 1e-300)
     share, time = float(error[held] @ error[held]) / total, float(held.mean())
     said = _sentence(variable, pattern, library, 0.0, 0.0, share, time, np.zeros(0))
@@ -259,9 +257,9 @@ def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
 def _ends(
     library: PatternLibrary, variable: str, shape: Array, directed: bool,
 ) -> tuple[float, float]:
-    values = library.values(variable)[library.series.known]
+    values = library.values(variable)
     if directed:
-        shape = shape * library.values('direction')[library.series.known]
+        shape = shape * library.values('direction')
     order = np.argsort(values)
     few = max(1, len(order) // 100)
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))

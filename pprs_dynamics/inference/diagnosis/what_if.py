@@ -264,7 +264,7 @@ class _System:
         in_time[:, series.index] = series.inverse(np.stack(
             [*(rows[int(column)] for column in columns), regression.base[d][-1]]))
         measured = np.zeros(in_time.shape[1], dtype=bool)
-        measured[series.index] = series.known
+        measured[series.index] = True
         return OptionalForces(
             name, diagnosis.noise_floors[name], len(series), columns, products, in_time[:-1],
             np.where(measured, in_time[-1], np.nan), diagnosis.residuals.error[:, d])

@@ -143,8 +143,15 @@ class Design:
             Effect that joins the model: the numbers of the others were fitted without it, and are
             `LEANING` times as uncertain as the file says.
         """
-        reconstructions = tuple(reconstruct(model, recording) for recording in recordings)
-        return cls._evaluated(model, model, reconstructions, progress, joining=joining)
+        report = progress or (lambda share: None)
+        reconstructions = []
+        for k, recording in enumerate(recordings):
+            def followed(done: int, total: int, k: int = k) -> None:
+                report(0.5 * (k + done / total) / len(recordings))
+
+            reconstructions.append(reconstruct(model, recording, followed))
+        return cls._evaluated(model, model, tuple(reconstructions),
+                              lambda share: report(0.5 + 0.5 * share), joining=joining)
 
     def around(self, point: OperatingPoint, alone: bool = False) -> Design:
         """Return the design of the same recordings around another operating point.

@@ -113,10 +113,10 @@ class Regression:
         self.noise_shapes = NoiseShapes.of(self.bands)
         every = {d: DriveSeries(residuals, d, self.bands)
                  for d in (range(len(residuals.drives)) if drives is None else drives)}
-        self.series = {d: one for d, one in every.items() if one.known.sum() >= LEAST_SAMPLES}
+        self.series = {d: one for d, one in every.items() if len(one) >= LEAST_SAMPLES}
         self.drives = tuple(self.series)
         if not self.drives:
-            most = max((int(one.known.sum()) for one in every.values()), default=0)
+            most = max(map(len, every.values()), default=0)
             raise ResidualsError('measured', f'a drive has at most {most} samples after treatment',
                                  f'hold at least {LEAST_SAMPLES} of a drive')
         self.counts = np.stack([self.series[d].counts for d in self.drives])
@@ -289,9 +289,7 @@ class Regression:
         """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""
         series = self.series[d]
         factor = series.spread(np.sqrt(self.weights(fit, d)))
-        white = series.inverse(series.transform(rows) * factor)
-        white[..., ~series.known] = 0.0
-        return white
+        return series.inverse(series.transform(rows) * factor)
 
     def local(self, fit: JointFit, d: int) -> tuple[Integers, list[Block]]:
         """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""

@@ -24,10 +24,11 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.residuals.residuals import Residuals, bridged
+from pprs_dynamics.inference.residuals.residuals import Residuals
 
 # The lowest frequencies, where spectra are steep, are bands of their own; above, bands grow.
 SINGLE_BANDS, BAND_RATIO = 12, 1.25
+MOST_STRETCHES = 256  # whose means are rotated at once: a record of more is taken in parts
 # For so few pairs of rows, sums over their products are up to 15 times as fast as a product of
 # matrices for every band (measured with 40 bands of 4000 samples).
 FEW_PAIRS = 12
@@ -35,7 +36,7 @@ FEW_PAIRS = 12
 
 @dataclass(frozen=True)
 class FrequencyBands:
-    """Bands that all drives share; the first holds the constant of every stretch only.
+    """Bands that all drives share; the first holds the constant of every record only.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ class FrequencyBands:
         Parameters
         ----------
         duration : float
-            Of the longest stretch [s].
+            Of the longest record [s].
         period : float
             Between samples [s].
         """
@@ -74,26 +75,37 @@ class FrequencyBands:
 
     @classmethod
     def for_residuals(cls, residuals: Residuals) -> FrequencyBands:
-        """Return the bands that suit the longest stretch of any drive."""
-        longest = max((part.stop - part.start for drive in range(len(residuals.drives))
-                       for part in residuals.stretches(drive)), default=1)
-        return cls.of(longest * residuals.period, residuals.period)
+        """Return the bands that suit the longest record of any drive, its gaps included."""
+        longest = max((residuals.time[record[-1].stop - 1] - residuals.time[record[0].start]
+                       for drive in range(len(residuals.drives))
+                       for record in _records(residuals, drive)), default=0.0)
+        return cls.of(float(longest) + residuals.period, residuals.period)
 
 
-def _fast(part: slice, known: np.typing.NDArray[np.bool_]) -> slice:
-    """Return a stretch less a few samples at its end, which is known as its beginning is.
-
-    A length without large prime factors is transformed ten times as fast.
-    """
-    count = fft.prev_fast_len(part.stop - part.start, True)
-    last = part.start + np.flatnonzero(known[part.start:part.start + count])[-1]
-    return slice(part.start, int(last) + 1)
+def _records(residuals: Residuals, drive: int) -> list[list[slice]]:
+    """Return the stretches of a drive, those through which noise goes on together."""
+    records: list[list[slice]] = []
+    for part in residuals.stretches(drive):
+        same = records and residuals.record[records[-1][-1].start] == residuals.record[part.start]
+        if same and len(records[-1]) < MOST_STRETCHES:
+            records[-1].append(part)
+        else:
+            records.append([part])
+    return records
 
 
 class DriveSeries:
     """One drive's measured samples, stretch by stretch, and their transform.
 
-    Short gaps are bridged by straight lines, in the error and in every column alike.
+    Over a stretch the k-th coefficient of the DCT has the frequency k / (2 T) of its length T, and
+    the one of k = 0 is its mean. In a record of several stretches, through the gaps between which
+    slow noise goes on, the R means are no constants: they tell what is slower than a stretch.
+    They are rotated by an orthonormal basis, made of cos(k pi t / T) at the stretches for
+    k = 0 .. R - 1 with the length T of the record; the k-th has the frequency k / (2 T), and only
+    that of k = 0 is the constant.
+
+    Only what was measured counts. Within a stretch samples follow each other as if the few that
+    are missing were not: the transform stays orthonormal, so that white noise is white.
 
     Parameters
     ----------
@@ -104,11 +116,9 @@ class DriveSeries:
     Attributes
     ----------
     index : (n,) int array
-        Samples of the residuals that belong to a stretch.
-    known : (n,) bool array
-        Those that were measured.
+        Samples of the residuals that were measured and take part.
     stretches : list of slice
-        Parts of `index` without a gap.
+        Parts of `index` without a long gap.
     frequency : (n,) array
         Of the coefficients, ascending [Hz].
     counts : (B,) array
@@ -118,18 +128,32 @@ class DriveSeries:
     def __init__(self, residuals: Residuals, drive: int, bands: FrequencyBands) -> None:
         self.residuals, self.drive, self.bands = residuals, drive, bands
         measured = np.isfinite(residuals.measured[:, drive])
-        stretches = [_fast(part, measured) for part in residuals.stretches(drive)]
-        self.index = np.concatenate([np.arange(part.start, part.stop) for part in stretches]
-                                    or [np.zeros(0, dtype=int)])
-        self.known = measured[self.index]
-        lengths = [part.stop - part.start for part in stretches]
-        self.stretches = [slice(a, b) for a, b in pairwise(accumulate(lengths, initial=0))]
-        frequency = np.concatenate([np.arange(n) / (2 * n * residuals.period) for n in lengths]
-                                   or [np.zeros(0)])
+        records = [[_fast(part.start + np.flatnonzero(measured[part])) for part in record]
+                   for record in _records(residuals, drive)]
+        known = [part for record in records for part in record]
+        self.index = np.concatenate([*known, np.zeros(0, dtype=int)])
+        self.stretches = [slice(a, b) for a, b in pairwise(accumulate(
+            map(len, known), initial=0))]
+        first = np.array([part.start for part in self.stretches])
+        frequency = np.concatenate([*(
+            np.arange(len(part)) / (2 * residuals.period * (part[-1] - part[0] + 1))
+            for part in known), np.zeros(0)])
+        self._rotations: list[tuple[np.typing.NDArray[np.int_], Array]] = []
+        at = 0
+        for record in records:
+            means = first[at:at + len(record)]
+            at += len(record)
+            if len(record) > 1:
+                basis, slow = _slow_basis([residuals.time[part] for part in record],
+                                          residuals.period)
+                self._rotations.append((means, basis))
+                frequency[means] = slow
         order = np.argsort(frequency, kind='stable')
         # Copies of hundreds of rows are dear: of one stretch all samples are taken as they are.
-        self._order: Any = order if len(lengths) > 1 else slice(None)
-        self._taken: Any = self.index if len(stretches) != 1 else stretches[0]
+        is_one = len(known) == 1
+        self._order: Any = slice(None) if is_one else order
+        whole = is_one and known[0][-1] - known[0][0] + 1 == len(known[0])
+        self._taken: Any = slice(int(known[0][0]), int(known[0][-1]) + 1) if whole else self.index
         self.frequency = frequency[order]
         self._cuts = np.searchsorted(self.frequency, bands.edges)
         self._cuts[-1] = len(frequency)
@@ -141,22 +165,28 @@ class DriveSeries:
 
     @cached_property
     def error(self) -> Array:
-        """Measured minus model at `index`, gaps bridged [N]."""
-        return bridged(np.nan_to_num(self.residuals.error[self.index, self.drive]), self.known)
+        """Measured minus model at `index` [N]."""
+        error: Array = self.residuals.error[self.index, self.drive]
+        return error
 
     def transform(self, values: Array) -> Array:
-        """Return DCT coefficients (..., n) by ascending frequency, of values (..., M or n)."""
+        """Return coefficients (..., n) by ascending frequency, of values (..., M or n)."""
         if values.shape[-1] != len(self.index):
             values = values[..., self._taken]
-        values = bridged(values, self.known)
         parts = [fft.dct(values[..., part], norm='ortho', axis=-1) for part in self.stretches]
-        return parts[0] if len(parts) == 1 else np.concatenate(
-            parts, axis=-1)[..., self._order]
+        if len(parts) == 1:
+            return parts[0]
+        coefficients: Array = np.concatenate(parts, axis=-1)
+        for means, basis in self._rotations:
+            coefficients[..., means] = coefficients[..., means] @ basis
+        return coefficients[..., self._order]
 
     def inverse(self, coefficients: Array) -> Array:
-        """Return the values (..., n) of DCT coefficients."""
+        """Return the values (..., n) of coefficients."""
         unsorted = np.empty_like(coefficients)
         unsorted[..., self._order] = coefficients
+        for means, basis in self._rotations:
+            unsorted[..., means] = unsorted[..., means] @ basis.T
         parts = [fft.idct(unsorted[..., part], norm='ortho', axis=-1) for part in self.stretches]
         return np.concatenate(parts, axis=-1)
 
@@ -184,3 +214,24 @@ class DriveSeries:
     def spread(self, by_band: Array) -> Array:
         """Return a value per coefficient (n,) from one per band (B,)."""
         return np.repeat(by_band, self.counts.astype(int))
+
+
+def _fast(samples: np.typing.NDArray[np.int_]) -> np.typing.NDArray[np.int_]:
+    """Return the samples of a stretch less a few at its end.
+
+    A count without large prime factors is transformed ten times as fast.
+    """
+    return samples[:fft.prev_fast_len(len(samples), True)]
+
+
+def _slow_basis(times: list[Array], period: float) -> tuple[Array, Array]:
+    """Return an orthonormal basis of the means of R stretches, (R, R), and its frequencies, (R,).
+
+    By QR of the means of cos(k pi t / T), each as much as the root of its samples is worth.
+    """
+    start = times[0][0] - period / 2
+    length = times[-1][-1] + period / 2 - start
+    wave = np.pi * np.arange(len(times)) / length
+    means = np.stack([np.sqrt(len(time)) * np.cos(np.outer(time - start, wave)).mean(axis=0)
+                      for time in times])
+    return np.linalg.qr(means)[0], wave / (2 * np.pi)

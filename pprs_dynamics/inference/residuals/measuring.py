@@ -111,7 +111,8 @@ def treated_table(
 def join_tables(model: ForceModel, tables: list[dict[Any, Array]]) -> Residuals:
     """Return the residuals of a model on recordings one after the other, from their tables."""
     start, segments = 0.0, 0.0
-    for table in tables:
+    for number, table in enumerate(tables):
+        table['record'] = np.full(len(table['time']), float(number))
         table['time'] = table['time'] + (start - table['time'][0] if start else 0.0)
         table['segment'] = table['segment'] + segments
         start, segments = table['time'][-1] + PAUSE, table['segment'][-1] + 1
@@ -119,8 +120,9 @@ def join_tables(model: ForceModel, tables: list[dict[Any, Array]]) -> Residuals:
               {name: np.concatenate([table[name] for table in tables]) for name in tables[0]})
     names = [*MOTION, *(key.name for key in joined if isinstance(key, Variable))]
     variables = {name: joined.pop(Variable(name)) for name in dict.fromkeys(names)}
-    time, segment = joined.pop('time'), joined.pop('segment').astype(int)
+    time = joined.pop('time')
+    segment, record = (joined.pop(name).astype(int) for name in ('segment', 'record'))
     measured, total = joined.pop('measured'), joined.pop('total')
     steps = np.diff(time)[np.diff(segment) == 0]
     return Residuals(model.drives, time, segment, measured, total, joined, variables,
-                     float(np.median(steps)), model.units)
+                     float(np.median(steps)), model.units, record)

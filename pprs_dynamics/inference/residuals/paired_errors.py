@@ -47,11 +47,11 @@ def sample_gains(
     for d, name in enumerate(before.drives):
         for sign, residuals in ((1, before), (-1, after)):
             series = DriveSeries(residuals, d, bands)
-            if name not in noises or series.known.sum() < LEAST_SAMPLES:
+            if name not in noises or len(series) < LEAST_SAMPLES:
                 continue
             root = np.sqrt(noises[name].power(series.frequency))
-            squares = series.inverse(series.transform(series.error) / root) ** 2 * series.known
-            np.add.at(gains, series.index, sign * squares)
+            gains[series.index] += sign * series.inverse(
+                series.transform(series.error) / root) ** 2
     return gains
 
 

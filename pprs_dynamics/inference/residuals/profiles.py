@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.bins import BINS, bin_edges, bin_of
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -90,14 +89,17 @@ def error_spectrum(residuals: Residuals, drive: int, noise: NoiseSpectrum) -> Sp
     """Return the spectrum of the drive's error, averaged over its stretches, Hann window."""
     from scipy.signal import welch
 
-    series = DriveSeries(residuals, drive, FrequencyBands.for_residuals(residuals))
-    longest = max(part.stop - part.start for part in series.stretches)
+    stretches = residuals.stretches(drive)
+    longest = max(part.stop - part.start for part in stretches)
     size = max(min(longest, 4096), min(longest, 16))
     powers, weights = [], []
-    for part in series.stretches:
+    for part in stretches:
         if part.stop - part.start >= size:
-            frequency, power = welch(series.error[part], 1 / residuals.period, nperseg=size,
-                                     detrend=False)
+            # To look at: over the few samples that a stretch lacks it is a straight line.
+            error, at = residuals.error[part, drive], np.arange(part.stop - part.start)
+            known = np.isfinite(error)
+            frequency, power = welch(np.interp(at, at[known], error[known]), 1 / residuals.period,
+                                     nperseg=size, detrend=False)
             powers.append(power)
             weights.append(part.stop - part.start)
     return Spectrum(frequency, np.average(powers, axis=0, weights=weights),

@@ -15,7 +15,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
 
-# A gap of a few samples is bridged by a straight line; over more, noise is a new stretch.
+# Samples that may be missing, in times the usual distance of those that were measured: over more
+# missing ones a stretch ends.
 LONGEST_BRIDGE = 10
 
 
@@ -44,7 +45,7 @@ class Residuals:
     time : (M,) array
         [s].
     segment : (M,) int array
-        Samples of one number follow each other without a gap; noise starts anew in the next.
+        Samples of one number follow each other without a gap.
     measured : (M, D) array
         Effort [N]; NaN where it was not measured.
     model : (M, D) array
@@ -59,6 +60,9 @@ class Residuals:
         Time between samples [s].
     units : tuple of DriveUnits
         Of the drives; drives that push where they are not given.
+    record : (M,) int array
+        Noise goes on through gaps between samples of one number, and starts anew in the next; by
+        default the segments.
 
     Raises
     ------
@@ -75,9 +79,13 @@ class Residuals:
     variables: Mapping[str, Array] = field(default_factory=dict)
     period: float = 0.01
     units: tuple[DriveUnits, ...] = ()
+    record: np.typing.NDArray[np.int_] = field(
+        default_factory=lambda: np.zeros(0, dtype=int))
 
     def __post_init__(self) -> None:
         samples, width = len(self.time), len(self.drives)
+        if not len(self.record):
+            object.__setattr__(self, 'record', self.segment)
         table = {'measured': self.measured, 'model': self.model,
                  **{f'parts[{name!r}]': part for name, part in self.parts.items()}}
         for name, array in table.items():
@@ -86,8 +94,9 @@ class Residuals:
         for name, array in self.variables.items():
             _require(array.shape in ((samples,), (samples, width)), f'variables[{name!r}]',
                      f'its shape is {array.shape}', f'be ({samples},) or ({samples}, {width})')
-        _require(self.segment.shape == (samples,), 'segment', f'its shape is {self.segment.shape}',
-                 f'be ({samples},)')
+        for name, numbers in (('segment', self.segment), ('record', self.record)):
+            _require(numbers.shape == (samples,), name, f'its shape is {numbers.shape}',
+                     f'be ({samples},)')
         for name, array in {**table, **self.variables, 'time': self.time}.items():
             _require(name == 'measured' or bool(np.isfinite(array).all()), name,
                      'it holds a number that is not finite', 'be finite')
@@ -123,7 +132,7 @@ class Residuals:
         return array if array is None or array.ndim == 1 else array[:, drive]
 
     def stretches(self, drive: int) -> list[slice]:
-        """Return where the drive was measured without a gap longer than a bridge.
+        """Return where the drive was measured without a gap that is long.
 
         Each stretch is of one segment, and starts and ends with a measurement.
         """
@@ -131,7 +140,9 @@ class Residuals:
         for part in _runs(self.segment):
             known = part.start + np.flatnonzero(np.isfinite(self.measured[part, drive]))
             if len(known):
-                cuts = np.flatnonzero(np.diff(known) > LONGEST_BRIDGE + 1)
+                steps = np.diff(known)
+                usual = np.median(steps) if len(steps) else 1
+                cuts = np.flatnonzero(steps > LONGEST_BRIDGE * usual + 1)
                 begins = np.concatenate(([known[0]], known[cuts + 1]))
                 ends = np.concatenate((known[cuts], [known[-1]])) + 1
                 stretches += [slice(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
@@ -160,29 +171,13 @@ class Residuals:
         # A mean over half a block is compared with the model's over the whole one; with fewer
         # measurements the two would not be of the same time.
         measured = np.where(share > 0.5, total / np.maximum(share, 0.5), np.nan)
-        segment = np.concatenate([self.segment[part][::factor] for part in parts])
+        segment, record = (np.concatenate([numbers[part][::factor] for part in parts])
+                           for numbers in (self.segment, self.record))
         return Residuals(
             self.drives, mean(self.time), segment, measured, mean(self.model),
             {name: mean(part) for name, part in self.parts.items()},
             {name: mean(array) for name, array in self.variables.items()}, self.period * factor,
-            self.units)
-
-
-def bridged(values: Array, known: np.typing.NDArray[np.bool_]) -> Array:
-    """Return (..., n) values in which straight lines replace what is not known.
-
-    Applied to an error and to the columns that are to explain it alike, so that a bridge makes
-    no error of its own.
-    """
-    if known.all():
-        return values
-    at, missing = np.flatnonzero(known), np.flatnonzero(~known)
-    right = np.searchsorted(at, missing)
-    before, after = at[right - 1], at[right]
-    share = (missing - before) / (after - before)
-    result = values.copy()
-    result[..., missing] = values[..., before] * (1 - share) + values[..., after] * share
-    return result
+            self.units, record)
 
 
 def _runs(segment: np.typing.NDArray[np.int_]) -> list[slice]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
@@ -51,11 +51,17 @@ class FittedSets:
     decisions : Decisions
     error_scale : mapping of drive to float, optional
         See `Regression`.
+
+    Attributes
+    ----------
+    stepped : callable
+        Called for each set that is fitted and each drive that is scanned: work is done.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
                  error_scale: Mapping[int, float] | None = None) -> None:
         self.design, self.decisions = design, decisions
+        self.stepped: Callable[[], None] = lambda: None
         self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
         self.prices = Prices.of(self.regression, decisions)
         self.library = Library(design, self.regression, self.prices)
@@ -84,6 +90,7 @@ class FittedSets:
         key = set_key(candidates)
         if key not in self._evaluated:
             self._evaluated[key] = self._fitted(tuple(sorted(candidates, key=lambda c: c.rank)))
+            self.stepped()
         return self._evaluated[key]
 
     def _fitted(self, candidates: Candidates) -> CandidateSet:

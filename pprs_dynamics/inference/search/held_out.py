@@ -55,7 +55,6 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
         y = regression.base[d][-1]
         root = np.sqrt(series.spread(regression.weights(fit, d)))
         stacked = series.inverse(np.concatenate((rows, y[None])) * root)
-        stacked[:, ~series.known] = 0.0
         white[d] = index, stacked, series.inverse(np.concatenate((rows, y[None])))
         at = np.searchsorted(series.index, edges)
         for k in range(BLOCKS):
@@ -77,7 +76,7 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
             block = slice(at[k], at[k + 1])
             left = stacked[-1, block] - coefficients[k, index] @ stacked[:-1, block]
             losses[k] += float(left @ left)
-            rest = (rows[-1, block] - plain[k, index] @ rows[:-1, block])[series.known[block]]
+            rest = rows[-1, block] - plain[k, index] @ rows[:-1, block]
             squares, count = squares + float(rest @ rest), count + len(rest)
     # Numbers that are stretched beyond what is known of them cost their share in every block.
     losses += np.array([one.penalty for one in others]) / BLOCKS

@@ -81,8 +81,14 @@ class Scan:
         library, fit = self.fits.library, base.fit
         taken = {(one.effect, one.drive) for one in base.blocks}
         drives = tuple(library.local) if drive is None else (drive,)
-        offered = each(lambda d: library.local[d].offers(fit), drives)
-        offers = [offer for of_drive in offered for offer in of_drive.values()]
+
+        def of_drive(d: int) -> list[tuple[Component, float]]:
+            found = list(library.local[d].offers(fit).values())
+            self.fits.stepped()
+            return found
+
+        offered = each(of_drive, drives)
+        offers = [offer for found_there in offered for offer in found_there]
         offers += library.shared_offers(fit) if drive is None else []
         best: dict[Hashable, Scored] = {}
         for one, gain in offers:

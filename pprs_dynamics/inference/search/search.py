@@ -34,6 +34,7 @@ MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
 REFINED = 3  # of the sets fitted in a round
+USUAL_STEPS = 50  # sets fitted and drives scanned, after which a bar stands at half
 # How much worse than the best a replacement may look at the best one's noise (its own noise may
 # favour it by about as much), and how much of what is lost without it it has to make good there.
 REPLACED, RECOVERED = 15.0, 0.9
@@ -58,7 +59,7 @@ class Search:
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
         self.refuted, self.scan = refuted, Scan(fits, refuted)
-        self._report = progress or (lambda share: None)
+        self._report, self._steps = progress or (lambda share: None), 0
 
     @property
     def best(self) -> CandidateSet:
@@ -72,15 +73,23 @@ class Search:
         that bends the columns, the search ends: what would come next might only make good that
         they are not bent.
         """
+        self.fits.stepped = self._stepped
+        try:
+            return self._found(starts)
+        finally:
+            # The fits hold hundreds of megabytes, and are let go of where nothing names them.
+            self.fits.stepped = lambda: None
+            self._report(1.0)
+
+    def _found(self, starts: Sequence[Candidates]) -> CandidateSet:
         self.fits.evaluate(())
         for number, start in enumerate(starts):
             improve = self.fits.refined if number else self.rescanned
             improve(self.fits.evaluate(start))
         if len(starts) != 1:
-            self._descend(False, 0.0)
+            self._descend(False)
         if self.patterns and not self.is_beyond_point:
-            self._descend(True, 0.5)
-        self._report(1.0)
+            self._descend(True)
         return self.best
 
     def release(self) -> None:
@@ -97,12 +106,14 @@ class Search:
         return any(one.effect.bends_columns and (one.effect, one.drive) not in known
                    for one in self.best.blocks)
 
-    def _descend(self, with_patterns: bool, begin: float) -> None:
+    def _stepped(self) -> None:
+        """Report progress: how much is to be done nobody knows, but it never stands still."""
+        self._steps += 1
+        self._report(self._steps / (self._steps + USUAL_STEPS))
+
+    def _descend(self, with_patterns: bool) -> None:
         """Move from the best set to better neighbours until there is none."""
-        left = 0.5
         while True:
-            left *= 0.7
-            self._report(begin + 0.5 - left)
             before = self.best.cost
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:

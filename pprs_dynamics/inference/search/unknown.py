@@ -151,8 +151,7 @@ class PatternLibrary:
     def around(self, regression: Regression) -> PatternLibrary:
         """Return the same patterns for the same samples around another operating point."""
         series = regression.series[self.d]
-        if not (np.array_equal(series.index, self.series.index)
-                and np.array_equal(series.known, self.series.known)):
+        if not np.array_equal(series.index, self.series.index):
             return PatternLibrary(regression, self.prices, self.d, self.with_plain_forms)
         found = copy(self)
         found.regression, found.series = regression, series
@@ -161,7 +160,7 @@ class PatternLibrary:
 
     @lazy
     def _transformed(self) -> list[_Transformed]:
-        samples = hash((self.series.index.tobytes(), self.series.known.tobytes()))
+        samples = hash(self.series.index.tobytes())
 
         def transformed(family: Family) -> _Transformed:
             rows = self.series.transform(family.columns.astype(np.float32, copy=False))
@@ -264,11 +263,14 @@ class PatternLibrary:
         """Return the strongest spectral line of what a fit leaves."""
         longest = max(self.series.stretches, key=lambda part: part.stop - part.start)
         white = self.regression.whitened(fit, self.d, self._remaining(fit))[longest]
-        n, period = len(white), self.residuals.period
+        at = self.series.index[longest] - self.series.index[longest.start]
+        n, period = int(at[-1]) + 1, self.residuals.period
         lowest = self.prices.decisions.line_periods
         if n < 16 * lowest:
             return None
-        power = np.abs(np.asarray(fft.rfft(white, OVERSAMPLING * n))) ** 2
+        even = np.zeros(n)
+        even[at] = white
+        power = np.abs(np.asarray(fft.rfft(even, OVERSAMPLING * n))) ** 2
         first = int(np.ceil(lowest * OVERSAMPLING))
         frequency = (first + int(np.argmax(power[first:-1]))) / (OVERSAMPLING * n * period)
         time = self.residuals.time[longest]

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""rosbag2 recordings of sensor_msgs/JointState, MCAP or sqlite3, a directory or a bare file."""
+"""Bags of sensor_msgs/JointState, and of other messages by their fields; rosbag2 is written."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,14 +14,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.files.bag_storage import (
+    Bag,
+    damaged,
+    opened_bag,
+    require_rosbags,
+)
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
     JointStateBlocks,
     message_types,
     serialised,
 )
-from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, read_merged
+from pprs_dynamics.measurement.files.merged_states import (
+    CONTROLLER,
+    DYNAMIC,
+    Fields,
+    fields_of,
+    read_merged,
+)
 from pprs_dynamics.measurement.files.samples import (
     Defect,
     Indices,
@@ -29,37 +42,26 @@ from pprs_dynamics.measurement.files.samples import (
     Samples,
     whole_epoch,
 )
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.measurement.files.way_out import MOST, missing_names
 from pprs_dynamics.system.output_files import new_folder, scratch_folder, writable_file
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
-    from rosbags.rosbag2 import Reader
 
 LOG, LOG_INFO = 'rcl_interfaces/msg/Log', 20  # what Foxglove's log panel lists
 CONTROLLER_TYPES = (DYNAMIC, CONTROLLER)
 TOPIC_END = 'joint_states'
-# First bytes of a bare storage file, and the suffix by which rosbags knows it.
-MAGIC = {b'\x89MCAP': '.mcap', b'SQLite format 3\x00': '.db3'}
 STORAGE = {'.mcap': 'MCAP', '.db3': 'SQLITE3'}
 # Messages handled at a time: a few megabytes of bytes and objects.
 BLOCK = 8192
 
 
-def storage_suffix(path: Path) -> str | None:
-    """Return '.mcap' or '.db3' by a file's first bytes, None for anything else."""
-    require_file(path)
-    with path.open('rb') as file:
-        start = file.read(16)
-    return next((suffix for magic, suffix in MAGIC.items() if start.startswith(magic)), None)
-
-
 def read_bag(
-    path: Path, drives: tuple[str, ...], topic: str | None = None,
+    path: Path, recorded: RecordedDrives, topic: str | None = None,
     progress: Progress | None = None,
 ) -> Samples:
-    """Read a bag directory, or a bare .mcap or .db3 file.
+    """Read a bag directory, or a bare .mcap, .db3 or .bag file.
 
     Raises
     ------
@@ -68,18 +70,20 @@ def read_bag(
     MissingLibraryError
         Where rosbags is not installed.
     """
-    storage, findings = _storage_of(path)
-    _check_lengths(path, storage)
-    with _opened(path, storage) as reader:
-        connections = _chosen(path, reader, topic)
+    drives = recorded.joints or recorded.names
+    with opened_bag(path) as (bag, findings):
+        fields = fields_of(bag, recorded)
+        if fields:
+            return _of_fields(bag, drives, fields, topic, findings)
+        connections = _chosen(bag, topic)
         name = connections[0].topic
         if connections[0].msgtype != JOINT_STATE:
-            return _merged(path, reader, connections, drives, findings)
+            return _merged(bag, connections, drives, findings)
         blocks = JointStateBlocks(drives)
         total = sum(connection.msgcount for connection in connections)
-        messages, done = _messages(path, reader, connections), 0
+        messages, done = bag.messages(connections), 0
         while block := list(islice(messages, BLOCK)):
-            blocks.add([data for _, data in block], [stamp for stamp, _ in block])
+            blocks.add([data for _, _, data in block], [stamp for _, stamp, _ in block])
             done += len(block)
             if progress is not None:
                 progress(done, max(total, done))
@@ -87,13 +91,13 @@ def read_bag(
             raise UnreadableFileError(path, f'{name} holds no messages')
         if not blocks.samples:
             if set(drives) <= blocks.names:  # spread over several messages
-                return _merged(path, reader, connections, drives, findings)
+                return _merged(bag, connections, drives, findings)
             _tell_missing(path, name, drives, blocks)
         stamps, received, position, velocity, effort = blocks.arrays()
-        others = [one for one in reader.connections
+        others = [one for one in bag.connections
                   if one.msgtype == JOINT_STATE and one.topic != name]
         if topic is None and others and np.all(np.isnan(effort)):
-            merged = _merged(path, reader, [*connections, *others], drives, findings)
+            merged = _merged(bag, [*connections, *others], drives, findings)
             if np.any(np.isfinite(merged.effort)):
                 return merged
     if not np.any(stamps):
@@ -104,6 +108,17 @@ def read_bag(
     return _samples(drives, stamps, (position, velocity, effort), name, findings)
 
 
+def _of_fields(bag: Bag, drives: tuple[str, ...], fields: Fields, topic: str | None,
+               findings: list[Defect]) -> Samples:
+    """Read messages of any type by their fields, and joint states beside them."""
+    topics = {one.topic for one in fields}
+    connections = [one for one in bag.connections if one.topic in topics]
+    named = {(one.joint, one.quantity) for one in fields}
+    if any((drive, 'position') not in named for drive in drives):
+        connections += [one for one in _chosen(bag, topic) if one not in connections]
+    return _merged(bag, connections, drives, findings, fields)
+
+
 def _samples(drives: tuple[str, ...], stamps: Indices, arrays: Sequence[Array], topics: str,
              findings: list[Defect]) -> Samples:
     """Return positions, velocities and efforts at stamps [ns] as samples."""
@@ -112,22 +127,24 @@ def _samples(drives: tuple[str, ...], stamps: Indices, arrays: Sequence[Array], 
     return Samples(
         drives, (stamps - epoch * 10**9) / 1e9, position,
         None if np.all(np.isnan(velocity)) else velocity, effort, epoch,
-        f'rosbag2, {topics}', tuple(findings))
+        f'bag, {topics}', tuple(findings))
 
 
-def _merged(path: Path, reader: Reader, connections: list[Connection], drives: tuple[str, ...],
-            findings: list[Defect]) -> Samples:
+def _merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...],
+            findings: list[Defect], fields: Fields = ()) -> Samples:
     """Read states that stand in several messages or in those of controllers."""
     try:
-        merged = read_merged(reader, connections, drives)
+        merged = read_merged(bag, connections, drives, fields)
+    except UnreadableFileError:
+        raise
     except Exception as error:
-        raise UnreadableFileError(path, _damaged(error)) from None
+        raise UnreadableFileError(bag.path, damaged(error)) from None
     topics = ', '.join(sorted({one.topic for one in connections}))
-    if merged is None or not len(merged[0]):
-        raise UnreadableFileError(path, f'{topics} holds no positions of all of '
+    if merged is None or not len(merged.stamps):
+        raise UnreadableFileError(bag.path, f'{topics} holds no positions of all of '
                                   f'{", ".join(drives)} at the same times')
-    stamps, arrays, told = merged
-    return _samples(drives, stamps, arrays, topics, [*findings, *told])
+    return replace(_samples(drives, merged.stamps, merged.arrays, topics,
+                            [*findings, *merged.findings]), in_amperes=merged.in_amperes)
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],
@@ -167,7 +184,7 @@ def _stamps(samples: Samples) -> Indices:
 
 def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[str, Sequence[str]],
                      suffix: str) -> None:
-    _require_rosbags('writing rosbag2 files')
+    require_rosbags('writing bags')
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     typestore = message_types()
@@ -196,88 +213,11 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
                     writer.write(connection, stamp, row.tobytes())
 
 
-def _require_rosbags(purpose: str) -> None:
-    try:
-        import rosbags.rosbag2  # noqa: F401
-    except ImportError:
-        raise MissingLibraryError('rosbags', purpose, 'bags') from None
-
-
-def _storage_of(path: Path) -> tuple[Path, list[Defect]]:
-    """Return what rosbags can open: a directory with metadata, or a file with its suffix."""
-    if not path.is_dir():
-        suffix = storage_suffix(path)
-        if suffix is not None and path.suffix != suffix:
-            raise UnreadableFileError(
-                path, f'its content is a {suffix} file of rosbag2: its name must end so')
-        return path, []
-    if (path / 'metadata.yaml').is_file():
-        return path, []
-    found = sorted(file for file in path.iterdir() if file.suffix in STORAGE)
-    if len(found) != 1:
-        raise UnreadableFileError(
-            path, 'not a rosbag2 directory: there is no metadata.yaml'
-            + (f', and {len(found)} storage files without it have no order' if found else ''))
-    return found[0], [Defect('no_metadata', 1, 'the bag has no metadata.yaml')]
-
-
-def _check_lengths(path: Path, storage: Path) -> None:
-    """Refuse databases shorter than they say: SQLite itself reads zeros where they end."""
-    for file in storage.iterdir() if storage.is_dir() else [storage]:
-        if file.is_dir():
-            continue
-        require_file(file)
-        with file.open('rb') as data:
-            head = data.read(32)
-        if head.startswith(b'SQLite format 3') and len(head) == 32:
-            # A page size of 1 stands for 65536, which two bytes cannot hold.
-            page, pages = int.from_bytes(head[16:18]), int.from_bytes(head[28:32])
-            length = pages * (page if page > 1 else 2**16)
-            if file.stat().st_size < length:
-                raise UnreadableFileError(
-                    path, f'it is truncated: {file.stat().st_size} bytes of {length}')
-
-
-@contextmanager
-def _opened(path: Path, storage: Path) -> Iterator[Reader]:
-    _require_rosbags('reading rosbag2 files')
-    from rosbags.rosbag2 import Reader
-
-    # Damaged bytes surface in rosbags as errors of any kind, from struct's to sqlite's.
-    try:
-        reader = Reader(storage)
-        reader.open()
-    except Exception as error:
-        raise UnreadableFileError(path, _damaged(error)) from None
-    try:
-        yield reader
-    finally:
-        reader.close()
-
-
-def _messages(
-    path: Path, reader: Reader, connections: list[Connection],
-) -> Iterator[tuple[int, bytes]]:
-    try:
-        for _, stamp, data in reader.messages(connections):
-            if not (isinstance(stamp, int) and isinstance(data, bytes)):
-                # A cell of sqlite is of any type, and a flipped bit makes it another one.
-                raise TypeError('a message is no bytes')
-            yield stamp, data
-    except Exception as error:
-        raise UnreadableFileError(path, _damaged(error)) from None
-
-
-def _damaged(error: Exception) -> str:
-    reason = ' '.join(str(error).split()) or type(error).__name__
-    return ('cannot be read as rosbag2, it is truncated, damaged or something else '
-            f'({reason[:160]})')
-
-
-def _chosen(path: Path, reader: Reader, topic: str | None) -> list[Connection]:
+def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
     """Return the connections of the one topic to be read."""
-    states = [item for item in reader.connections if item.msgtype == JOINT_STATE]
-    controllers = [item for item in reader.connections
+    path = bag.path
+    states = [item for item in bag.connections if item.msgtype == JOINT_STATE]
+    controllers = [item for item in bag.connections
                    if item.msgtype in CONTROLLER_TYPES and item.msgcount]
     if topic is not None:
         states += controllers
@@ -296,9 +236,13 @@ def _chosen(path: Path, reader: Reader, topic: str | None) -> list[Connection]:
         filled = {item.topic for item in states if item.msgcount}
         matching = [name for name in matching if name in filled] or matching
         if not matching:
+            arrays = sorted({item.topic for item in bag.connections
+                             if item.msgtype.endswith('MultiArray')})
             raise UnreadableFileError(
                 path, f'there is no sensor_msgs/JointState on a topic ending in {TOPIC_END}'
-                + (f'; choose one of {", ".join(topics)} with topic' if topics else ''))
+                + (f'; choose one of {", ".join(topics)} with topic' if topics else
+                   f'; of arrays write columns: {{DRIVE: {{position: "{arrays[0]}[0]"}}}} in the '
+                   'model file' if arrays else ''))
     if len(matching) > 1:
         raise UnreadableFileError(
             path, f'there are joint states on {", ".join(matching)}: choose one with topic')
@@ -311,8 +255,9 @@ def _tell_missing(
     missing = [drive for drive in drives if drive not in blocks.names]
     if missing:
         raise UnreadableFileError(
-            path, f'{topic} lacks {", ".join(missing)}; it holds '
-            + (', '.join(sorted(blocks.names)) or 'no names'))
+            path, f'{topic} lacks {", ".join(missing[:MOST])}; it holds '
+            + (', '.join(sorted(blocks.names)[:MOST]) or 'no names')
+            + f'; {missing_names(drives, blocks.names, path.name[:40])}')
     raise UnreadableFileError(
         path, f'no single message on {topic} holds positions of all of {", ".join(drives)}')
 

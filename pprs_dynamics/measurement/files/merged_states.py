@@ -4,62 +4,150 @@
 """Joint states that stand in several messages, topics or types, merged by their stamps.
 
 sensor_msgs/JointState of some drives each, or with efforts on a topic of their own;
-control_msgs/DynamicJointState; control_msgs/JointTrajectoryControllerState. Definitions of the
-latter two are those that the bag carries.
+control_msgs/DynamicJointState; control_msgs/JointTrajectoryControllerState; messages of any type by
+the fields that a model file names. Definitions of all but the first are those that the bag carries.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections import defaultdict
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE, message_types
-from pprs_dynamics.measurement.files.samples import QUANTITIES, Defect, Indices
+from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.measurement.files.bag_storage import Bag
+from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
+from pprs_dynamics.measurement.files.samples import CURRENT, QUANTITIES, Defect, Indices
+from pprs_dynamics.measurement.files.way_out import MOST
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
-    from rosbags.rosbag2 import Reader
 
 DYNAMIC = 'control_msgs/msg/DynamicJointState'
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
+# Interfaces of ros2_control.
+INTERFACES = {'position': 'position', 'velocity': 'velocity', 'effort': 'effort',
+              'torque': 'effort', 'force': 'effort', 'current': CURRENT}
 LONGEST_STEP = 1.6  # median steps between two samples, over which nothing is interpolated
 
 
-def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str, ...],
-                ) -> tuple[Indices, list[Array], list[Defect]] | None:
-    """Return the states of all drives, at the stamps of the first one's positions.
+class Field(NamedTuple):
+    """A number in messages of any type: its topic, and the way to it, as `data[2]`."""
 
-    Returns
-    -------
-    tuple or None
-        Stamps [ns] (N,), positions, velocities and efforts (N, D) with NaN where unknown, and what
-        there is to say; None where some drive has no positions in these messages.
+    topic: str
+    way: str
+    joint: str
+    quantity: str
+
+
+Fields = Sequence[Field]
+
+
+class Merged(NamedTuple):
+    """States of all drives at the stamps of the first one's positions.
+
+    Parameters
+    ----------
+    stamps : (N,) array of int
+        [ns].
+    arrays : list of (N, D) arrays
+        Positions, velocities and efforts, NaN where unknown.
+    in_amperes : tuple of D bool
+        Drives whose efforts are currents.
+    findings : list of Defect
     """
-    typestore = _typestore(connections)
+
+    stamps: Indices
+    arrays: list[Array]
+    in_amperes: tuple[bool, ...]
+    findings: list[Defect]
+
+
+def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
+    """Return the columns of a model file that are fields of messages: `/topic.field[2]`.
+
+    Of std_msgs' arrays `/topic[2]` is enough.
+    """
+    topics = sorted({one.topic for one in bag.connections}, key=len, reverse=True)
+    columns = recorded.columns.drives if recorded.columns is not None else {}
+    found = []
+    for joint, drive in zip(recorded.joints or recorded.names, recorded.names, strict=True):
+        for quantity, column in columns[drive].names.items() if drive in columns else ():
+            name = str(column)
+            if not name.startswith('/'):
+                continue
+            topic = next((one for one in topics if name.startswith(one)
+                          and name[len(one):][:1] in ('.', '[')), None)
+            if topic is None:
+                raise UnreadableFileError(
+                    bag.path, f'no topic of the column {name}; it holds '
+                    + ', '.join(sorted(topics)[:MOST]))
+            way = name[len(topic):]
+            found.append(Field(topic, f'data{way}' if way.startswith('[') else way[1:], joint,
+                               quantity))
+    return found
+
+
+def _value(message: Any, way: str) -> float:
+    """Return a number of a message; NaN where it has none there."""
+    for name, element in re.findall(r'([^.\[\]]+)|\[(\d+)\]', way):
+        try:
+            message = getattr(message, name) if name else message[int(element)]
+        except (AttributeError, IndexError, TypeError):
+            return math.nan
+    return float(message) if isinstance(message, (int, float, np.number)) else math.nan
+
+
+def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...],
+                fields: Fields = ()) -> Merged | None:
+    """Return the states of all drives, or None where some drive has no positions.
+
+    Parameters
+    ----------
+    bag : Bag
+    connections : list of Connection
+        Topics that are read.
+    drives : tuple of D str
+    fields : sequence of Field
+        Of messages of any type.
+    """
+    typestore = bag.types(connections)
     times: dict[tuple[str, str], list[int]] = defaultdict(list)
     values: dict[tuple[str, str], list[float]] = defaultdict(list)
+    named = {(one.joint, one.quantity) for one in fields}
     commanded = False
-    for connection, received, data in reader.messages(connections):
+    for connection, received, data in bag.messages(connections):
         try:
             message = typestore.deserialize_cdr(data, connection.msgtype)
         except Exception:  # bytes that are no such message
             continue
-        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec or received
-        for joint, quantity, value, is_command in _states(message, connection.msgtype):
+        stamp = _stamp(message) or received
+        states = [(one.joint, one.quantity, _value(message, one.way), False)
+                  for one in fields if one.topic == connection.topic]
+        states += [one for one in _states(message, connection.msgtype) if one[:2] not in named]
+        for joint, quantity, value, is_command in states:
             if joint in drives and np.isfinite(value):
                 times[joint, quantity].append(stamp)
                 values[joint, quantity].append(float(value))
                 commanded |= is_command
     if any(not times[drive, 'position'] for drive in drives):
         return None
+    in_amperes = tuple(bool(times[drive, CURRENT]) and not times[drive, 'effort']
+                       for drive in drives)
     stamps = np.unique(np.array(times[drives[0], 'position'], dtype=np.int64))
-    arrays = [np.stack([
-        _at(stamps, times[drive, quantity], values[drive, quantity]) for drive in drives], axis=1)
-        for quantity in QUANTITIES]
+
+    def array(quantity: str) -> Array:
+        keys = [(drive, CURRENT if current and quantity == 'effort' else quantity)
+                for drive, current in zip(drives, in_amperes, strict=True)]
+        return np.stack([at_stamps(stamps, times[key], values[key]) for key in keys], axis=1)
+
+    arrays = [array(quantity) for quantity in QUANTITIES]
     kept = np.isfinite(arrays[0]).all(axis=1)
     topics = sorted({connection.topic for connection in connections})
     findings = [Defect('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
@@ -67,20 +155,14 @@ def read_merged(reader: Reader, connections: list[Connection], drives: tuple[str
         findings.append(Defect(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
-    return stamps[kept], [array[kept] for array in arrays], findings
+    return Merged(stamps[kept], [one[kept] for one in arrays],
+                  in_amperes if any(in_amperes) else (), findings)
 
 
-def _typestore(connections: list[Connection]) -> Any:
-    """Return types with those that the bag defines beside ROS 2's own."""
-    from rosbags.typesys import get_types_from_msg
-
-    typestore = message_types()
-    for connection in connections:
-        if connection.msgtype not in typestore.types and connection.msgdef.data:
-            found = get_types_from_msg(connection.msgdef.data, connection.msgtype)
-            typestore.register({name: fields for name, fields in found.items()
-                                if name not in typestore.types})
-    return typestore
+def _stamp(message: Any) -> int:
+    """Return the stamp of a message's header [ns], 0 where it has none."""
+    header = getattr(message, 'header', None)
+    return 0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
 
 
 def _states(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]:
@@ -93,10 +175,10 @@ def _states(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]:
                     yield joint, quantity, value, False
     elif kind == DYNAMIC:
         for joint, state in zip(message.joint_names, message.interface_values, strict=False):
-            for quantity, value in zip(state.interface_names, state.values, strict=False):
-                if quantity in QUANTITIES:
-                    yield joint, quantity, value, False
-    else:
+            for interface, value in zip(state.interface_names, state.values, strict=False):
+                if interface in INTERFACES:
+                    yield joint, INTERFACES[interface], value, False
+    elif kind == CONTROLLER:
         measured, output = message.feedback, message.output
         efforts = measured.effort if len(measured.effort) else output.effort
         for quantity, array in (('position', measured.positions),
@@ -107,7 +189,8 @@ def _states(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]:
                         quantity == 'effort' and not len(measured.effort))
 
 
-def _at(stamps: Indices, times: list[int], values: list[float]) -> Array:
+def at_stamps(stamps: Indices, times: Sequence[int] | Indices,
+              values: Sequence[float] | Array) -> Array:
     """Return a series at other stamps: exact where they are the same, else between neighbours."""
     if len(times) < 2:
         return np.full(len(stamps), np.nan)

@@ -17,10 +17,13 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array, as_numbers
 from pprs_dynamics.drives import DRIVES, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
-from pprs_dynamics.measurement.files.bag_files import read_bag, storage_suffix, write_bag
+from pprs_dynamics.measurement.files.array_files import is_lerobot
+from pprs_dynamics.measurement.files.bag_files import read_bag, write_bag
+from pprs_dynamics.measurement.files.bag_storage import is_storage
+from pprs_dynamics.measurement.files.csv_files import write_csv
 from pprs_dynamics.measurement.files.defects import Judgement
 from pprs_dynamics.measurement.files.samples import Defect, Progress, Samples
-from pprs_dynamics.measurement.files.table_files import read_csv, read_table, write_csv
+from pprs_dynamics.measurement.files.table_files import read_table
 from pprs_dynamics.system.plain_text import counted, displayed
 
 
@@ -198,15 +201,12 @@ def read_recording(
         drives = RecordedDrives(tuple(drives))
     try:
         # A name that promises a bag is read as one, for the reason why it is none.
-        is_bag = path.is_dir() or storage_suffix(path) or path.suffix in ('.mcap', '.db3')
+        is_table = is_lerobot(path) or bool(drives.columns and drives.columns.files)
+        is_bag = not is_table and is_storage(path)
         if not path.is_dir() and not path.stat().st_size:
             raise UnreadableFileError(path, 'the file is empty')
-        if drives.columns is not None and not is_bag:
-            samples = read_table(path, drives.names, drives.columns, progress)
-        else:
-            reader = read_bag if is_bag else read_csv
-            names = drives.names if drives.columns is not None else drives.joints or drives.names
-            samples = reader(path, names, topic, progress)
+        samples = (read_bag(path, drives, topic, progress) if is_bag
+                   else read_table(path, drives, topic, progress))
     except OSError as error:
         if isinstance(error, UnreadableFileError):
             raise

@@ -41,6 +41,7 @@ POLICY = {
     'merged': 'samples are those of the first drive, the others lie between their neighbours',
     'commanded_efforts': 'they stand for the efforts',
     'receive_times': 'the times at which the messages were recorded are used',
+    'epoch_unit': 'they are read so',
     'non_finite_time': 'those samples are dropped',
     'non_finite_position': 'those samples are dropped',
     'clock_reset': 'the recording is split there',
@@ -66,6 +67,7 @@ POLICY = {
     'frozen_samples': 'they are kept',
     'short_segment': 'those segments are not used',
     'too_short': 'it is kept',
+    'too_long': 'the rest is left out of fits',
 }
 
 
@@ -149,7 +151,7 @@ class Samples:
     @classmethod
     def of_columns(
         cls, drives: tuple[str, ...], time: Array, columns: Mapping[tuple[str, str], Array],
-        source: str, findings: tuple[Defect, ...] = (),
+        source: str, findings: tuple[Defect, ...] = (), epoch: int = 0,
     ) -> Samples:
         """Return the samples of a table.
 
@@ -160,19 +162,19 @@ class Samples:
             Stamps [s].
         columns : dict of (N,) arrays
             By drive and quantity: one of `QUANTITIES`, or `CURRENT`.
-        source, findings
-            As of the class.
+        source, findings, epoch
+            As of the class; `time` counts from the last.
         """
         none = np.full(len(time), np.nan)
 
         def of(quantity: str) -> Array:
             return np.column_stack([columns.get((drive, quantity), none) for drive in drives])
 
-        epoch, velocity = whole_epoch(time), of('velocity')
+        whole, velocity = whole_epoch(time), of('velocity')
         in_amperes = tuple((drive, CURRENT) in columns for drive in drives)
-        return cls(drives, time - epoch, of('position'),
+        return cls(drives, time - whole, of('position'),
                    None if np.all(np.isnan(velocity)) else velocity,
-                   np.where(in_amperes, of(CURRENT), of('effort')), epoch, source, findings,
+                   np.where(in_amperes, of(CURRENT), of('effort')), epoch + whole, source, findings,
                    in_amperes)
 
     def unit_of(self, drive: int, unit: str) -> str:

@@ -1,261 +1,283 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings in tables: CSV, Parquet and MAT files.
+"""Recordings in tables: CSV, Parquet, MAT and NumPy files, LeRobot datasets.
 
-Our own are CSV: `time`, `<drive>/position`, and optionally `<drive>/velocity`, `<drive>/effort`.
-
-In place of an effort there may be `<drive>/current` [A]. Files that end in .gz are unpacked.
-
-Read by numpy.loadtxt in blocks. A million rows of 19 columns on one core, exact to the last bit:
-pandas 1 s (a dependency), loadtxt 6 s, float() of each cell 12 s.
+A table holds `time`, `<drive>/position`, and optionally `<drive>/velocity`, `<drive>/effort`, or in
+its place `<drive>/current` [A]; or what a model file's `columns` say.
 """
 
 from __future__ import annotations
 
-import gzip
 import re
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from io import TextIOWrapper
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, TextIO, cast
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import RecordedColumns
-from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+from pprs_dynamics.drives import Column, DriveColumns, RecordedColumns, RecordedDrives
+from pprs_dynamics.errors import UnreadableFileError, meant
+from pprs_dynamics.measurement.files.array_files import ArrayTable, open_arrays
+from pprs_dynamics.measurement.files.csv_files import CsvTable
+from pprs_dynamics.measurement.files.merged_states import at_stamps
 from pprs_dynamics.measurement.files.samples import (
     CURRENT,
     QUANTITIES,
     Defect,
     Progress,
     Samples,
+    whole_epoch,
 )
-from pprs_dynamics.system.csv_tables import (
-    LONGEST_LINE,
-    cells_of,
-    check_length,
-    read_lines,
-    write_table,
-)
-from pprs_dynamics.system.numbers import parse_number
+from pprs_dynamics.measurement.files.way_out import MOST, init_command, missing_names
 from pprs_dynamics.system.plain_text import counted
 
-PARQUET, MAT = ('.parquet', '.pq'), ('.mat',)
 # The second is what PlotJuggler writes.
 TIME_COLUMNS = ('time', '__time')
-SEPARATORS = (',', ';', '\t')
+# What other programs call it.
+TIME_LIKE = ('t', 'stamp', 'timestamp', 'times', 'seconds', 'sec', 'clock', 'rostime', 'date',
+             'datetime')
+ELEMENT = re.compile(r'(.+)\[(\d+)\]')
+# From here on a stamp counts no seconds since 1970, but a thousandth, a millionth, ... of them.
+LATEST_SECOND = 1e11
+PARTS = {3: 'milli', 6: 'micro', 9: 'nano'}
+Table = CsvTable | ArrayTable
 
 
-@dataclass(frozen=True)
-class _Table:
-    """A CSV file by its header: separator, all columns, and which are used.
-
-    Those of drives and quantities had a prefix where there is one.
-    """
-
-    path: Path
-    separator: str
-    header: list[str]
-    time: int
-    columns: dict[tuple[str, str], int]
-    prefix: str = ''
-
-    @property
-    def used(self) -> list[int]:
-        """Numbers of the columns that are read: of time, and of drives and quantities."""
-        return [self.time, *self.columns.values()]
-
-    def blocks(self, file: TextIO) -> Iterator[Array]:
-        """Yield the used columns of the rows below the header, (n, columns used)."""
-        for start, lines in read_lines(self.path, file, start=2):
-            numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
-            for number, line in numbered:
-                if line.count(self.separator) != len(self.header) - 1:
-                    self._cells(number, line)
-            if numbered:
-                yield self._numbers(numbered)
-
-    def _numbers(self, numbered: list[tuple[int, str]]) -> Array:
-        text = _with_empty_cells_named(
-            '\n' + '\n'.join([line for _, line in numbered]), self.separator)
-        try:
-            rows = np.loadtxt(text[1:].split('\n'), delimiter=self.separator, usecols=self.used,
-                              comments=None, ndmin=2, quotechar='"')
-            if len(rows) == len(numbered):
-                return rows
-        except ValueError:
-            pass
-        # Slow, and seldom: to name the row or the cell, or to read cells of blanks.
-        return np.array([[self._number(number, cells, column) for column in self.used]
-                         for number, line in numbered for cells in [self._cells(number, line)]])
-
-    def _cells(self, number: int, line: str) -> list[str]:
-        cells = cells_of(self.path, number, line, self.separator)
-        if len(cells) == len(self.header):
-            return cells
-        raise UnreadableFileError(
-            self.path, f'row {number} holds {counted(len(cells), "cell")}, but the header '
-            f'{len(self.header)}: it is truncated or not a table')
-
-    def _number(self, line: int, cells: Sequence[str], column: int) -> float:
-        cell = cells[column].strip()
-        try:
-            return parse_number(cell) if cell else float('nan')
-        except ValueError:
-            comma = ' (a decimal comma is not read)' if re.fullmatch(r'[-+\d]+,\d+', cell) else ''
-            raise UnreadableFileError(
-                self.path, f'row {line}, column {self.header[column]} must hold a number, but '
-                f'holds {cell[:40]!r}{comma}') from None
-
-    def samples(self, drives: tuple[str, ...], blocks: list[Array]) -> Samples:
-        """Return what the blocks of the rows hold, and which columns were not read."""
-        time, *values = (np.concatenate([block[:, place] for block in blocks])
-                         for place in range(len(self.used)))
-        others = [name or '(no name)' for index, name in enumerate(self.header)
-                  if index not in self.used]
-        findings = (Defect(
-            'ignored_columns', len(others),
-            f'the file also holds {counted(len(others), "column")}: '
-            + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),) if others else ()
-        return Samples.of_columns(drives, time, dict(zip(self.columns, values, strict=True)),
-                                  f'CSV, {self.prefix}' if self.prefix else 'CSV', findings)
-
-
-def read_csv(
-    path: Path, drives: tuple[str, ...], topic: str | None = None,
-    progress: Progress | None = None, names: RecordedColumns | None = None,
-) -> Samples:
-    """Read a CSV with a header; comma, semicolon or tab between columns in any order.
+def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
+               progress: Progress | None = None) -> Samples:
+    """Read a table, or several that make one recording.
 
     Parameters
     ----------
-    names : RecordedColumns, optional
-        Of columns that have names of their own; blanks and | may be between these, too.
+    path : Path
+        .parquet, .mat (up to version 7.2), .npz, a LeRobot dataset, or anything else as CSV;
+        where the model names several files, their folder or one of them.
+    drives : RecordedDrives
     topic : str, optional
         Where columns have prefixes, as in `/joint_states/lift_1/position`: the one to take, if
         there are several.
+    progress : callable, optional
+        Called with (done, total) now and then.
 
     Raises
     ------
     UnreadableFileError
-        Where it is no such table, a drive is missing, or a cell is not a number.
+        Where it is no such table, a drive or a column is missing, or a cell is not a number.
+    MissingLibraryError
+        For Parquet without pyarrow.
     """
-    try:
-        size = path.stat().st_size
-        with (path.open('rb') as raw, _unpacked(path, raw) as content,
-              TextIOWrapper(content, encoding='utf-8-sig') as file):
-            first = file.readline(LONGEST_LINE + 1)
-            if not first:
-                raise UnreadableFileError(path, 'the file is empty')
-            check_length(path, 1, first)
-            table = (_columns(path, first, drives, topic) if names is None
-                     else _named_columns(path, first, drives, names))
-            blocks = []
-            for block in table.blocks(file):
-                blocks.append(block)
-                if progress is not None:
-                    progress(min(raw.tell(), size), size)
-    except OSError as error:
-        if isinstance(error, UnreadableFileError):
-            raise
-        raise UnreadableFileError(path, error.strerror or str(error)) from None
-    except (EOFError, zlib.error):
-        raise UnreadableFileError(path, 'damaged: it cannot be unpacked to its end') from None
-    except UnicodeDecodeError:
-        raise UnreadableFileError(
-            path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8') from None
-    if not blocks:
-        raise UnreadableFileError(path, 'no samples below the header')
-    return table.samples(drives, blocks)
+    columns = drives.columns or RecordedColumns()
+    samples = (_of_several(path, drives, columns, progress) if columns.files else
+               _of_one(path, drives, columns, topic, progress))
+    of_drives = [columns.drives.get(drive, DriveColumns({})) for drive in drives.names]
+    velocity = samples.velocity
+    return replace(
+        samples, position=samples.position * [one.position_scale for one in of_drives],
+        velocity=None if velocity is None else velocity * [
+            one.velocity_scale for one in of_drives],
+        effort=samples.effort * [one.effort_scale for one in of_drives])
 
 
-def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:
-    return cast('IO[bytes]', gzip.GzipFile(fileobj=raw)) if path.suffix == '.gz' else raw
+def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Table:
+    """Return a table by its first bytes; see `CsvTable.open`."""
+    return open_arrays(path) or CsvTable.open(path, decimal, likely)
 
 
-def write_csv(path: Path, samples: Samples) -> None:
-    """Write samples as CSV, exact to the last digit; NaN as an empty cell.
+def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
+            progress: Progress | None) -> Samples:
+    table = _opened(path, columns)
+    time = _time_column(table, columns)
+    chosen, prefix = _chosen(table, drives, columns, topic)
+    wanted = [*chosen.values()] if time is None else [time, *chosen.values()]
+    arrays = _read(table, wanted, time, progress)
+    seconds, epoch, told = _seconds(None if time is None else arrays[time], columns,
+                                    len(arrays[wanted[-1]]))
+    return Samples.of_columns(
+        drives.joints or drives.names, seconds, {key: arrays[one] for key, one in chosen.items()},
+        _source(path, columns, prefix), (*told, *_ignored(table, wanted)), epoch)
 
-    Times stay counted from `epoch`, which is not written: as floats they would lose digits.
-    """
-    quantities = [(name, values) for name, values in zip(
-        QUANTITIES, (samples.position, samples.velocity, samples.effort), strict=True)
-        if values is not None]
-    header = ['time', *(f'{drive}/{name}' for name, _ in quantities for drive in samples.drives)]
-    write_table(path, header, [samples.time, *(values for _, values in quantities)])
+
+def _opened(path: Path, columns: RecordedColumns) -> Table:
+    named = [one for of in columns.drives.values() for one in of.names.values()]
+    return open_table(path, columns.decimal,
+                      [one for one in (columns.time, *named) if isinstance(one, str)])
 
 
-def _columns(
-    path: Path, first: str, drives: tuple[str, ...], topic: str | None,
-) -> _Table:
-    """Return what the header says, by the names of our own format."""
-    headers = _headers(path, first, SEPARATORS)
-    separator = max(SEPARATORS, key=lambda s: len(headers[s]))
-    header = headers[separator]
-    time = next((name for name in TIME_COLUMNS if name in header), None)
-    if time is None:
-        raise UnreadableFileError(
-            path, 'not a recording: the header must hold time and <drive>/position, but is '
-            f'{first.strip()[:80]!r}')
-    found: dict[str, dict[tuple[str, str], int]] = {}
-    for index, name in enumerate(header):
+def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
+    kind = 'LeRobot' if path.is_dir() else path.suffix.lstrip('.') or 'table'
+    if columns.time is not None or any(of.names for of in columns.drives.values()):
+        return f'{kind} by columns of the model file'
+    kind = {'mat': 'MAT', 'parquet': 'Parquet', 'npz': 'NumPy'}.get(kind, 'CSV')
+    return f'{kind}, {prefix}' if prefix else kind
+
+
+def _time_column(table: Table, columns: RecordedColumns) -> Column | None:
+    """Return the column of times; None where a rate stands for them."""
+    if columns.time is not None:
+        _require(table, [columns.time])
+        return columns.time
+    if columns.rate is not None:
+        return None
+    time = next((name for name in TIME_COLUMNS if name in table.names), None)
+    if time is not None:
+        return time
+    words = {re.sub('[^a-z]', '', name.lower()): name for name in reversed(table.names)}
+    likely = next((words[word] for word in TIME_LIKE if word in words), None)
+    # A header of one word, or of many, is no table of ours: a letter, a log.
+    head = ', '.join(table.names[:6])[:80] or 'numbers alone'
+    raise UnreadableFileError(
+        table.path, f'not a recording as it is: the header must hold time and <drive>/position, '
+        f'but is {head!r}; '
+        + (f'write columns: {{time: {likely}}} in the model file, or: ' if likely else '')
+        + init_command(table.path.name[:40]))
+
+
+def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
+            ) -> tuple[dict[tuple[str, str], Column], str]:
+    """Return the column of each joint and quantity, and the prefix of those of our own format."""
+    joints = drives.joints or drives.names
+    named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
+             for quantity, column in columns.drives.get(drive, DriveColumns({})).names.items()}
+    _require(table, list(named.values()))
+    ours = tuple(joint for joint in joints if (joint, 'position') not in named)
+    if not ours:
+        return named, ''
+    found: dict[str, dict[tuple[str, str], Column]] = {}
+    for name in table.names:
         joint, slash, quantity = name.rpartition('/')
         prefix, _, drive = joint.rpartition('/')
         if slash and quantity in (*QUANTITIES, CURRENT):
             of_prefix = found.setdefault(prefix, {})
             if (drive, quantity) in of_prefix:
-                raise UnreadableFileError(path, f'the column {name!r} stands twice')
-            of_prefix[drive, quantity] = index
-    if header.count(time) > 1:
-        raise UnreadableFileError(path, f'the column {time!r} stands twice')
-    prefix = _prefix(path, found, drives, topic)
-    columns = {key: index for key, index in found[prefix].items() if key[0] in drives}
-    for drive in drives:
-        if (drive, 'effort') in columns:
-            columns.pop((drive, CURRENT), None)
-    return _Table(path, separator, header, header.index(time), columns, prefix)
+                raise UnreadableFileError(table.path, f'the column {name!r} stands twice')
+            of_prefix[drive, quantity] = name
+    for name in TIME_COLUMNS:
+        if table.names.count(name) > 1:
+            raise UnreadableFileError(table.path, f'the column {name!r} stands twice')
+    prefix = _prefix(table.path, found, ours, topic)
+    chosen = {key: name for key, name in found[prefix].items() if key[0] in ours}
+    for joint in ours:
+        if (joint, 'effort') in chosen:
+            chosen.pop((joint, CURRENT), None)
+    return {**chosen, **named}, prefix
 
 
-def _named_columns(
-    path: Path, first: str, drives: tuple[str, ...], names: RecordedColumns,
-) -> _Table:
-    """Return what the header says, of columns with names of their own."""
-    headers = _headers(path, first, (*SEPARATORS, ' ', '|'))
-    separator = next((each for each, cells in headers.items() if names.time in cells), ',')
-    header = headers[separator]
-    wanted = _names_of_columns(names, drives)
-    _require_columns(path, [names.time, *wanted.values()], header)
-    return _Table(path, separator, header, header.index(names.time),
-                  {key: header.index(name) for key, name in wanted.items()})
-
-
-def _names_of_columns(names: RecordedColumns, drives: Sequence[str]) -> dict[tuple[str, str], str]:
-    """Return the names of columns by drive and quantity."""
-    return {(drive, quantity): name for drive in drives
-            for quantity, name in names.drives[drive].names.items()}
-
-
-def _require_columns(path: Path, wanted: Sequence[str], known: Sequence[str]) -> None:
+def _require(table: Table, wanted: Sequence[Column]) -> None:
     """Raise UnreadableFileError where a table lacks a column."""
-    missing = [name for name in wanted if name not in known]
-    if missing:
-        raise UnreadableFileError(path, f'no column {missing[0]!r}; it holds '
-                                  + (', '.join(sorted(known)[:12]) or 'none'))
+    for column in wanted:
+        if not isinstance(column, int) and not _holder(table, column):
+            if not table.names:
+                raise UnreadableFileError(
+                    table.path, f'no column {column!r}: it has no header, so columns must be '
+                    'numbers from 1')
+            close = meant(column, table.names)
+            raise UnreadableFileError(
+                table.path, f'no column {column!r}' + (f' (did you mean {close}?)' if close else '')
+                + '; it holds ' + (', '.join(sorted(table.names)[:MOST]) or 'none'))
 
 
-def _headers(path: Path, first: str, separators: Sequence[str]) -> dict[str, list[str]]:
-    if '\x00' in first:
-        raise UnreadableFileError(path, 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8')
-    return {separator: [cell.strip() for cell in cells_of(path, 1, first.rstrip('\n'), separator)]
-            for separator in separators}
+def _holder(table: Table, column: str) -> tuple[str, int | None] | None:
+    """Return the name that a column is under, and which element of its lists it is."""
+    if column in table.names:
+        return column, None
+    element = ELEMENT.fullmatch(column)
+    return ((element[1], int(element[2]))
+            if element and isinstance(table, ArrayTable) and element[1] in table.names else None)
+
+
+def _read(table: Table, wanted: Sequence[Column], time: Column | None,
+          progress: Progress | None) -> dict[Column, Any]:
+    """Return columns, (N,) each."""
+    if isinstance(table, CsvTable):
+        return dict(zip(wanted, table.read(wanted, progress), strict=True))
+    places: dict[Column, tuple[str, int | None]] = {}
+    for column in wanted:
+        if isinstance(column, int):
+            raise UnreadableFileError(table.path, f'no column {column}: its columns have names, '
+                                      + ', '.join(sorted(table.names)[:MOST]))
+        places[column] = _holder(table, column) or (column, None)
+    loaded = table.load(list(dict.fromkeys(name for name, _ in places.values())))
+    length = None if time is None else np.asarray(loaded[places[time][0]]).size
+    arrays: dict[Column, Any] = {
+        column: _series(table.path, name, loaded[name], element, None if column == time else length)
+        for column, (name, element) in places.items()}
+    lengths = {len(values) for values in arrays.values()}
+    if len(lengths) > 1:
+        short = min(arrays, key=lambda name: len(arrays[name]))
+        raise UnreadableFileError(table.path, f'column {short!r} has {len(arrays[short])} rows, '
+                                  f'must have {max(lengths)}, as others')
+    return arrays
+
+
+def _series(path: Path, name: str, values: Any, element: int | None, length: int | None) -> Any:
+    """Return an array, or one element of each of its lists, as (N,)."""
+    array = np.asarray(values)
+    if not np.issubdtype(array.dtype, np.datetime64):
+        try:
+            array = array if array.dtype.kind in 'iu' else array.astype(float)
+        except (TypeError, ValueError):
+            raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'
+                                      ) from None
+    array = np.squeeze(array) if array.size > 1 else array.ravel()
+    if array.ndim == 2 and (array.shape[0] != length if length else
+                            array.shape[0] < array.shape[1]):
+        array = array.T
+    if array.ndim == 1 and not element:
+        return array
+    if array.ndim != 2:
+        raise UnreadableFileError(path, f'column {name!r} has the shape {array.shape}, must hold '
+                                  'numbers, or lists of them')
+    count = array.shape[1]
+    if element is None or element >= count:
+        raise UnreadableFileError(path, f'column {name!r} holds lists of {count}, must be named '
+                                  f'{name}[0] to {name}[{count - 1}]')
+    return array[:, element]
+
+
+def _seconds(stamps: Any, columns: RecordedColumns, count: int,
+             ) -> tuple[Array, int, tuple[Defect, ...]]:
+    """Return times [s], whole seconds that they count from, and what was made of the stamps."""
+    if stamps is None:
+        assert columns.rate is not None
+        return np.arange(count) / columns.rate, 0, ()
+    if np.issubdtype(stamps.dtype, np.datetime64):
+        stamps = stamps.astype('datetime64[ns]').astype(np.int64)
+    scale = columns.time_scale
+    told: tuple[Defect, ...] = ()
+    if scale is None:
+        finite = stamps[np.isfinite(stamps)]
+        largest = float(np.median(finite)) if len(finite) else 0.0
+        power = 0
+        while largest > LATEST_SECOND and power < max(PARTS):
+            largest, power = largest / 1e3, power + 3
+        scale = 10.0 ** -power
+        if power:
+            told = (Defect('epoch_unit', len(stamps),
+                           f'the stamps count {PARTS[power]}seconds since 1970'),)
+    if stamps.dtype.kind in 'iu' and scale <= 1:
+        # As floats, nanoseconds since 1970 are off by a quarter of a microsecond.
+        unit = round(1 / scale)
+        epoch = whole_epoch(stamps / unit)
+        return (stamps - epoch * unit) / unit, epoch, told
+    return stamps * scale, 0, told
+
+
+def _ignored(table: Table, wanted: Sequence[Column]) -> tuple[Defect, ...]:
+    used = {table.names[one - 1] if isinstance(one, int) and table.names else
+            one if isinstance(one, int) else (_holder(table, one) or (one,))[0] for one in wanted}
+    others = [name or '(no name)' for name in table.names if name not in used]
+    if not others:
+        return ()
+    return (Defect('ignored_columns', len(others),
+                   f'the file also holds {counted(len(others), "column")}: '
+                   + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),)
 
 
 def _prefix(
-    path: Path, found: dict[str, dict[tuple[str, str], int]], drives: tuple[str, ...],
+    path: Path, found: Mapping[str, Mapping[tuple[str, str], Column]], drives: tuple[str, ...],
     topic: str | None,
 ) -> str:
     """Return the prefix whose columns hold all drives."""
@@ -272,9 +294,10 @@ def _prefix(
                  for drive, quantity in columns if quantity == 'position'}
         missing = [drive for drive in drives if drive not in known] or list(drives)
         raise UnreadableFileError(
-            path, f'no {", ".join(f"{drive}/position" for drive in missing)}'
+            path, f'no {", ".join(f"{drive}/position" for drive in missing[:MOST])}'
             + (f' under {topic}' if topic else '') + '; there are positions of '
-            + (', '.join(joints) or 'no joint'))
+            + (', '.join(joints[:MOST]) or 'no joint')
+            + f'; {missing_names(drives, known, path.name[:40])}')
     # The plain names are the format; prefixes are a courtesy to other tools.
     if '' in complete:
         return ''
@@ -284,101 +307,89 @@ def _prefix(
     return complete[0]
 
 
-def _with_empty_cells_named(text: str, separator: str) -> str:
-    """Return lines, after a first newline, with nan in cells of no character."""
-    # Plain searches: a regular expression for the same takes as long as reading the numbers.
-    if '\n' + separator in text:
-        text = text.replace('\n' + separator, '\nnan' + separator)
-    if separator + '\n' in text or text.endswith(separator):
-        text = (text + '\n').replace(separator + '\n', separator + 'nan\n')[:-1]
-    if separator * 2 in text:
-        # Twice: of three separators in a row the first replacement sees only one pair.
-        for _ in range(2):
-            text = text.replace(separator * 2, separator + 'nan' + separator)
-    return text
+# ------------------------------------------------------------ several files of one recording
 
 
-def read_table(path: Path, drives: tuple[str, ...], columns: RecordedColumns,
-               progress: Progress | None = None) -> Samples:
-    """Read a table by its own names.
+def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
+                progress: Progress | None) -> Samples:
+    """Read files of one quantity each, at the times of the positions."""
+    files = files_of(path, columns.files)
+    shared = None
+    if 'time' in files:
+        table = _opened(files['time'], columns)
+        own: Column = columns.time if columns.time is not None else next(
+            (name for name in TIME_COLUMNS if name in table.names), 1)
+        shared = next(iter(_read(table, [own], None, None).values()))
+    stamps: Array | None = None
+    epoch = 0
+    joints, arrays, told = drives.joints or drives.names, {}, []
+    for quantity, file in sorted(files.items(), key=lambda one: one[0] != 'position'):
+        if quantity == 'time':
+            continue
+        table = _opened(file, columns)
+        chosen = {joint: columns.drives[drive].names[quantity]
+                  for joint, drive in zip(joints, drives.names, strict=True)
+                  if quantity in columns.drives[drive].names}
+        _require(table, list(chosen.values()))
+        time = None if shared is not None else _time_column(table, columns)
+        read = _read(table, [*([] if time is None else [time]), *chosen.values()], time, progress)
+        series = {joint: read[column] for joint, column in chosen.items()}
+        count = len(next(iter(series.values()), ()))
+        if shared is not None and count != len(shared):
+            raise UnreadableFileError(file, f'it has {counted(count, "row")}, but '
+                                      f'{files["time"].name} {len(shared)}')
+        seconds, start, found = _seconds(shared if time is None else read[time], columns, count)
+        if stamps is None:
+            stamps, epoch, told = seconds, start, list(found)
+        seconds = seconds + (start - epoch)
+        if len(seconds) != len(stamps) or np.any(seconds != stamps):
+            told.append(Defect('merged', len(stamps), f'{file.name} has times of its own'))
+            whole, at = (np.rint((one - stamps[0]) * 1e9).astype(np.int64)
+                         for one in (seconds, stamps))
+            series = {joint: at_stamps(at, whole, values) for joint, values in series.items()}
+        arrays.update({(joint, quantity): values for joint, values in series.items()})
+    assert stamps is not None
+    return Samples.of_columns(joints, stamps, arrays, _source(path, columns), tuple(told), epoch)
+
+
+def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:
+    """Return the files that make a recording, by quantity.
 
     Parameters
     ----------
     path : Path
-        .parquet, .mat (up to version 7.2), or anything else as CSV.
-    drives : tuple of D str
-    columns : RecordedColumns
-    progress : callable, optional
-        Called with (done, total) now and then.
+        Their folder, or one of them.
+    names : mapping
+        By quantity; * stands for what recordings in one folder differ in.
 
     Raises
     ------
     UnreadableFileError
-        Where it is no such table, or lacks a column.
-    MissingLibraryError
-        For Parquet without pyarrow.
+        Where one is missing, or cannot be told.
     """
-    samples = (_of_arrays(path, drives, columns) if path.suffix in (*PARQUET, *MAT)
-               else read_csv(path, drives, progress=progress, names=columns))
-    scale = np.array([columns.drives[drive].position_scale for drive in drives])
-    velocity = samples.velocity
-    return replace(
-        samples, position=samples.position * scale,
-        velocity=None if velocity is None else velocity * scale,
-        effort=samples.effort * [columns.drives[drive].effort_scale for drive in drives],
-        source=f'{path.suffix.lstrip(".") or "table"} by columns of the model file')
-
-
-def _of_arrays(path: Path, drives: tuple[str, ...], columns: RecordedColumns) -> Samples:
-    names = _names_of_columns(columns, drives)
-    wanted = [columns.time, *names.values()]
-    table = (_parquet if path.suffix in PARQUET else _mat)(path, wanted)
-    _require_columns(path, wanted, list(table))
-    arrays = {name: _as_numbers(path, name, table[name]) for name in wanted}
-    lengths = {len(values) for values in arrays.values()}
-    if len(lengths) > 1:
-        short = min(arrays, key=lambda name: len(arrays[name]))
-        raise UnreadableFileError(path, f'column {short!r} has {len(arrays[short])} rows, '
-                                  f'must have {max(lengths)}, as others')
-    return Samples.of_columns(drives, arrays[columns.time],
-                              {key: arrays[name] for key, name in names.items()}, '')
-
-
-def _as_numbers(path: Path, name: str, values: Any) -> Array:
-    try:
-        array: Array = np.asarray(values, dtype=float).ravel()
-    except (TypeError, ValueError):
-        raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'
-                                  ) from None
-    return array
-
-
-def _parquet(path: Path, wanted: list[str]) -> Mapping[str, Any]:
-    try:
-        from pyarrow import ArrowException
-        from pyarrow.parquet import ParquetFile
-    except ImportError:
-        raise MissingLibraryError('pyarrow', 'reading Parquet files', 'tables') from None
-    try:
-        file = ParquetFile(path)
-        names = file.schema_arrow.names
-        table = file.read([name for name in wanted if name in names])
-    except (ArrowException, OSError) as error:
-        raise UnreadableFileError(path, f'no Parquet file ({str(error).splitlines()[0][:120]})'
-                                  ) from None
-    return {name: table[name].to_numpy() if name in table.column_names else () for name in names}
-
-
-def _mat(path: Path, wanted: list[str]) -> Mapping[str, Any]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        content = loadmat(path, squeeze_me=True)
-    except NotImplementedError:
-        raise UnreadableFileError(path, 'a MAT file of version 7.3, must be saved with -v7'
-                                  ) from None
-    except (MatReadError, ValueError, TypeError, OSError, EOFError, IndexError) as error:
-        raise UnreadableFileError(path, f'no MAT file ({str(error).splitlines()[0][:120]})'
-                                  ) from None
-    return {name: value for name, value in content.items() if not name.startswith('__')}
+    if path.is_dir():
+        folder, star = path, None
+        if '*' in names['position']:
+            fitting = sorted(folder.glob(names['position']))
+            if len(fitting) != 1:
+                raise UnreadableFileError(
+                    path, f'{counted(len(fitting), "file")} of the name {names["position"]}: name '
+                    'one of them instead of the folder')
+            return files_of(fitting[0], names)
+    else:
+        folder = path.parent
+        fits = [re.fullmatch(re.escape(Path(name).name).replace(r'\*', '(.*)'), path.name)
+                for name in names.values()]
+        fit = next(filter(None, fits), None)
+        if fit is None:
+            raise UnreadableFileError(
+                path, f'it is none of {", ".join(names.values())}, of which columns.files say '
+                'that they make one recording')
+        star = next(iter(fit.groups()), None)
+        if len(Path(names['position']).parts) > 1:  # they may lie in folders of their own
+            folder = folder.parent
+    found = {quantity: folder / name.replace('*', star or '') for quantity, name in names.items()}
+    for quantity, file in found.items():
+        if not file.is_file():
+            raise UnreadableFileError(file, f'no such file, which columns.files.{quantity} names')
+    return found

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 

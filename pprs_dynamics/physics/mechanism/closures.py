@@ -48,6 +48,7 @@ ROWS: dict[str, tuple[Row, ...]] = {
 # Files round angles such as pi / 2 to four digits; poorer conditions make no robot.
 RANK = 1e-4  # of the largest singular value
 OPEN = 1e-4  # of the size: by which a loop may be open at home, in rows that others imply
+OPEN_IN_MOTION = 1e-3  # the same in a motion, where roundings of a file add up
 TRIES = 60  # Newton steps to home
 LONGEST_STEP = 0.2  # of the size, or rad, in one of them
 CLOSED_HOME = 1e-12  # of the size

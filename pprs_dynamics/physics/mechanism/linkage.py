@@ -21,6 +21,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Loads,
     Motion,
     Tables,
+    Wrenches,
     apply_bodies,
     gap,
     gradients,
@@ -92,10 +93,11 @@ def predict(t: Tables, one: Motion, goal: Any, start: Any) -> None:
             start[t.passive[c]] += one.T[t.passive[c], d] * moved
 
 
-def _press(t: Tables, m: Motion, inertial: Any, gravity: Any, with_reactions: bool, o: Loads,
-           ) -> None:
+def _press(t: Tables, m: Motion, inertial: Any, gravity: Any, x: Wrenches, with_reactions: bool,
+           o: Loads) -> None:
     for s in range(len(m.q)):
-        apply_bodies(t, motion_at(m, s), inertial, gravity, loads_at(o, s))
+        applied = Wrenches(x.joint, x.force[s], x.moment[s])
+        apply_bodies(t, motion_at(m, s), inertial, gravity, applied, loads_at(o, s))
         if with_reactions:
             react(t, motion_at(m, s), loads_at(o, s))
 
@@ -108,6 +110,13 @@ def _twist(t: Tables, m: Motion, W: Any, U: Any) -> None:
 def _rub(t: Tables, m: Motion, o: Loads, friction: JointFriction, W: Any, efforts: Any) -> None:
     for s in range(len(m.q)):
         rub(t, motion_at(m, s), loads_at(o, s), friction, W[s], efforts[s])
+
+
+def _openings(t: Tables, m: Motion, found: Any) -> None:
+    for s in range(len(m.q)):
+        one = motion_at(m, s)
+        for r in range(len(t.row_loop)):
+            found[s, r] = gap(t, one, r)
 
 
 def _survey(t: Tables, m: Motion, column_of: Any, gaps: Any, J: Any) -> None:
@@ -192,15 +201,42 @@ def follow(t: Tables, home: Array, q: Array, v: Array, a: Array, start: Array | 
     return m, int(np.argmax(~(size < np.inf) | (size == np.max(size))))
 
 
-def press(t: Tables, m: Motion, inertial: Array, gravity: Array, with_reactions: bool) -> Loads:
-    """Return the forces that move bodies (J + 1, 10), with or without reactions of closures."""
+def openings(t: Tables, m: Motion) -> Array:
+    """Return by how much closures are open at samples of a motion, (N, r) [m, rad].
+
+    The rows may be others than those that the motion was closed by.
+    """
+    found = np.zeros((len(m.q), len(t.row_loop)))
+    loop = compiled_or_none(_openings)
+    if loop is not None:
+        loop(t, m, found)
+    else:
+        views = samples_last(m)
+        for r in range(len(t.row_loop)):
+            found[:, r] = gap(t, views, r)
+    return found
+
+
+def no_wrenches(samples: int) -> Wrenches:
+    """Return no wrenches at so many samples."""
+    return Wrenches(np.zeros(0, dtype=np.int64), *np.zeros((2, samples, 0, 3)))
+
+
+def press(t: Tables, m: Motion, inertial: Array, gravity: Array, wrenches: Wrenches,
+          with_reactions: bool) -> Loads:
+    """Return the forces that move bodies (J + 1, 10) and apply wrenches.
+
+    With or without reactions of closures.
+    """
     o = new_loads(t, m)
     loop = compiled_or_none(_press)
     if loop is not None:
-        loop(t, m, inertial, gravity, with_reactions, o)
+        loop(t, m, inertial, gravity, wrenches, with_reactions, o)
         return o
     views = samples_last(m), samples_last(o)
-    apply_bodies(t, views[0], inertial, gravity, views[1])
+    applied = wrenches._replace(force=np.moveaxis(wrenches.force, 0, -1),
+                                moment=np.moveaxis(wrenches.moment, 0, -1))
+    apply_bodies(t, views[0], inertial, gravity, applied, views[1])
     if with_reactions:
         react(t, *views)
     return o

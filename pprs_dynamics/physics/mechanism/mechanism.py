@@ -13,18 +13,33 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
+from pprs_dynamics.physics.mechanism.closures import OPEN_IN_MOTION
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage import follow, friction_efforts, press, twists
-from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction, Loads, Motion
+from pprs_dynamics.physics.mechanism.linkage import (
+    follow,
+    friction_efforts,
+    no_wrenches,
+    openings,
+    press,
+    twists,
+)
+from pprs_dynamics.physics.mechanism.linkage_equations import (
+    TRANSLATION,
+    JointFriction,
+    Loads,
+    Motion,
+    Wrenches,
+)
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.system.parallel import lazy
 
 # Condition number of the loops, lengths in units of the mechanism's size, over that at home.
@@ -156,6 +171,7 @@ class Linkage:
         found = cls(structure, motion, (position, velocity, acceleration))
         if len(t.row_loop):
             found._require_regular()
+        found._require_closed()
         return found
 
     def is_of(self, position: Array, velocity: Array, acceleration: Array) -> bool:
@@ -184,6 +200,27 @@ class Linkage:
                 worst, f'the loops are {condition[worst]:.3g} times worse conditioned than at home',
                 f'must be below {WORST_CONDITION:g}: the drives nearly lose hold')
 
+    def _require_closed(self) -> None:
+        """Raise WorkspaceError where rows that others implied at home no longer follow from them.
+
+        At a home where joints are in line, others become dependent than elsewhere.
+        """
+        rows = self.structure.implied
+        if not len(rows.row_loop):
+            return
+        gaps = openings(rows, self.motion)
+        size = np.abs(gaps) / rows.row_unit
+        if np.all(size < OPEN_IN_MOTION):
+            return
+        sample = int(np.argmax(~np.all(size < OPEN_IN_MOTION, axis=1)))
+        row = int(np.argmax(size[sample]))
+        amount = (f'{1e3 * abs(gaps[sample, row]):.3g} mm' if rows.row_kind[row] == TRANSLATION
+                  else f'{np.degrees(abs(gaps[sample, row])):.3g} degrees')
+        raise WorkspaceError(
+            sample, f'the loop {self.structure.loops[rows.row_loop[row]].name} is open by {amount}',
+            'must close as at home, where it follows from the other loops and joints alone: name a '
+            'robot.home at which no links are in line')
+
     def frame_of(self, link: str) -> Frame:
         """Return the frames of a link in the base's, R (N, 3, 3) and p (N, 3)."""
         row, frame = self.structure.links[link]
@@ -195,18 +232,21 @@ class Linkage:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
         return twists(self.structure.tables, self.motion)
 
-    def loads(self, mechanism: Mechanism, with_reactions: bool = False) -> Loads:
-        """Return the forces that move the bodies."""
+    def loads(self, mechanism: Mechanism, wrenches: Wrenches | None = None,
+              with_reactions: bool = False) -> Loads:
+        """Return the forces that move the bodies and apply wrenches, by default none."""
+        if wrenches is None:
+            wrenches = no_wrenches(len(self.motion.q))
         return press(self.structure.tables, self.motion, mechanism.by_joint,
-                     np.array(mechanism.gravity, dtype=float), with_reactions)
+                     np.array(mechanism.gravity, dtype=float), wrenches, with_reactions)
 
     def efforts(self, mechanism: Mechanism) -> Array:
         """Return the efforts of the drives that move the bodies, (N, D)."""
         efforts: Array = self.loads(mechanism).efforts
         return efforts
 
-    def wrench_efforts(self, wrench: Array) -> Array:
-        """Return the efforts of wrenches that the tool applies, (N, D).
+    def at_tool(self, wrench: Array) -> Wrenches:
+        """Return wrenches that the tool applies.
 
         Parameters
         ----------
@@ -214,12 +254,10 @@ class Linkage:
             Force [N] and moment about the tool's origin [N m], in the base's axes.
         """
         row, _ = self.structure.links[self.structure.tool]
-        W, U = (each[:, row] for each in self.twists)
         arm = self.frame_of(self.structure.tool).p - self.motion.p[:, row]
         force, moment = wrench[:, :3], wrench[:, 3:] + np.cross(arm, wrench[:, :3])
-        efforts: Array = (np.einsum('nid,ni->nd', U, force)
-                          + np.einsum('nid,ni->nd', W, moment))
-        return efforts
+        return Wrenches(np.array([row], dtype=np.int64), np.ascontiguousarray(force)[:, None],
+                        np.ascontiguousarray(moment)[:, None])
 
     def regressor(self, mechanism: Mechanism) -> Array:
         """Return the derivatives of the efforts by the bodies' parameters, (N, D, 10 B)."""
@@ -264,6 +302,11 @@ class LinkageState(JointMotion):
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Linkage | None = field(default=None, kw_only=True)
 
+    def __getitem__(self, samples: Any) -> Self:
+        """Return the samples that a slice, a mask or indices select, with their load."""
+        return replace(super().__getitem__(samples), known=None,
+                       load=None if self.load is None else self.load.at(samples))
+
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
@@ -287,19 +330,22 @@ class LinkageState(JointMotion):
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
         efforts: Array = self.reactions.efforts + self.robot.armature * self.acceleration
-        if self.load is not None:
-            efforts = efforts + self.linkage.wrench_efforts(self.load.wrench)
         return efforts
 
     @lazy
     def guide_load(self) -> Array:
-        """What a drive's gear carries: the size of its effort without friction [N m, N]."""
-        return np.abs(self.rigid_force)
+        """What a drive's gear carries [N m, N]: the size of its effort without friction.
+
+        The motor accelerates its rotor on its own side of the gear.
+        """
+        load: Array = np.abs(self.reactions.efforts)
+        return load
 
     @lazy
     def reactions(self) -> Loads:
         """What joints and closures transmit without friction."""
-        return self.linkage.loads(self.robot, with_reactions=True)
+        wrenches = None if self.load is None else self.linkage.at_tool(self.load.wrench)
+        return self.linkage.loads(self.robot, wrenches, with_reactions=True)
 
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""

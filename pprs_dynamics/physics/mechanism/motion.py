@@ -15,16 +15,15 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array, Sample
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate_if_ready
 from pprs_dynamics.physics.mechanism.motion_checks import (
     UNIT_LENGTH_TOLERANCE,
     checked_matrix,
     checked_times,
     normalised,
 )
+from pprs_dynamics.physics.mechanism.motion_sample import rotation
 from pprs_dynamics.physics.mechanism.pose_spline import checked_poses, spline_rows
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate_if_ready
-from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
-from pprs_dynamics.physics.three_pprs.motion_sample import rotation
 
 QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
               'linear_acceleration', 'angular_acceleration')

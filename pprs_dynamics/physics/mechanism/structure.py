@@ -47,6 +47,8 @@ class Structure:
     description : Description
     tables : Tables
         Their drives are in the model's order.
+    implied : Tables
+        With the rows of closures that follow from the others at home instead.
     drives : tuple of str
     kinds : tuple of str
         `revolute` or `prismatic`, of the drives.
@@ -67,6 +69,7 @@ class Structure:
 
     description: Description
     tables: Tables
+    implied: Tables
     drives: tuple[str, ...]
     kinds: tuple[str, ...]
     coordinates: tuple[str, ...]
@@ -362,15 +365,17 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
     free = np.array([name not in given or name not in drives for name in build.coordinates])
     q = _home(closing, start, free) if loops else start
     structure = Structure(
-        description, t, drives,
+        description, t, t, drives,
         tuple('revolute' if description.joints[name].kind in TURNING else PRISMATIC
               for name in drives), tuple(build.coordinates), build.links, build.rows, loops, tool,
         Mobility(none, none, none, q, len(q), 1.0), size,
         *(np.array([getattr(description.joints[name], limit) for name in drives])
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
-    return replace(structure, mobility=mobility,
-                   tables=build.tables(loops, mobility.passive, mobility.rows, size))
+    implied = np.setdiff1d(np.arange(len(t.row_loop)), mobility.rows)
+    tables, others = (build.tables(loops, mobility.passive, rows, size)
+                      for rows in (mobility.rows, implied))
+    return replace(structure, mobility=mobility, tables=tables, implied=others)
 
 
 def _home(closing: Closing, start: Array, free: Array) -> Array:

@@ -200,8 +200,10 @@ def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:
 def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism with its bodies, from the file where it has them."""
     block = mechanism_block(values)
-    rows = [structure.rows[name] for name in structure.drives]
-    bodies = np.array(rows) if block == ARM_BLOCK else np.flatnonzero(structure.inertial[:, 0] > 0)
+    # Of an arm what each joint moves comes first, in the order of `joints`; then what follows them.
+    driven = [structure.rows[name] for name in structure.drives] if block == ARM_BLOCK else []
+    with_mass = [int(row) for row in np.flatnonzero(structure.inertial[:, 0] > 0)]
+    bodies = np.array([*driven, *(row for row in with_mass if row not in driven)], dtype=np.int64)
     inertial = structure.inertial[bodies]
     for key, first, size in (('links.mass', 0, 1), ('links.moment', 1, 3),
                              ('links.inertia', 4, 6)):

@@ -228,9 +228,9 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
         return Key(name, f'{description}, of each of {listed}', unit, size=count,
                    **{'default': zeros, **more})
 
-    def links(name: str, description: str, unit: str, each: int) -> Key:
-        return Key(name, f'{description}; without it, as the URDF says', unit,
-                   size=each * count if block == ARM else ANY, may_be_empty=True, default=())
+    def links(name: str, description: str, unit: str) -> Key:
+        return Key(name, f'{description}; without it, as the URDF says', unit, size=ANY,
+                   may_be_empty=True, default=())
 
     files = (Key('arm.urdf', "path of the arm's URDF, from the folder of this file",
                  is_text=True),) if block == ARM else (
@@ -255,9 +255,9 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
             default=(0.0, 0.0, -9.81)),
         drives(f'{block}.armature', 'inertia of the rotor, seen at the joint', 'kg m^2, kg',
                lower=0),
-        links('links.mass', 'mass of what each joint moves up to the next', 'kg', 1),
-        links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m', 3),
-        links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2', 6),
+        links('links.mass', 'mass of what each joint moves up to the next', 'kg'),
+        links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m'),
+        links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2'),
         drives('friction.viscous', 'F_v, viscous friction', 'N m s/rad, N s/m', lower=0),
         drives('friction.coulomb', 'F_c, dry friction', 'N m, N', lower=0),
         drives('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
@@ -353,7 +353,7 @@ NODE_KEYS = frozenset({
     'bandwidth', 'damping_ratio',
     'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
-    'action', 'controller_timeout',
+    'action', 'controller_timeout', 'demo', 'max_ahead', 'max_duration',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)
 

@@ -16,8 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import LimitError, WorkspaceError
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
-from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 
 
 class DriveLimits(ABC):

@@ -22,7 +22,9 @@ from pprs_dynamics.physics.effects.laws.passive_friction import (
     friction_forces,
     joint_resistances,
 )
+from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.model.force_model import total_force
@@ -35,7 +37,6 @@ from pprs_dynamics.physics.three_pprs.closure import (
     invert,
     rows_of_chains,
 )
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     ChainSample,
     ThreeChains,
@@ -44,7 +45,6 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
 )
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover
 from pprs_dynamics.physics.three_pprs.kernel_parameters import RobotParameters
-from pprs_dynamics.physics.three_pprs.motion_sample import motion_sample
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
 from pprs_dynamics.physics.three_pprs.robot import Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, MechanismState

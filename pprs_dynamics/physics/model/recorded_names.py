@@ -3,8 +3,10 @@
 
 """How a model's drives are called on the machine: in messages, and in the columns of files.
 
-A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: NAME, DRIVE:
-{position: NAME, velocity: NAME, effort: NAME, scale: NUMBER, position_scale: NUMBER}}`.
+A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
+time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …}, DRIVE: {position:
+COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, scale: NUMBER, position_scale: NUMBER,
+velocity_scale: NUMBER}}`.
 """
 
 from __future__ import annotations
@@ -13,13 +15,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pprs_dynamics.drives import DriveColumns, RecordedColumns
-from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.drives import Column, DriveColumns, RecordedColumns
+from pprs_dynamics.errors import ModelError, UnknownNameError
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
-TIME = 'columns.time'
-QUANTITIES = ('position', 'velocity', 'effort')
-SCALES = {'scale': 'effort', 'position_scale': 'position'}
+TIME, FILES = 'time', 'files.'
+QUANTITIES = ('position', 'velocity', 'effort', 'current')
+SCALES = ('scale', 'position_scale', 'velocity_scale')
+OF_TABLE = (TIME, 'time_scale', 'rate', 'decimal')
+OF_FILES = (TIME, *QUANTITIES)
 
 
 def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, ...]:
@@ -55,32 +59,63 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
     Raises
     ------
     ModelError
-        For keys that are none, names that are no words, scales that are no numbers, and where
-        the column of time or of a drive's position is missing.
+        For keys that are none, columns that are neither names nor numbers, scales and rates that
+        are no numbers.
     """
-    given = {key: value for key, value in values.items() if key.startswith(COLUMNS)}
+    given = {key.removeprefix(COLUMNS): value for key, value in values.items()
+             if key.startswith(COLUMNS)}
     if not given:
         return None
     for key in given:
-        drive, _, quantity = key.removeprefix(COLUMNS).partition('.')
-        if key != TIME and drive not in drives:
-            raise UnknownNameError('drive', drive, (*drives, 'time'), key)
-        if key != TIME and quantity not in (*QUANTITIES, *SCALES):
-            raise UnknownNameError('key', key, [f'{COLUMNS}{drive}.{one}'
-                                                for one in (*QUANTITIES, *SCALES)])
-    if TIME not in given:
-        raise ModelError(TIME, MISSING, 'name the column of time [s]')
+        _require_known(key, drives)
     found = {}
     for drive in drives:
-        keys = {quantity: f'{COLUMNS}{drive}.{quantity}' for quantity in QUANTITIES}
-        names = {quantity: _word(key, given[key]) for quantity, key in keys.items()
-                 if key in given}
-        if 'position' not in names:
-            raise ModelError(f'{COLUMNS}{drive}.position', MISSING, 'name the column of positions')
-        scales = {of: _factor(f'{COLUMNS}{drive}.{key}', given.get(f'{COLUMNS}{drive}.{key}', 1.0))
-                  for key, of in SCALES.items()}
-        found[drive] = DriveColumns(names, scales['effort'], scales['position'])
-    return RecordedColumns(_word(TIME, given[TIME]), found)
+        names = {quantity: _column(f'{drive}.{quantity}', given[f'{drive}.{quantity}'])
+                 for quantity in QUANTITIES if f'{drive}.{quantity}' in given}
+        effort, position, velocity = (
+            _factor(f'{drive}.{scale}', given[f'{drive}.{scale}'])
+            if f'{drive}.{scale}' in given else None for scale in SCALES)
+        # Degrees of a position are those of its velocity, but where that says otherwise.
+        found[drive] = DriveColumns(names, effort or 1.0, position or 1.0,
+                                    velocity or position or 1.0)
+    if given.get('decimal', '.') not in ('.', ','):
+        raise ModelError(f'{COLUMNS}decimal', given['decimal'], 'be "." or ","')
+    rate = _factor('rate', given['rate']) if 'rate' in given else None
+    if rate is not None and rate < 0:
+        raise ModelError(f'{COLUMNS}rate', rate, 'be greater than 0 (samples per second [Hz])')
+    files = {quantity: _word(f'{COLUMNS}{FILES}{quantity}', given[f'{FILES}{quantity}'])
+             for quantity in OF_FILES if f'{FILES}{quantity}' in given}
+    if files and 'position' not in files:
+        raise ModelError(f'{COLUMNS}{FILES}position', '', 'name the file of positions')
+    return RecordedColumns(
+        _column(TIME, given[TIME]) if TIME in given else None, found,
+        _factor('time_scale', given['time_scale']) if 'time_scale' in given else None, rate,
+        given.get('decimal', '.'), files)
+
+
+def _require_known(key: str, drives: Sequence[str]) -> None:
+    """Raise UnknownNameError for a key of the block that is none."""
+    if key in OF_TABLE or key.removeprefix(FILES) in (OF_FILES if FILES in key else ()):
+        return
+    drive, _, quantity = key.partition('.')
+    if drive not in drives:
+        raise UnknownNameError('drive', drive, (*drives, *OF_TABLE, 'files'), f'{COLUMNS}{key}')
+    if quantity not in (*QUANTITIES, *SCALES):
+        raise UnknownNameError('key', f'{COLUMNS}{key}', [
+            f'{COLUMNS}{drive}.{one}' for one in (*QUANTITIES, *SCALES)])
+
+
+def _column(key: str, value: Any) -> Column:
+    """Return a column's name, or its number from 1, which a node's parameter has as a float."""
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        if value < 1:
+            raise ModelError(f'{COLUMNS}{key}', value, 'be a name, or a number from 1')
+        return value
+    if not isinstance(value, str) or not value.strip():
+        raise ModelError(f'{COLUMNS}{key}', value, 'be the name of a column, or its number')
+    return value
 
 
 def _word(key: str, value: Any, may_be_empty: bool = False) -> str:
@@ -92,5 +127,5 @@ def _word(key: str, value: Any, may_be_empty: bool = False) -> str:
 def _factor(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or (
             not math.isfinite(value) or value == 0):
-        raise ModelError(key, value, 'be a finite number other than 0')
+        raise ModelError(f'{COLUMNS}{key}', value, 'be a finite number other than 0')
     return float(value)

@@ -21,8 +21,10 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.errors import ConvergenceError, MotionError, SingularityError
 from pprs_dynamics.physics.mechanism.arithmetic import everywhere, larger, sqrt
+from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix
+from pprs_dynamics.physics.mechanism.motion_sample import Rotation, rotation, vector
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -39,10 +41,8 @@ from pprs_dynamics.physics.three_pprs.closure import (
     rows_of_chains,
     solve_closure,
 )
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import chain_arm, solve_inverse_kinematics
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
-from pprs_dynamics.physics.three_pprs.motion_sample import Rotation, rotation, vector
 from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 RESIDUAL_TOLERANCE = 1e-13  # of the lengths involved; a few rounding errors of the closure

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array, Sample
 from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.vectors import add, cross, in_chain
 from pprs_dynamics.physics.three_pprs.chains import each_chain
@@ -32,7 +33,6 @@ from pprs_dynamics.physics.three_pprs.closure import (
     platform_twist,
     read_inverse,
 )
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     ThreeChains,

@@ -17,17 +17,17 @@ import numpy as np
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
-from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
-from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
-from pprs_dynamics.physics.three_pprs.motion_sample import (
+from pprs_dynamics.physics.mechanism.motion_sample import (
     MotionSample,
     Rotation,
     motion_sample,
     turned,
 )
+from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
+from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
+from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
 from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 CHAIN_COLUMNS = 48

@@ -16,6 +16,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
+from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.closure import (
     INVERSE_COLUMNS,
     InverseParameters,
@@ -24,7 +25,6 @@ from pprs_dynamics.physics.three_pprs.closure import (
     inverse_kernel,
     rod_row,
 )
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics
 from pprs_dynamics.physics.three_pprs.robot import Geometry
 

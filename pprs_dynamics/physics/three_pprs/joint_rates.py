@@ -11,12 +11,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.physics.mechanism.vectors import ChainVector
 from pprs_dynamics.physics.three_pprs.chains import CHAINS
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import read_chains
-from pprs_dynamics.physics.three_pprs.kernel_parameters import KernelParameters
 
 
 class Turnover(NamedTuple):

@@ -1,56 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parameters of kernels: numbers by name, and the row of them that compiled code takes."""
+"""Parameters of the 3-PPRS' kernels, by name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Generic, NamedTuple, TypeVar
-
-import numpy as np
+from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.vectors import Vector
-
-P = TypeVar('P', bound=tuple[Any, ...])
-Q = TypeVar('Q', bound=tuple[Any, ...])
-
-
-class KernelParameters(Generic[P]):
-    """The parameters of a kernel in both forms.
-
-    Parameters
-    ----------
-    named : named tuple
-        Of floats and of tuples, named or not, of the like.
-
-    Attributes
-    ----------
-    row : (K,) array
-        All numbers in `named`, in order. Handing it to compiled code takes a third of a
-        microsecond, the named tuple itself four: half as long as the forces of a sample.
-    """
-
-    __slots__ = ('named', 'row')
-
-    def __init__(self, named: P) -> None:
-        self.named = named
-        self.row = np.array(_numbers(named))
-
-    def extended(self, form: Callable[..., Q], *others: Any) -> KernelParameters[Q]:
-        """Return the parameters `form(named, *others)`, a named tuple that begins with these."""
-        return KernelParameters(form(self.named, *others))
-
-
-def _numbers(named: tuple[Any, ...]) -> list[float]:
-    numbers: list[float] = []
-    for value in named:
-        if isinstance(value, tuple):
-            numbers += _numbers(value)
-        else:
-            numbers.append(float(value))
-    return numbers
 
 
 class Chain(NamedTuple):

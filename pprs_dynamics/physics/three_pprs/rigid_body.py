@@ -18,7 +18,16 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion_sample import (
+    MotionSample,
+    motion_sample,
+    turned,
+    turned_back,
+    vector,
+)
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -36,7 +45,6 @@ from pprs_dynamics.physics.three_pprs.closure import (
     read_inverse,
     unit_wrench,
 )
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     ChainSample,
     ThreeChains,
@@ -48,32 +56,7 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     PlatformBody,
     RobotParameters,
 )
-from pprs_dynamics.physics.three_pprs.motion_sample import (
-    MotionSample,
-    motion_sample,
-    turned,
-    turned_back,
-    vector,
-)
 from pprs_dynamics.physics.three_pprs.robot import Robot
-
-
-class StructureLoad(NamedTuple):
-    """Loads on the mechanism beside bodies and gravity.
-
-    Parameters
-    ----------
-    wrench : (N, 6) array
-        Force [N] and moment about o [N m] on the platform, in `base`.
-    hinge : (N, 3) array
-        Moment about n_i that resists growing u_i in C_i [N m].
-    """
-
-    wrench: Array
-    hinge: Array
-
-    def __add__(self, other: StructureLoad) -> StructureLoad:  # type: ignore[override]
-        return StructureLoad(self.wrench + other.wrench, self.hinge + other.hinge)
 
 
 class Reactions(NamedTuple):

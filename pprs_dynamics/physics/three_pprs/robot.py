@@ -13,12 +13,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
 from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, in_base
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     Chain,
     ChainMasses,
     GeometryParameters,
-    KernelParameters,
     PlatformBody,
     RobotParameters,
 )

@@ -16,10 +16,11 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
 from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
-from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, StructureLoad, solve_bodies
+from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Robot
 
 

@@ -23,7 +23,7 @@ RejectionCode = Literal['EMPTY', 'NAMES', 'FRAME', 'SIZE', 'NON_FINITE', 'QUATER
                         'WORKSPACE', 'SINGULAR', 'LIMIT', 'OUTPUT', 'EFFECT']
 # Conditions: of all nodes; of forces; of the managed node; of the simulated robot; of the monitor;
 # of the trajectory proxy.
-Condition = Literal['OK', 'WAITING', 'CLOCK',
+Condition = Literal['OK', 'WAITING', 'CLOCK', 'CONFLICT',
                     'DONE', 'STALE', 'CLAMPED', 'LAG', 'NEAR_SINGULAR', 'NEAR_WORKSPACE',
                     'CURVE',
                     'UNCONFIGURED', 'INACTIVE', 'FINALIZED',

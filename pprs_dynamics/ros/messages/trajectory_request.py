@@ -69,21 +69,74 @@ class TrajectoryRequest(NamedTuple):
         return self.start + int(self.offsets[-1])
 
 
+class Timing(NamedTuple):
+    """When a trajectory may begin, and how long it may last; 0 in each: any.
+
+    Parameters
+    ----------
+    max_age : float
+        Oldest header stamp; of a message without one, longest time since it was sent [s].
+    max_ahead : float
+        How far ahead of its moment the first point may arrive, which is executed at once [s].
+    max_duration : float
+        Latest time_from_start [s].
+    """
+
+    max_age: float = 0.0
+    max_ahead: float = 0.0
+    max_duration: float = 0.0
+
+    def check(self, request: TrajectoryRequest, now: int, waited: float = 0.0) -> None:
+        """Refuse a request that is too old, too early or too long.
+
+        Parameters
+        ----------
+        request : TrajectoryRequest
+        now : int
+            Time of arrival [ns]; 0 where there is no clock: then nothing can be said of a stamp.
+        waited : float
+            Since the message was sent, by the clocks of sender and receiver [s].
+
+        Raises
+        ------
+        Rejection
+            TIME.
+        """
+        lasts = int(request.offsets[-1]) / NANOSECONDS
+        if self.max_duration and lasts > self.max_duration:
+            raise Rejection('TIME', f'time_from_start of the last point is {lasts:g} s, '
+                            f'max_duration allows {self.max_duration:g} s')
+        if request.start == now:
+            if self.max_age and waited > self.max_age:
+                raise Rejection('TIME', f'the message was sent {waited:.3f} s ago, max_age allows '
+                                f'{self.max_age:g} s; where that is too much, the clocks of two '
+                                'machines differ, or this one is busy')
+        elif now:
+            age = (now - request.start) / NANOSECONDS
+            if self.max_age and age > self.max_age:
+                raise Rejection('TIME', f'header.stamp is {age:.3f} s old, max_age allows '
+                                f'{self.max_age:g} s')
+        ahead = (request.first_stamp - now) / NANOSECONDS
+        if now and self.max_ahead and ahead > self.max_ahead:
+            raise Rejection('TIME', f'the first point is due {ahead:.3f} s from now, and would be '
+                            f'executed at once; max_ahead allows {self.max_ahead:g} s')
+
+
 def read_serialised(
-    data: bytes, now: int, max_age: float = 0.0, missing: str = REJECT, frame: str = BASE,
+    data: bytes, now: int, missing: str = REJECT, frame: str = BASE,
 ) -> TrajectoryRequest:
     """Return what the bytes of a message ask for; see `read_trajectory`."""
     # The layout of the bytes is known for the frame's own name and for none.
     points = read_points(data) if frame == BASE else None
     if points is not None:
         stamp, numbers, offsets = points
-        return _request_of(_start_of(stamp, now, max_age), offsets, _motion_of(numbers))
-    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, max_age, missing, frame)
+        return _request_of(stamp or now, offsets, _motion_of(numbers))
+    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, missing, frame)
 
 
 def read_trajectory(
-    message: MultiDOFJointTrajectory, now: int, max_age: float = 0.0, missing: str = REJECT,
-    frame: str = BASE, body: str = PLATFORM,
+    message: MultiDOFJointTrajectory, now: int, missing: str = REJECT, frame: str = BASE,
+    body: str = PLATFORM,
 ) -> TrajectoryRequest:
     """Return the platform motion that a message asks for.
 
@@ -91,9 +144,7 @@ def read_trajectory(
     ----------
     message : trajectory_msgs/MultiDOFJointTrajectory
     now : int
-        Time of arrival [ns].
-    max_age : float
-        Oldest header stamp that is accepted [s]; 0 for any.
+        Time of arrival [ns], which a stamp of 0 means.
     missing : {'reject', 'spline'}
         What to do where points have no velocities or no accelerations: 'spline' takes those
         that are missing from a spline through the poses.
@@ -117,7 +168,7 @@ def read_trajectory(
         raise Rejection('FRAME', f'header.frame_id is {message.header.frame_id!r:.100}, '
                         f'must be {frame!r} or empty')
     lacking = _check_counts(points, missing)
-    start, offsets = _times_of(message, now, max_age)
+    start, offsets = _times_of(message, now)
     numbers = np.array([_row(point) for point in points])
     if lacking.any():
         _fill_in(numbers, (VELOCITY, ACCELERATION), spline_derivatives(
@@ -139,20 +190,10 @@ def _request_of(
     return TrajectoryRequest(motion_at(offsets / NANOSECONDS), start, offsets)
 
 
-def _times_of(message: Any, now: int, max_age: float) -> tuple[int, Indices]:
+def _times_of(message: Any, now: int) -> tuple[int, Indices]:
     """Return the start of a trajectory, and time_from_start of its points (N,) [ns]."""
-    start = _start_of(nanoseconds(message.header.stamp), now, max_age)
-    return start, np.array([nanoseconds(point.time_from_start) for point in message.points],
-                           dtype=np.int64)
-
-
-def _start_of(stamp: int, now: int, max_age: float) -> int:
-    """Return a header stamp, or the time of arrival where it is 0 [ns]; see `read_trajectory`."""
-    start = stamp if stamp else now
-    age = (now - start) / NANOSECONDS
-    if max_age and age > max_age:
-        raise Rejection('TIME', f'header.stamp is {age:.3f} s old, max_age allows {max_age:g} s')
-    return start
+    return nanoseconds(message.header.stamp) or now, np.array(
+        [nanoseconds(point.time_from_start) for point in message.points], dtype=np.int64)
 
 
 def _check_counts(
@@ -217,8 +258,7 @@ def _twist(twists: Sequence[Any]) -> tuple[float, ...]:
 
 
 def read_joint_trajectory(
-    message: JointTrajectory, joints: Sequence[str], now: int, max_age: float = 0.0,
-    missing: str = REJECT,
+    message: JointTrajectory, joints: Sequence[str], now: int, missing: str = REJECT,
 ) -> TrajectoryRequest:
     """Return the motion that a message asks of an arm.
 
@@ -228,7 +268,7 @@ def read_joint_trajectory(
         Of all joints, in any order; its efforts are not read, and its frame means nothing.
     joints : sequence of n str
         In the model's order.
-    now, max_age, missing
+    now, missing
         See `read_trajectory`; a spline goes through the positions.
 
     Raises
@@ -244,7 +284,7 @@ def read_joint_trajectory(
                         f'{", ".join(joints)} once, and nothing else')
     count = len(joints)
     lacking = _check_counts(points, missing, 'positions', count)
-    start, offsets = _times_of(message, now, max_age)
+    start, offsets = _times_of(message, now)
     none = np.zeros(count)
     order = [names.index(joint) for joint in joints]
     numbers = np.array([[point.positions, point.velocities or none, point.accelerations or none]
@@ -265,12 +305,12 @@ class RequestReader(NamedTuple):
     ----------
     message : type
     read : callable
-        Bytes, time of arrival [ns], largest age [s] and what to do about missing derivatives ->
-        TrajectoryRequest; see `read_trajectory`.
+        Bytes, time of arrival [ns] and what to do about missing derivatives -> TrajectoryRequest;
+        see `read_trajectory`.
     """
 
     message: type
-    read: Callable[[bytes, int, float, str], TrajectoryRequest]
+    read: Callable[[bytes, int, str], TrajectoryRequest]
 
 
 def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
@@ -302,5 +342,5 @@ def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestRea
 
 
 def _poses(frame: str, body: str) -> RequestReader:
-    return RequestReader(MultiDOFJointTrajectory, lambda data, now, age, missing: read_trajectory(
-        message_in(data, MultiDOFJointTrajectory), now, age, missing, frame, body))
+    return RequestReader(MultiDOFJointTrajectory, lambda data, now, missing: read_trajectory(
+        message_in(data, MultiDOFJointTrajectory), now, missing, frame, body))

@@ -31,14 +31,32 @@ from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
     declare_own,
+    has_model,
     in_declared_type,
     overrides,
+    own_parameter,
     with_hint,
 )
 
 NodeModel = DriveModel | ArmModel
 Checked = TypeVar('Checked')
+DEMO = own_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
+                     'demonstrations', stays=True)
 OF_OTHERS = NODE_KEYS - {'use_sim_time', 'start_type_description_service'}  # those are ROS 2's
+
+
+class NoModelError(PprsError):
+    """A node that speaks to a machine was given no model of it.
+
+    Parameters
+    ----------
+    node : str
+    """
+
+    def __init__(self, node: str) -> None:
+        super().__init__(
+            f'{node} was given no model: --ros-args --params-file FILE names that of the robot '
+            'which is connected; -p demo:=true takes the paper\'s robot, for demonstrations')
 
 
 class ExplainsRefusals(Node):
@@ -125,19 +143,25 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
     ------
     ModelError, EffectError
         Where the parameters at start are no model, or an effect of another package cannot begin.
+    NoModelError
+        Where there is none at all, and this is no demonstration.
     """
 
     def __init__(
         self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
     ) -> None:
         self._changed = changed
-        own = tuple(own)
+        own = (*own, DEMO)
         declare_own(node, own)
-        self._kind: type[NodeModel] = ArmModel if is_mechanism(overrides(node)) else DriveModel
+        given = overrides(node)
+        self._kind: type[NodeModel] = ArmModel if is_mechanism(given) else DriveModel
         taken_from_paper = declare_model(node)
         self._stays: dict[str, Any] = {}
         super().__init__(node, own)
         self.model, self.own = self._checked
+        # Whatever is connected would be driven by the forces of another robot.
+        if not self.own[DEMO.name] and not has_model(given):
+            raise NoModelError(node.get_name())
         self._stays = self._staying(self.model, self.own)
         # A status entry, and a line in the log: another robot would get wrong forces.
         self.taken_from_paper = taken_from_paper

@@ -140,6 +140,12 @@ def drive_count(node: Node) -> int:
     return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 
+def has_model(given: Mapping[str, Any]) -> bool:
+    """Return whether a robot is among the parameters given, and not only changes of the paper's."""
+    return is_mechanism(given) or is_axis(given) or any(
+        name.startswith('geometry.') for name in given)
+
+
 def declare_model(node: Node) -> list[str]:
     """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
 
@@ -162,8 +168,7 @@ def declare_model(node: Node) -> list[str]:
         if isinstance(given.get(key), str) and given[key]:
             given[key] = str(folder_of(key) / given[key])
     # Of somebody's own robot what is missing must not become the paper's in silence.
-    is_own = is_mechanism(given) or any(name.startswith('geometry.') for name in given)
-    defaults = {} if is_own else default_parameters()
+    defaults = {} if has_model(given) else default_parameters()
     _declare_keys(node, keys_of(given), given, defaults)
     return [name for name in KEYS if name not in given and name in defaults]
 

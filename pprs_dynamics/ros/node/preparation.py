@@ -14,10 +14,10 @@ from typing import Any
 
 from rclpy.node import Node
 
+from pprs_dynamics.physics.mechanism.evaluation import compiling_here
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
-from pprs_dynamics.physics.three_pprs.evaluation import compiling_here
 
 NAME = 'preparation'
 # [s] A message asks for the interpreter some five times: with Python's 5 ms each, messages at

@@ -16,6 +16,7 @@ from std_msgs.msg import String
 from pprs_dynamics.ros.messages.status_codes import LEVELS, Code, Level
 from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, steady_timer
 from pprs_dynamics.ros.node.qos import LATCHED, publisher
+from pprs_dynamics.ros.node.senders import namesakes
 
 try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -76,6 +77,10 @@ class StatusReporter:
         level, code, message = self._current
         if level == 'OK' and clock_is_missing(self._node):
             level, code, message = 'WARN', 'CLOCK', MISSING_CLOCK
+        elif level == 'OK' and (others := namesakes(self._node)):
+            level, code, message = 'WARN', 'CONFLICT', (
+                f'{others + 1} nodes are called {self._node.get_fully_qualified_name()}, and each '
+                'answers on the same topics; one that was killed is among them for 20 s')
         content = {'level': level, 'code': code, 'message': message,
                    'counters': self._counters, **self.facts}
         self._publisher.publish(String(data=json.dumps(content)))

@@ -16,6 +16,7 @@ from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.physics.mechanism.vectors import in_base, plus, times
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
@@ -27,10 +28,9 @@ from pprs_dynamics.physics.three_pprs.closure import (
     read_inverse,
     rod_row,
 )
-from pprs_dynamics.physics.three_pprs.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ThreeChains, read_chains
 from pprs_dynamics.physics.three_pprs.joint_rates import Turnover, length, relative_rate
-from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters, KernelParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 

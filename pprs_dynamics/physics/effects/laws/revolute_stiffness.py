@@ -18,7 +18,7 @@ import numpy as np
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.three_pprs.rigid_body import StructureLoad
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 

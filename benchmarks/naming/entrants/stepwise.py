@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Stepwise selection by the Bayesian information criterion, with white or whitened noise.
+
+What most people would write first: add the group that lowers BIC most, drop what raises it, until
+nothing pays. G. Schwarz, Ann. Stat. 6 (1978) 461.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.naming.entrants.equations import Equations, Group
+from benchmarks.naming.problems import Answer, Problem
+
+
+def stepwise(problem: Problem, whiten: bool, weight: float = 1.0) -> Answer:
+    """Return what stepwise selection finds; `weight` multiplies the penalty."""
+    equations = Equations(problem, whiten)
+    n = len(equations.y)
+    chosen: list[Group] = []
+
+    def cost(groups: list[Group]) -> float:
+        columns = [k for group in groups for k in group.columns]
+        return float(n * np.log(max(equations.fit(columns)[2], 1e-12) / n)
+                     + weight * len(columns) * np.log(n))
+
+    current = cost(chosen)
+    while len(chosen) < 20:
+        taken = {(one.effect, one.drive) for one in chosen}
+        free = [one for one in equations.groups if (one.effect, one.drive) not in taken]
+        if not free:
+            break
+        gains = equations.gains([k for one in chosen for k in one.columns], free)
+        # Of each number of columns the best, as the penalty differs.
+        sizes = np.array([len(one.columns) for one in free])
+        best = min((cost([*chosen, free[int(k)]]), int(k)) for size in set(sizes)
+                   for k in [np.flatnonzero(sizes == size)[np.argmax(gains[sizes == size])]])
+        if best[0] >= current:
+            break
+        chosen, current = [*chosen, free[best[1]]], best[0]
+        for one in list(chosen):
+            without = [other for other in chosen if other is not one]
+            if cost(without) < current:
+                chosen, current = without, cost(without)
+    return equations.answered(chosen)

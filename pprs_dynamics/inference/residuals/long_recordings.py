@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Excerpts of recordings that are longer than what a search can hold in memory.
+
+A search keeps some thousands of columns, a number each for every block of every drive: an hour
+would take tens of gigabytes and as many minutes. Stretches keep all frequencies up to the
+blocks' own, which longer blocks would not, and what many minutes more would tell is a smaller
+uncertainty alone. Where a robot does the same for hours they are chosen by how much it moves,
+never by how it errs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.files.samples import Defect
+from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
+from pprs_dynamics.measurement.motion.rests import GLANCE
+from pprs_dynamics.measurement.motion.treatment import block_length
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+TOO_LONG = 'too_long'
+# Blocks of all recordings together. A search takes 50 to 150 kB for each, with six drives: as many
+# as the first stay whole, and take up to 2 GB; beside the samples of an hour there is room for the
+# second.
+MOST_WHOLE, MOST_BLOCKS = 16_000, 10_000
+# Stretches of one recording, and how long they are at least [s]: slow noise, and what drifts, is
+# told by long ones, what changes over hours by many.
+STRETCHES, SHORTEST_STRETCH = 12, 5.0
+
+
+def excerpts_within_memory(model: ForceModel, recordings: Sequence[Recording]) -> list[Recording]:
+    """Return recordings of which no more is used than a search can hold.
+
+    What is left out is among their findings. Those that are short enough stay as they are, and so
+    do excerpts.
+    """
+    whole = [one for one in recordings if not _is_excerpt(one)]
+    blocks = sum(_blocks(one, 1) for one in whole)
+    if blocks > MOST_WHOLE and model.blocks_per_period:
+        blocks = sum(_blocks(one, _block(model, one)) for one in whole)
+    if blocks <= MOST_WHOLE:
+        return list(recordings)
+    return [one if _is_excerpt(one) else _excerpt(one, MOST_BLOCKS / blocks)
+            for one in recordings]
+
+
+def _is_excerpt(recording: Recording) -> bool:
+    return any(one.kind == TOO_LONG for one in recording.findings)
+
+
+def _step(recording: Recording) -> float:
+    part = max(recording.segments, key=lambda one: one.stop - one.start)
+    return float(np.median(np.diff(recording.time[part])))
+
+
+def _used(recording: Recording) -> int:
+    return sum(part.stop - part.start for part in recording.segments)
+
+
+def _blocks(recording: Recording, times: int) -> float:
+    """Return how many blocks of so many usual ones a recording has."""
+    if not recording.segments:
+        return 0.0
+    return _used(recording) / (times * block_length(_step(recording)))
+
+
+def _block(model: ForceModel, recording: Recording) -> int:
+    """Return how many usual blocks make one of a model whose blocks follow the motion."""
+    if not recording.segments:
+        return 1
+    length = block_length(_step(recording))
+    pieces = _pieces(recording, STRETCHES * round(SHORTEST_STRETCH / _step(recording)))
+    busiest = pieces[int(np.argmax(_moved(recording, pieces)))]
+    try:
+        smooth = smooth_drives(replace(recording, segments=(busiest,)), None,
+                               model.blocks_per_period)
+    except PprsError:
+        return 1
+    return max(1, smooth.block // length)
+
+
+def _excerpt(recording: Recording, share: float) -> Recording:
+    """Return a recording of which that share is used, in stretches where the drives move most."""
+    if not recording.segments:
+        return recording
+    step, used = _step(recording), _used(recording)
+    length = max(round(share * used / STRETCHES), round(SHORTEST_STRETCH / step))
+    pieces = _pieces(recording, length)
+    groups = np.array_split(np.arange(len(pieces)), max(1, round(share * len(pieces))))
+    moved = _moved(recording, pieces)
+    chosen = [pieces[group[int(np.argmax(moved[group]))]] for group in groups]
+    segments = [chosen[0]]
+    for part in chosen[1:]:
+        if part.start == segments[-1].stop and part.start not in {
+                one.start for one in recording.segments}:
+            segments[-1] = slice(segments[-1].start, part.stop)
+        else:
+            segments.append(part)
+    kept = sum(part.stop - part.start for part in segments)
+    finding = Defect(TOO_LONG, used - kept,
+                     f'{used * step:.0f} s at {1 / step:.4g} Hz are more than a search holds in '
+                     f'memory: {len(segments)} stretches of {length * step:.3g} s, spread over '
+                     'them, are fitted')
+    return replace(recording, segments=tuple(segments), findings=(finding, *recording.findings))
+
+
+def _pieces(recording: Recording, length: int) -> list[slice]:
+    """Return the segments in pieces of a length; what is left of one and half as long is one."""
+    pieces = []
+    for part in recording.segments:
+        starts = list(range(part.start, part.stop, length))
+        if len(starts) > 1 and part.stop - starts[-1] < length / 2:
+            del starts[-1]
+        pieces += [slice(first, min(first + length, part.stop)) for first in starts]
+    return pieces
+
+
+def _moved(recording: Recording, pieces: Sequence[slice]) -> Array:
+    """Return how far the drives move in pieces, each by its own range of positions, summed."""
+    glance = max(1, round(GLANCE / _step(recording)))
+    seen = [recording.position[part][::glance] for part in pieces]
+    ways = np.array([np.abs(np.diff(one, axis=0)).sum(axis=0) for one in seen])
+    span = np.ptp(np.concatenate([np.array([one.min(axis=0), one.max(axis=0)])
+                                  for one in seen]), axis=0)
+    total: Array = (ways / np.where(span > 0, span, np.inf)).sum(axis=1)
+    return total

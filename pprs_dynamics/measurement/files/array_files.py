@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables of arrays: Parquet files and LeRobot datasets of them, MAT and NumPy files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
+
+PARQUET, MAT, NUMPY = ('.parquet', '.pq'), ('.mat',), ('.npz',)
+INFO = Path('meta') / 'info.json'  # of a LeRobot dataset
+DEEPEST = 6  # structures within structures of a MAT file
+
+
+@dataclass(frozen=True)
+class ArrayTable:
+    """Arrays by name.
+
+    Parameters
+    ----------
+    path : Path
+    names : list of str
+        All that there are; `structure.field` of those that are nested.
+    load : callable
+        Returns arrays, (N,) or (N, K), by the names that are asked for.
+    labels : mapping of str to sequence of K str
+        What the elements of lists are, where the file says so.
+    """
+
+    path: Path
+    names: list[str]
+    load: Callable[[Sequence[str]], Mapping[str, Any]]
+    labels: Mapping[str, Sequence[str]]
+
+
+def is_lerobot(path: Path) -> bool:
+    """Return whether a folder is a LeRobot dataset."""
+    return (path / INFO).is_file()
+
+
+def open_arrays(path: Path) -> ArrayTable | None:
+    """Return what is in a file or a dataset of arrays; None where it is neither.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where it promises to be one, and is not.
+    MissingLibraryError
+        For Parquet without pyarrow.
+    """
+    if path.is_dir():
+        return _lerobot(path) if is_lerobot(path) else None
+    if path.suffix in PARQUET:
+        return _parquet(path, [path], {})
+    if path.suffix in (*MAT, *NUMPY):
+        arrays = _mat(path) if path.suffix in MAT else _numpy(path)
+        return ArrayTable(path, list(arrays), lambda wanted: arrays, {})
+    return None
+
+
+def _lerobot(path: Path) -> ArrayTable:
+    """Return the episodes of a LeRobot dataset, one after the other."""
+    try:
+        features = json.loads((path / INFO).read_text(encoding='utf-8'))['features']
+        labels = {name: _labels(of.get('names')) for name, of in features.items()}
+    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+        raise UnreadableFileError(path, f'{INFO} holds no features of a LeRobot dataset'
+                                  ) from None
+    files = sorted((path / 'data').rglob('*.parquet'))
+    if not files:
+        raise UnreadableFileError(path, 'a LeRobot dataset without a Parquet file below data')
+    return _parquet(path, files, labels)
+
+
+def _labels(names: Any) -> list[str]:
+    """Return names of elements, which may be grouped: {motors: [shoulder, …]}."""
+    if isinstance(names, Mapping):
+        names = [name for group in names.values() for name in (
+            group if isinstance(group, list) else [])]
+    return [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
+
+
+def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[str]],
+             ) -> ArrayTable:
+    try:
+        from pyarrow import ArrowException
+        from pyarrow.parquet import ParquetFile
+    except ImportError:
+        raise MissingLibraryError('pyarrow', 'reading Parquet files', 'tables') from None
+
+    def opened(file: Path) -> Any:
+        try:
+            return ParquetFile(file)
+        except (ArrowException, OSError) as error:
+            raise UnreadableFileError(file, f'no Parquet file ({_first_line(error)})') from None
+
+    def load(wanted: Sequence[str]) -> Mapping[str, Any]:
+        parts = []
+        for file in files:
+            try:
+                table = opened(file).read(list(wanted))
+            except (ArrowException, OSError) as error:
+                raise UnreadableFileError(file, f'no Parquet file ({_first_line(error)})'
+                                          ) from None
+            parts.append({name: _plain(table[name].to_numpy()) for name in table.column_names})
+        try:
+            return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
+        except (KeyError, ValueError):
+            raise UnreadableFileError(path, 'its Parquet files do not hold the same columns'
+                                      ) from None
+
+    return ArrayTable(path, opened(files[0]).schema_arrow.names, load, labels)
+
+
+def _plain(values: Any) -> Any:
+    """Return a column of lists as an array, (N, K), and any other as it is."""
+    if values.dtype == object and len(values) and isinstance(values[0], np.ndarray):
+        try:
+            return np.stack(list(values))
+        except ValueError:  # lists of several lengths are no table
+            return values
+    return values
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0][:120]
+
+
+def _mat(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except NotImplementedError:
+        raise UnreadableFileError(path, 'a MAT file of version 7.3, must be saved with -v7'
+                                  ) from None
+    except (MatReadError, ValueError, TypeError, OSError, EOFError, IndexError) as error:
+        raise UnreadableFileError(path, f'no MAT file ({_first_line(error)})') from None
+    return dict(_fields({name: value for name, value in content.items()
+                         if not name.startswith('__')}))
+
+
+def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
+            ) -> Iterator[tuple[str, Any]]:
+    """Yield arrays of structures within structures, by their full names."""
+    for name, value in content.items():
+        if hasattr(value, '_fieldnames'):
+            if depth < DEEPEST:
+                yield from _fields({field: getattr(value, field) for field in value._fieldnames},
+                                   f'{before}{name}.', depth + 1)
+        elif (isinstance(value, np.ndarray) and value.dtype == object
+              and value.ndim == 1 and len(value) and hasattr(value[0], '_fieldnames')):
+            yield from _fields({f'{name}[{k}]': one for k, one in enumerate(value)}, before,
+                               depth + 1)
+        else:
+            yield f'{before}{name}', value
+
+
+def _numpy(path: Path) -> dict[str, Any]:
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            return {name: content[name] for name in content.files}
+    except Exception as error:  # a damaged archive surfaces as zipfile's and zlib's own errors
+        raise UnreadableFileError(path, f'no NumPy file of arrays ({_first_line(error)})'
+                                  ) from None

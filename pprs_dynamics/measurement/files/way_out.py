@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What to write where a file names its drives in a way of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from pprs_dynamics.errors import meant
+
+MOST = 12  # names of a file that are listed
+INIT = '`pprs init ROBOT.urdf {} --output robot.yaml` writes a model file that reads it'
+
+
+def init_command(name: str) -> str:
+    """Return the sentence that names the command which writes a model file."""
+    return INIT.format(name)
+
+
+def missing_names(drives: Sequence[str], known: Collection[str], name: str) -> str:
+    """Return what a file lacks of some drives, which names it holds, and what to write.
+
+    Parameters
+    ----------
+    drives : sequence of str
+        Those looked for.
+    known : collection of str
+        Those that are there.
+    name : str
+        Of the file.
+    """
+    missing = [drive for drive in drives if drive not in known]
+    prefix = common_prefix(missing, known)
+    if prefix:
+        return f'write joint_prefix: {prefix} in the model file'
+    for drive in missing:
+        close = meant(drive, [one for one in known if one not in drives])
+        if close and len(missing) < len(drives):
+            return f'write joint_map: {{{drive}: {close}}} in the model file'
+    return init_command(name)
+
+
+def common_prefix(drives: Sequence[str], known: Collection[str]) -> str:
+    """Return what stands before the names of all drives among those known; '' for nothing."""
+    first = [one.removesuffix(drives[0]) for one in known if one.endswith(drives[0])
+             ] if drives else []
+    return next((prefix for prefix in sorted(first, key=len) if prefix and all(
+        f'{prefix}{drive}' in known for drive in drives)), '')

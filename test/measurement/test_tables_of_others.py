@@ -1,0 +1,262 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables as other programs write them, each against the arrays that were written."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import re
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.errors import PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.physics.model.recorded_names import recorded_columns
+
+JOINTS = ('j1', 'j2', 'j3')
+N, STEP = 300, 0.01
+EPOCH = 1_700_000_000
+TIME = np.arange(N) * STEP
+POSITION = np.sin(TIME[:, None] * [1.0, 1.3, 1.7])
+VELOCITY = np.cos(TIME[:, None] * [1.0, 1.3, 1.7]) * [1.0, 1.3, 1.7]
+EFFORT = 3.0 * np.cos(TIME[:, None] * [2.0, 0.7, 1.1]) + [0.1, 0.2, 0.3]
+
+
+def read(path: Path, keys: dict[str, Any]) -> Recording:
+    """Read with what stands below `columns` of a model file."""
+    columns = recorded_columns({f'columns.{key}': value for key, value in keys.items()}, JOINTS)
+    return read_recording(path, RecordedDrives(JOINTS, columns=columns))
+
+
+def assert_read(recording: Recording, tolerance: float = 1e-9) -> None:
+    np.testing.assert_allclose(recording.time - recording.time[0], TIME, atol=tolerance)
+    np.testing.assert_allclose(recording.position, POSITION, atol=tolerance)
+    np.testing.assert_allclose(recording.effort, EFFORT, atol=tolerance)
+
+
+def numbered(*blocks: str, first: int = 2) -> dict[str, Any]:
+    """Return columns of blocks of three that stand one after another."""
+    return {f'{joint}.{quantity}': first + 3 * b + k
+            for b, quantity in enumerate(blocks) for k, joint in enumerate(JOINTS)}
+
+
+def text(array: np.ndarray, separator: str = ',', header: str = '') -> str:
+    return header + '\n'.join(separator.join(map(repr, row)) for row in array.tolist()) + '\n'
+
+
+WHOLE = np.column_stack([TIME, POSITION, EFFORT])
+ALL = {'time': 1, **numbered('position', 'effort')}
+NAMED = {'time': 't', **{f'{joint}.{quantity}': f'{short}{k}' for k, joint in enumerate(JOINTS)
+                         for quantity, short in (('position', 'q'), ('effort', 'tau'))}}
+HEADER = 't,' + ','.join(f'q{k}' for k in range(3)) + ',' + ','.join(f'tau{k}' for k in range(3))
+DATES = ['T'.join(datetime.fromtimestamp(EPOCH + t, UTC).isoformat().split('T')) for t in TIME]
+TEXTS: dict[str, tuple[str, dict[str, Any]]] = {
+    'no header': (text(WHOLE), ALL),
+    'blanks between': (text(WHOLE, '   '), ALL),
+    'tabs': (text(WHOLE, '\t'), ALL),
+    'decimal comma': (text(WHOLE, ';').replace('.', ','), {**ALL, 'decimal': ','}),
+    'numbers with a header': (text(WHOLE, header='some,words,that,no,one,can,spell\n'), ALL),
+    'header of numpy': ('# ' + text(WHOLE, header=HEADER + '\n'), NAMED),
+    'sep of a spreadsheet': ('sep=;\n' + text(WHOLE, ';', HEADER.replace(',', ';') + '\n'), NAMED),
+    'no time': (text(WHOLE[:, 1:]), {'rate': 1 / STEP, **numbered(
+        'position', 'effort', first=1)}),
+    'milliseconds': (text(np.column_stack([1e3 * TIME, WHOLE[:, 1:]])),
+                     {**ALL, 'time_scale': 1e-3}),
+    'ISO 8601': ('\n'.join([HEADER, *(','.join([date, *map(repr, row)]) for date, row in zip(
+        DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
+    'a blank in the date': ('\n'.join([HEADER, *(','.join([date.replace('T', ' '), *map(
+        repr, row)]) for date, row in zip(DATES, WHOLE[:, 1:].tolist(), strict=True))]), NAMED),
+    'time alone is called otherwise': (text(WHOLE, header='stamp,' + ','.join(
+        f'{joint}/{quantity}' for quantity in ('position', 'effort') for joint in JOINTS) + '\n'),
+        {'time': 'stamp'}),
+}
+
+
+@pytest.mark.parametrize(('content', 'keys'), TEXTS.values(), ids=TEXTS)
+def test_a_csv_of_any_program_is_read(
+    content: str, keys: dict[str, Any], tmp_path: Path,
+) -> None:
+    (tmp_path / 'run.csv').write_text(content)
+    assert_read(read(tmp_path / 'run.csv', keys), 1e-6 if keys.get('time') == 't' else 1e-9)
+
+
+@pytest.mark.parametrize(('per_second', 'word'), [
+    (1e3, 'milliseconds'), (1e6, 'microseconds'), (1e9, 'nanoseconds')])
+def test_stamps_since_1970_are_told_by_their_size(
+    per_second: float, word: str, tmp_path: Path,
+) -> None:
+    stamps = EPOCH * int(per_second) + np.rint(TIME * per_second).astype(np.int64)
+    pd.DataFrame(WHOLE[:, 1:]).assign(stamp=stamps).to_csv(
+        tmp_path / 'run.csv', index=False, columns=['stamp', *range(6)])
+    recording = read(tmp_path / 'run.csv', ALL)
+    assert_read(recording, 1e-6)
+    assert recording.epoch == EPOCH
+    kinds = {one.kind: one.text for one in recording.findings}
+    assert 'epoch_unit' in kinds
+    assert kinds['epoch_unit'] == f'the stamps count {word} since 1970; they are read so'
+    pd.DataFrame(WHOLE[:, 1:]).rename(columns=str).assign(
+        stamp=stamps).to_parquet(tmp_path / 'run.parquet')
+    keys = {'time': 'stamp', **{f'{joint}.{quantity}': str(3 * b + k) for b, quantity in enumerate(
+        ('position', 'effort')) for k, joint in enumerate(JOINTS)}}
+    assert_read(read(tmp_path / 'run.parquet', keys), 1e-9)  # whole numbers lose nothing
+
+
+def test_velocities_have_a_scale_of_their_own(tmp_path: Path) -> None:
+    table = np.column_stack([TIME, np.rad2deg(POSITION), VELOCITY, EFFORT])
+    (tmp_path / 'run.csv').write_text(text(table))
+    keys = {'time': 1, **numbered('position', 'velocity', 'effort'),
+            **{f'{joint}.position_scale': np.pi / 180 for joint in JOINTS}}
+    recording = read(tmp_path / 'run.csv', {**keys, **{
+        f'{joint}.velocity_scale': 1.0 for joint in JOINTS}})
+    assert_read(recording)
+    np.testing.assert_allclose(recording.velocity, VELOCITY, atol=1e-12)
+    # Without one, velocities of positions in degrees are in degrees, too.
+    np.testing.assert_allclose(read(tmp_path / 'run.csv', keys).velocity,
+                               np.deg2rad(VELOCITY), atol=1e-12)
+
+
+def as_mat(folder: Path) -> tuple[Path, str, str, str]:
+    savemat(folder / 'run.mat', {'rec': {
+        't': TIME[:, None], 'act': {'pos': POSITION.T, 'trq': EFFORT}, 'note': 'a word'}})
+    return folder / 'run.mat', 'rec.t', 'rec.act.pos', 'rec.act.trq'
+
+
+def as_struct_array(folder: Path) -> tuple[Path, str, str, str]:
+    other = {'t': TIME[:9], 'q': POSITION[:9], 'tau': EFFORT[:9]}
+    savemat(folder / 'run.mat', {'runs': [other, {'t': TIME, 'q': POSITION, 'tau': EFFORT}]})
+    return folder / 'run.mat', 'runs[1].t', 'runs[1].q', 'runs[1].tau'
+
+
+def as_numpy(folder: Path) -> tuple[Path, str, str, str]:
+    # As TimeSeries of mujoco.sysid saves itself: positions and efforts would be two of them.
+    np.savez(folder / 'run.npz', times=TIME, data=POSITION, tau=EFFORT)
+    return folder / 'run.npz', 'times', 'data', 'tau'
+
+
+def as_parquet(folder: Path) -> tuple[Path, str, str, str]:
+    pd.DataFrame({'timestamp': TIME, 'observation.state': list(POSITION),
+                  'observation.effort': list(EFFORT)}).to_parquet(folder / 'run.parquet')
+    return folder / 'run.parquet', 'timestamp', 'observation.state', 'observation.effort'
+
+
+@pytest.mark.parametrize('write', [as_mat, as_struct_array, as_numpy, as_parquet])
+def test_elements_of_lists_and_fields_of_structures_are_columns(
+    write: Callable[[Path], tuple[Path, str, str, str]], tmp_path: Path,
+) -> None:
+    path, time, position, effort = write(tmp_path)
+    keys = {'time': time, **{f'{joint}.{quantity}': f'{name}[{k}]'
+                             for quantity, name in (('position', position), ('effort', effort))
+                             for k, joint in enumerate(JOINTS)}}
+    assert_read(read(path, keys))
+    with pytest.raises(UnreadableFileError, match=re.escape(f'{position}[0] to {position}[2]')):
+        read(path, {**keys, 'j1.position': f'{position}[3]'})
+    with pytest.raises(UnreadableFileError, match=re.escape(f'{effort}[0] to {effort}[2]')):
+        read(path, {**keys, 'j1.effort': effort})
+    with pytest.raises(UnreadableFileError, match=re.escape(f'did you mean {position}?')):
+        read(path, {**keys, 'j1.position': f'{position}s'})
+
+
+def lerobot(folder: Path) -> Path:
+    (folder / 'meta').mkdir(parents=True)
+    (folder / 'meta' / 'info.json').write_text(json.dumps({'features': {
+        'observation.state': {'names': {'motors': list(JOINTS)}}, 'timestamp': {'names': None}}}))
+    for episode in range(2):
+        data = folder / 'data' / 'chunk-000'
+        data.mkdir(parents=True, exist_ok=True)
+        pd.DataFrame({'timestamp': TIME.astype(np.float32), 'observation.state': list(POSITION),
+                      'observation.effort': list(EFFORT)}).to_parquet(
+            data / f'episode_{episode:06}.parquet')
+    return folder
+
+
+def test_episodes_of_a_lerobot_dataset_are_stretches_of_one_recording(tmp_path: Path) -> None:
+    keys = {'time': 'timestamp', **{f'{joint}.{quantity}': f'observation.{name}[{k}]'
+                                    for quantity, name in (('position', 'state'),
+                                                           ('effort', 'effort'))
+                                    for k, joint in enumerate(JOINTS)}}
+    recording = read(lerobot(tmp_path / 'set'), keys)
+    assert len(recording.segments) == 2
+    for part in recording.segments:
+        np.testing.assert_allclose(recording.position[part], POSITION, atol=1e-9)
+        np.testing.assert_allclose(recording.effort[part], EFFORT, atol=1e-9)
+
+
+def written_apart(folder: Path, shift: float = 0.0, before: str = '') -> Path:
+    """Write positions, efforts and, without a shift, times to files of their own."""
+    (folder / f'{before}q.csv').write_text(text(
+        np.column_stack([TIME, POSITION]) if shift else POSITION))
+    (folder / f'{before}tau.csv').write_text(text(
+        np.column_stack([TIME + shift, EFFORT]) if shift else EFFORT))
+    (folder / f'{before}t.csv').write_text(text(TIME[:, None]))
+    return folder
+
+
+def test_one_file_a_quantity_is_one_recording(tmp_path: Path) -> None:
+    keys = {'files.time': 't.csv', 'files.position': 'q.csv', 'files.effort': 'tau.csv',
+            **{f'{joint}.{quantity}': k + 1 for quantity in ('position', 'effort')
+               for k, joint in enumerate(JOINTS)}}
+    folder = written_apart(tmp_path)
+    assert_read(read(folder, keys))
+    assert_read(read(folder / 'tau.csv', keys))
+    (folder / 'other.csv').write_text('1\n')
+    with pytest.raises(UnreadableFileError, match=r'none of t\.csv, q\.csv, tau\.csv'):
+        read(folder / 'other.csv', keys)
+    with pytest.raises(UnreadableFileError, match=r'columns\.files\.effort names'):
+        read(folder, {**keys, 'files.effort': 'torque.csv'})
+
+
+def test_files_with_times_of_their_own_are_held_at_those_of_the_positions(tmp_path: Path) -> None:
+    keys = {'time': 1, 'files.position': '*q.csv', 'files.effort': '*tau.csv',
+            **{f'{joint}.{quantity}': k + 2 for quantity in ('position', 'effort')
+               for k, joint in enumerate(JOINTS)}}
+    written_apart(tmp_path, shift=-STEP / 2, before='second_')
+    written_apart(tmp_path, shift=-STEP / 2, before='first_')
+    recording = read(tmp_path / 'second_q.csv', keys)
+    np.testing.assert_allclose(recording.effort[1:-1], (EFFORT[1:-1] + EFFORT[2:]) / 2, atol=1e-9)
+    assert 'merged' in {one.kind for one in recording.findings}
+    with pytest.raises(UnreadableFileError, match='2 files of the name'):
+        read(tmp_path, keys)
+
+
+@pytest.mark.parametrize('suffix', ['.gz', '.zst'])
+def test_packed_tables_are_unpacked(suffix: str, tmp_path: Path) -> None:
+    from rosbags.rosbag2.reader import zstd
+
+    data = text(WHOLE).encode()
+    path = tmp_path / f'run.csv{suffix}'
+    path.write_bytes(gzip.compress(data) if suffix == '.gz' else zstd.compress(data))
+    assert_read(read(path, ALL))
+
+
+@pytest.mark.parametrize(('content', 'words'), [
+    ('stamp,j1/position\n0,1\n1,2\n', r'write columns: \{time: stamp\}.*pprs init'),
+    ('0.0,1.0\n0.1,2.0\n', 'pprs init ROBOT.urdf run.csv'),
+    ('time,left_j1/position,left_j2/position,left_j3/position\n0,1,2,3\n',
+     'write joint_prefix: left_'),
+    ('time,j1/position,j2/position,jo3/position\n0,1,2,3\n', r'joint_map: \{j3: jo3\}'),
+    ('time,a/position,b/position\n0,1,2\n', 'pprs init ROBOT.urdf run.csv')])
+def test_every_refusal_names_the_line_to_write(
+    content: str, words: str, tmp_path: Path,
+) -> None:
+    (tmp_path / 'run.csv').write_text(content)
+    with pytest.raises(UnreadableFileError, match=words):
+        read_recording(tmp_path / 'run.csv', JOINTS)
+
+
+@pytest.mark.parametrize('suffix', ['.npz', '.mat', '.parquet', '.csv.zst'])
+def test_what_only_ends_like_a_table_is_one_sentence(suffix: str, tmp_path: Path) -> None:
+    for content in (b'PK\x03\x04' + b'x' * 90, b'\x00' * 200, b'words, words\n'):
+        (tmp_path / f'run{suffix}').write_bytes(content)
+        with pytest.raises(PprsError) as caught:
+            read(tmp_path / f'run{suffix}', NAMED)
+        assert '\n' not in str(caught.value)
