@@ -66,7 +66,7 @@ class EffectFit:
     evidence : float
         By which the cost falls with the effect.
     own_share : float
-        The least share of a column's square that nothing else in the model explains.
+        The least share of its force's square on a place that nothing else in the model explains.
     fits : FittedSets
         Around the model with the effect.
     found : CandidateSet
@@ -120,7 +120,7 @@ def fit_effect(
     report(0.6)
     if found is None:
         return None
-    share = min((fits.regression.own_share(without.fit, block)
+    share = min((fits.regression.own_share(without.fit, block, found.fit.of(block))
                  for block in found.blocks.values() if block.mean is None), default=1.0)
     before = hold_out(fits, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.

@@ -163,6 +163,12 @@ class Library:
                                              self.regression.error_scale, self.design.given)
         return replace(found, centre=self._centres[key])
 
+    def variant(self, component: Component, names: tuple[str, ...]) -> Component:
+        """Return a component with other coefficients; a body where it is most likely to be."""
+        if component.drive is None:
+            return self._placed(self.design.find_term(component.effect, None, {}), names)
+        return replace(component, names=names)
+
     @cached_property
     def score_test(self) -> ScoreTest[Component]:
         """All that more than one drive feels; computed when asked for."""

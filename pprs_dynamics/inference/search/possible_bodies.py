@@ -23,7 +23,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.body_centres import REACH
+from pprs_dynamics.inference.search.body_centres import reach_of
 from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.physics.effects.added_body import AXES, KEPT, MOMENTS, AddedBody
 from pprs_dynamics.physics.effects.structure_effect import with_bodies
@@ -159,7 +159,7 @@ def _margins(robot: Mechanism, component: Component, sign: float) -> Callable[[A
         away = c[1:4] / mass if len(c) > 1 else np.zeros(3)
         inertia = padded[tensor].reshape(3, 3)
         found = [np.array([sign * c[0] / LEAST_MASS - 1,
-                           1 - float(np.linalg.norm(away)) / (REACH * robot.structure.size)])]
+                           1 - float(np.linalg.norm(away)) / reach_of(robot)])]
         if has_extent:
             about = sign * (np.trace(inertia) / 2 * np.eye(3) - inertia)
             extent = np.asarray(np.linalg.eigvalsh(about), dtype=float)
